@@ -12,7 +12,7 @@ from inputdesign_cli.campaign.memory import Memory
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.text_formats import read_csv
+from inputdesign_cli.runs.text_formats import csv_rows, read_csv
 from inputdesign_cli.tasks.campaign_rounds import Part
 
 # So few samples are alike by chance.
@@ -196,8 +196,7 @@ def _of_another(
     found = {
         plan["file"]: abs(_matched(memory, plan, part, excitation).likeness)
         for plan in _plans(memory)
-        if plan["file"] != due["file"]
-        and len(memory.files.get(plan["file"], b"").splitlines()) > part.samples
+        if plan["file"] != due["file"] and len(csv_rows(memory.files.get(plan["file"], b""))) > part.samples
     }
     likest = max(found, key=found.__getitem__, default=None)
     return likest if likest is not None and found[likest] > max(LIKE, abs(likeness)) else None

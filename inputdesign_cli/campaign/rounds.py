@@ -20,7 +20,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.curves import Curves, SignalCurves
 from inputdesign_cli.runs.results import Json, Results, Table
-from inputdesign_cli.runs.text_formats import csv_text
+from inputdesign_cli.runs.text_formats import csv_columns, csv_text
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 
 Decide = Callable[[Past], Decision]
@@ -118,7 +118,7 @@ def _again(
         past = Past(
             records=paths,
             done=sum(int(record["samples"]) for record in records),
-            ended=_ended(files, records),
+            applied=_applied(files, records),
             last=None if last is None else np.array(list(last.values()), dtype=float),
             first_cost=campaign.get("first_cost"),
             seed=seed,
@@ -145,12 +145,13 @@ def _refuted(directory: Path, records: Sequence[Mapping[str, Json]], done: int, 
     )
 
 
-def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
-    """(r,): the last sample that was planned of what was applied."""
-    if not records:
-        return None
-    rows = files[records[-1]["plan"]].decode().splitlines()
-    return np.array(rows[int(records[-1]["samples"])].split(",")[1:], dtype=float)
+def _applied(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
+    """(n, r): what was applied, as it was planned."""
+    parts = [
+        np.stack(list(csv_columns(files[record["plan"]]).values())[1:], axis=1)[: int(record["samples"])]
+        for record in records
+    ]
+    return np.concatenate(parts) if parts else None
 
 
 @contextmanager
@@ -252,6 +253,7 @@ def _decided(
             "power": plan.power,
             "part_power": float(np.sum(np.mean(moved**2, axis=0))),
             "cost": plan.cost,
+            "part_cost": plan.part_cost,
             "kind": plan.kind,
             "capped": plan.capped,
             "seed": seed,

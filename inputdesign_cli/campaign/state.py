@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import chain
-from math import isfinite
 from typing import Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeFloat, PositiveFloat, PositiveInt
+
+from inputdesign_cli.runs.text_formats import csv_columns
 
 
 class _Kept(BaseModel):
@@ -67,7 +68,7 @@ class Campaign(_Kept):
 def _rows(content: bytes) -> int:
     """Of a table of numbers; -1 where it is none."""
     try:
-        rows = [[float(cell) for cell in row.split(",")] for row in content.decode().splitlines()[1:]]
+        columns = list(csv_columns(content).values())
     except ValueError:
         return -1
-    return len(rows) if all(map(isfinite, chain.from_iterable(rows))) else -1
+    return len(columns[0]) if columns and np.isfinite(columns).all() else -1

@@ -36,7 +36,9 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     handles: dict[str, Artist] = {}
     for (name, values), (record, histogram) in zip(channels, grid, strict=False):
         style = "steps-post" if curves.held else "default"
-        (line,) = record.plot(time, values[:shown], color=BLUE, linewidth=0.9, drawstyle=style)
+        (line,) = record.plot(
+            time, values[:shown], _mark(time), color=BLUE, linewidth=0.9, drawstyle=style, markersize=4
+        )
         handles.setdefault("to be applied, held between samples" if curves.held else "to be applied", line)
         _name(record, name, curves.labels.get(name, ""), "")
         limits = curves.limits.get(name, ())
@@ -52,7 +54,8 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     for record, _ in grid[:-1]:
         record.tick_params(labelbottom=False)
     last, counts = grid[-1][0], grid[len(channels) - 1][1]
-    last.set_xlim(time[0], time[-1])
+    if shown > 1:
+        last.set_xlim(time[0], time[-1])
     part = f"{samples} samples" if shown == samples else f"first {shown} of {samples} samples"
     if len(channels) < len(curves.channels):
         part += f", {len(channels)} of {len(curves.channels)} channels"
@@ -62,6 +65,11 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     for label, handle in handles.items():
         handle.set_label(label)
     legend_over_all(page, list(handles.values()))
+
+
+def _mark(time: Array) -> str:
+    """How a signal is drawn: a single sample makes no line."""
+    return "-" if time.size > 1 else "o"
 
 
 def _name(axes: Axes, name: str, label: str, what: str) -> None:
@@ -79,7 +87,7 @@ def _draw_predicted(
     band = axes.fill_between(time, y - noise, y + noise, color=GREY, alpha=0.3, linewidth=0)
     since = " since the start" if grows else ""
     handles.setdefault(f"± 2 standard deviations of noise{since}", band)
-    (line,) = axes.plot(time, y, color=GREEN, linewidth=1.0)
+    (line,) = axes.plot(time, y, _mark(time), color=GREEN, linewidth=1.0, markersize=4)
     # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
     said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
     handles.setdefault(said, line)

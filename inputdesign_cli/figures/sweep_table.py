@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +13,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Array, Json
+from inputdesign_cli.runs.text_formats import csv_rows
 
 # What a sweep is about, if its results have it: the first of these.
 QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
@@ -79,7 +78,7 @@ def read_sweep(root: Path) -> SweepTable:
     """
     try:
         summary = json.loads(read_regular(root / "sweep.json"))
-        header, *rows = csv.reader(io.StringIO(read_regular(root / "sweep.csv").decode(), newline=""))
+        header, *rows = csv_rows(read_regular(root / "sweep.csv"))
         columns = {name: [row[i] for row in rows] for i, name in enumerate(header)}
         table = SweepTable(summary, columns)
         _ = table.axes, table.rows

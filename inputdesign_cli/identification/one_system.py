@@ -48,10 +48,12 @@ def _probability(flat: Sequence[Array], scores: Sequence[Array], chosen: int) ->
     turn = (left[:, kept] / sizes[kept]).T
     own = turn @ flat[chosen]
     shares, axes = np.linalg.eigh(own @ own.T)
-    other = np.sum([score for i, score in enumerate(scores) if i != chosen], axis=0)
     both = (shares > _OF_ONE_SIDE) & (shares < 1.0 - _OF_ONE_SIDE)
+    if not np.any(both):
+        return 1.0
+    shares, axes = shares[both], axes[:, both]
+    other = np.sum([score for i, score in enumerate(scores) if i != chosen], axis=0)
     mine, theirs = (axes.T @ (turn @ score) for score in (scores[chosen], other))
-    apart = (mine / np.where(both, shares, 1.0) - theirs / np.where(both, 1.0 - shares, 1.0))[both]
-    variance = (1.0 / shares + 1.0 / (1.0 - shares))[both] if np.any(both) else np.ones(0)
-    statistic = float(np.sum(apart**2 / variance))
-    return float(scipy.special.chdtrc(both.sum(), statistic)) if np.any(both) else 1.0
+    apart = mine / shares - theirs / (1.0 - shares)
+    statistic = float(np.sum(apart**2 / (1.0 / shares + 1.0 / (1.0 - shares))))
+    return float(scipy.special.chdtrc(len(shares), statistic))

@@ -93,7 +93,7 @@ class PredictionErrors:
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
         """Cost (runs,), psi^T W psi (runs, k, k) and psi^T W epsilon (runs, k); overflow costs infinity."""
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             sums = self.sums(theta)
             cost, weights = self._weighed(sums.errors)
             hessian, slope = self.gathered(sums, weights)

@@ -84,7 +84,7 @@ def rounding(records: Records) -> Array:
 
 def evaluate(records: Records, theta: Array) -> Point:
     """The cost of records; infinite where it overflows, zero where all errors are rounding."""
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         near = records.at(theta)
         S = near.all_errors.T @ near.all_errors / records.samples
     none, nowhere = np.zeros((theta.size, theta.size)), np.zeros(theta.size)

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +64,14 @@ def csv_text(table: Table) -> str:
         lengths = ", ".join(f"{name}: {len(values)}" for name, values in columns.items())
         raise ValueError(f"the columns of a table differ in length ({lengths})")
     rows = zip(*(_shortest(values) for values in columns.values()), strict=True)
-    return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"
+    return csv_line(columns) + "".join(f"{','.join(row)}\n" for row in rows)
+
+
+def csv_line(cells: Iterable[str]) -> str:
+    """One line of a table. A cell with a comma, a quote or the end of a line in it stands in quotes."""
+    buffer, end = io.StringIO(), "\r\n"  # the writer puts in quotes what holds a character of its end
+    csv.writer(buffer, lineterminator=end).writerow(cells)
+    return f"{buffer.getvalue().removesuffix(end)}\n"
 
 
 def shortest(value: float) -> str:
@@ -87,6 +94,27 @@ def _shortest(values: Array) -> list[str]:
 
 def read_csv(path: Path) -> dict[str, Array]:
     """The columns of a file that `csv_text` made: name -> (n,)."""
-    header, *rows = csv.reader(io.StringIO(read_regular(path).decode(), newline=""))
+    return csv_columns(read_regular(path))
+
+
+def csv_columns(content: bytes) -> dict[str, Array]:
+    """The columns of what `csv_text` made: name -> (n,).
+
+    Raises:
+        ValueError: it is no table of numbers.
+    """
+    header, *rows = csv_rows(content)
     values = np.array(rows, dtype=float).reshape(len(rows), len(header))
     return {name: values[:, i] for i, name in enumerate(header)}
+
+
+def csv_rows(content: bytes) -> list[list[str]]:
+    """The cells of each line of a table, its header first.
+
+    Raises:
+        ValueError: it is no table.
+    """
+    try:
+        return list(csv.reader(io.StringIO(content.decode(), newline="")))
+    except csv.Error as error:
+        raise ValueError(str(error)) from error

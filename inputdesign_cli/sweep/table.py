@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterator, Mapping
 
 from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.text_formats import shortest
+from inputdesign_cli.runs.text_formats import csv_line, shortest
 from inputdesign_cli.sweep.plan import Plan
 
 Read = Callable[[str], Mapping[str, Json] | None]
@@ -49,23 +47,23 @@ def table_lines(plan: Plan, read: Read) -> Iterator[str]:
         if content is not None and "code" not in content:
             found.update(dict.fromkeys(scalars(content)))
     names = [*(n for n in FIRST if n in found), *(n for n in found if n not in FIRST)]
-    yield _line([*(axis.key for axis in plan.grid.axes), "status", *names, *LAST])
+    yield csv_line([*(axis.key for axis in plan.grid.axes), "status", *names, *LAST])
     for index in range(len(plan.grid)):
         key = plan.key(index)
         content = read(key)
         point = list(plan.grid[index])
         if content is None:
-            yield _line([*point, PENDING, *([""] * (len(names) + len(LAST)))])
+            yield csv_line([*point, PENDING, *([""] * (len(names) + len(LAST)))])
             continue
         timing = content.get("timing_s", {})
         seconds = _cell(timing.get("point"))
         if "code" in content:
             tail = [seconds, content["code"], content["message"], ""]
-            yield _line([*point, content["status"], *([""] * len(names)), *tail])
+            yield csv_line([*point, content["status"], *([""] * len(names)), *tail])
         else:
             values = scalars(content)
             cells = [_cell(values.get(name)) for name in names]
-            yield _line([*point, content.get("status", "done"), *cells, seconds, "", "", f"points/{key}"])
+            yield csv_line([*point, content.get("status", "done"), *cells, seconds, "", "", f"points/{key}"])
 
 
 def scalars(value: Json, path: str = "") -> dict[str, Json]:
@@ -88,9 +86,3 @@ def _cell(value: Json) -> str:
     if value is None:
         return ""
     return shortest(value) if isinstance(value, float) else str(value)
-
-
-def _line(cells: list[str]) -> str:
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerow(cells)
-    return buffer.getvalue()

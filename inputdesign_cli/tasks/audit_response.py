@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, Results
-from inputdesign_cli.runs.text_formats import csv_text, json_text
+from inputdesign_cli.runs.text_formats import csv_columns, csv_text, json_text
 from inputdesign_cli.tasks.result.response import Planned, ResponseTerms
 
 # Two ways to the same number may differ by this share of it.
@@ -31,7 +29,8 @@ def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> Non
         InaccurateError: `internal-disagreement`.
     """
     written = json.loads(json_text(results.result))
-    record = _reread(csv_text(results.tables["signal"]))
+    _, *samples = csv_columns(csv_text(results.tables["signal"]).encode()).values()
+    record = np.stack(samples, axis=1)
     for claim in [*_of_lines(terms, written), *_of_record(terms, plan, written, record)]:
         raise InaccurateError.because(
             "internal-disagreement",
@@ -103,8 +102,3 @@ def _of_record(
     claimed = written["signal"]["worst_ratio"]
     if not abs(worst - claimed) <= _APART * worst:
         yield f"the record leaves {worst:.10g} times what is admitted, not {claimed:.10g}"
-
-
-def _reread(text: str) -> NDArray[np.float64]:
-    """(n, r): the samples in the text of signal.csv."""
-    return np.loadtxt(islice(text.splitlines(), 1, None), delimiter=",", ndmin=2)[:, 1:]

@@ -147,6 +147,10 @@ class Planned:
         claim: gives what is proved of the design, as in a result; None of white noise.
         why: there is no design.
         share: of its power that the next part has, which else would cost more than the cap.
+        lead: samples of the part, the first ones, that only lead from the end of the last one to its start.
+        part_cost: of a sample of the next part, at the plant that it is planned for, with what earlier parts
+            have left in it.
+        beyond: whether that is more than the cap, whatever is applied.
     """
 
     record: Array
@@ -158,6 +162,9 @@ class Planned:
     claim: Callable[[], Mapping[str, Json]] | None = field(default=None, compare=False, repr=False)
     why: str = ""
     share: float = 1.0
+    lead: int = 0
+    part_cost: float = 0.0
+    beyond: bool = False
 
     @property
     def designed(self) -> bool:
@@ -183,7 +190,7 @@ class Planned:
         steps = int(np.max(np.ceil(np.abs(last) / rate)))
         back = np.arange(1, steps + 1)[:, None] * np.asarray(rate)
         ramp = np.sign(last) * np.maximum(np.abs(last) - back, 0.0)
-        return replace(self, record=np.concatenate([ramp, self.record]))
+        return replace(self, record=np.concatenate([ramp, self.record]), lead=len(ramp))
 
     def at_most(self, cost: float) -> Planned:
         """The same at a smaller power, where a sample would cost more."""
@@ -195,7 +202,8 @@ class Planned:
 
     def weaker(self, share: float) -> Planned:
         """The same, whose next part has this share of its power."""
-        record = np.concatenate([self.applied * np.sqrt(share), self.record[self.take :]])
+        record = self.record.copy()
+        record[self.lead : self.take] *= np.sqrt(share)
         return replace(self, record=record, share=share)
 
 
@@ -222,7 +230,13 @@ class Planner(Protocol):
         """
 
     def plan(
-        self, rules: Rules, known: Standing | None, done: int, seed: int, first: float | None
+        self,
+        rules: Rules,
+        known: Standing | None,
+        done: int,
+        seed: int,
+        first: float | None,
+        before: Array | None = None,
     ) -> Planned:
         """The experiment after so many samples.
 
@@ -230,6 +244,7 @@ class Planner(Protocol):
             known: None before any data.
             seed: of the record.
             first: cost of a sample of the first plan, which the cap is relative to.
+            before: (n, r), what was applied about the operating point and still tells; None for nothing.
 
         Raises:
             IdesignError: there is no first one.

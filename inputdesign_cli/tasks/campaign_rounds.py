@@ -59,7 +59,7 @@ class Past:
     Attributes:
         records: the files that count, each with u and y of a part.
         done: samples that have been applied, in records that count or not.
-        ended: (r,) the last sample that was applied; None before any.
+        applied: (n, r) of these samples, as they were planned; None before any.
         last: (k,) the estimate that was built on before; None before any.
         first_cost: of a sample of the first plan, None before it.
         seed: of the next record.
@@ -68,7 +68,7 @@ class Past:
 
     records: Sequence[Path]
     done: int
-    ended: Array | None
+    applied: Array | None
     last: Array | None
     first_cost: float | None
     seed: int
@@ -163,9 +163,8 @@ def decide(task: Rounds, past: Past) -> Decision:
         return Decision(
             header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes), refuted
         )
-    plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost)
-    if past.ended is not None:
-        plan = plan.following(past.ended - task.offsets, task.rules.rate)
+    before = None if past.applied is None else past.applied - task.offsets
+    plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost, before)
     part = _part(task, plan, past.done)
     more = _of_the_plan(plan, task, past)
     return Decision(header, task.rules, state, stands, assessed, plan, part, task.offsets, (*notes, *more))
@@ -286,10 +285,13 @@ def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
             "first plan, if it is not stated) or limits leave no more until campaign.max_samples"
         )
     if plan.share < _NEARLY:
+        share = f"the part has {100 * plan.share:.0f} % of its power"
         notes.append(
-            "the next part is stronger than the plan is on average, or costs more at the plant of the spec: "
-            f"it has {100 * plan.share:.0f} % of its power, so that campaign.power_cap holds"
+            f"{share}: it would cost more than campaign.power_cap, at the estimate or the plant of the spec"
         )
+    if plan.beyond:
+        told = f"a sample of the next part costs {plan.part_cost:.4g}, more than campaign.power_cap allows"
+        notes.append(f"{told}, by what the parts before it have left in the plant")
     wanted = task.rules.robust_last and task.rules.schedule.last(past.done)
     if wanted and plan.kind == "nominal":
         notes.append(

@@ -95,14 +95,13 @@ class _Run:
         while True:
             try:
                 plan = self.job.planner.plan(
-                    rules, self.known, len(self.r), int(self.rng.integers(_SEEDS)), self.first
+                    rules, self.known, len(self.r), int(self.rng.integers(_SEEDS)), self.first, self.r
                 )
             except (InfeasibleError, InaccurateError, SpecError):
                 return self._ended("unplanned")
             if self.first is None and plan.designed:
                 self.first = plan.cost
-            last = self.r[-1] if len(self.r) else np.zeros(self.r.shape[1])
-            self.r = np.concatenate([self.r, plan.following(last, rules.rate).applied])
+            self.r = np.concatenate([self.r, plan.applied])
             u, y = self._measured()
             self._estimate(u, y)
             met = self.known is not None and self.known.met

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +81,33 @@ def covered(coverage: Coverage) -> dict[str, Json]:
         limits = list(binomial_limits(coverage.kept, runs))
         entry |= {"runs": runs, "kept": coverage.kept / runs, "kept_limits": limits}
     return entry
+
+
+def too_few(coverage: Coverage, probability: float) -> bool:
+    """Whether fewer runs than asked keep r_adm, by more than chance."""
+    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[1] < probability)
+
+
+def too_many(coverage: Coverage, probability: float) -> bool:
+    """Whether more of them do."""
+    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[0] > probability)
+
+
+def missed(result: Mapping[str, Json]) -> list[str]:
+    """Notes where the design of a result, or its record, keeps less than was asked, by more than chance."""
+    notes = []
+    design = result.get("model_error", {}).get("confidence", {})
+    for of, told in (
+        ("of this design", design),
+        ("with this record", result.get("signal", {}).get("confidence", {})),
+    ):
+        if "kept_limits" in told and told["kept_limits"][1] < design["asked"]:
+            notes.append(
+                f"{100 * told['kept']:.1f} % of {told['runs']} simulated experiments {of} keep r_adm, fewer "
+                f"than the {100 * design['asked']:g} % that are asked for by more than chance: ask for more "
+                "runs (confidence: {exact: .., runs: ..}), which tell alpha more sharply"
+            )
+    return notes
 
 
 def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:

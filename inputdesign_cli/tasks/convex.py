@@ -26,7 +26,7 @@ from inputdesign_cli.runs.results import Json, Result, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit import audit
-from inputdesign_cli.tasks.confidence import Confidence, covered
+from inputdesign_cli.tasks.confidence import Confidence, covered, missed
 from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.foresight import Foresight
@@ -145,7 +145,7 @@ class ConvexTask:
         if done.design.result.x.any():
             taken = result.get("signal", {}).get("of_limits", {})
             limited = any(limit.upper for limit in done.design.problem.limits)
-            notes += made.notes
+            notes += [*missed(result), *made.notes]
             notes += record_notes(made.request, done.experiment.samples, record, taken, of_powers=limited)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)

@@ -16,7 +16,14 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
-from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, settled_alpha
+from inputdesign_cli.tasks.confidence import (
+    SETTLED,
+    Confidence,
+    bounded_errors,
+    settled_alpha,
+    too_few,
+    too_many,
+)
 from inputdesign_cli.tasks.record import Made, RecordRequest, as_long, redrawn, worst_ratio
 from inputdesign_cli.tasks.record_search import fitting_record
 from inputdesign_cli.tasks.result.design import Designed
@@ -25,7 +32,9 @@ from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates, Simula
 # A record that needs a larger alpha is made anew, this often at the most.
 _RECORDS = 4
 # Simulated experiments correct the design this often at the most, until they change alpha by this share.
-_CORRECTIONS, _CORRECTED = 4, 0.01
+_CORRECTIONS, _CORRECTED = 5, 0.01
+# Where other runs do not bear the correction out, so many times as many correct.
+_SETS = 4
 
 MakeDesign = Callable[[Question, Confidence], tuple[Designed, dict[str, Json]]]
 Known = Callable[[Record | None], Array | None]
@@ -49,21 +58,25 @@ class ExactConfidence:
         Raises:
             InfeasibleError, InaccurateError: see `settled_alpha`, `SimulatedEstimates.corrected`.
         """
-        calibration, designs = self.calibration, 0
-        alpha, simulated = self._first_alpha(), None
+        calibration, designs, sets = self.calibration, 0, 1
+        alpha, simulated, coverage = self._first_alpha(), None, None
         for _ in range(_CORRECTIONS):
             done, how = self._settled(design, calibration, alpha)
             designs += how["designs"]
-            alpha, simulated = done.confidence.alpha, self._simulated(done, request)
+            alpha, simulated, coverage = done.confidence.alpha, self._simulated(done, request, sets), None
             if simulated is None:
                 break
             errors, before = bounded_errors(done.problem.requirements), calibration.excess
             corrected = simulated.corrected(calibration, errors, done.information)
             if abs(corrected.excess / before - 1.0) <= _CORRECTED:
-                break
+                coverage, asked = self._coverage(done, done.information, simulated), calibration.probability
+                if sets > 1 or not (too_few(coverage, asked) or too_many(coverage, asked)):
+                    break
+                sets = _SETS
+                corrected = replace(simulated, sets=sets).corrected(calibration, errors, done.information)
             calibration = corrected
             alpha *= corrected.excess / before
-        coverage = self._coverage(done, done.information, simulated)
+        coverage = coverage or self._coverage(done, done.information, simulated)
         confidence = Confidence(done.confidence.alpha, self.usual, done.confidence.calibration, coverage)
         return replace(done, confidence=confidence), {**how, "designs": designs}
 
@@ -94,16 +107,17 @@ class ExactConfidence:
         Args:
             known: the information (k, k) of a record; None where it leaves a parameter undetermined.
         """
-        design, alpha = done.design, done.confidence.alpha
+        design, alpha, sets = done.design, done.confidence.alpha, 1
         for _ in range(_RECORDS):
             information = known(made.record)
             if information is None or not (made.record and made.record.met):
                 return made
-            errors, calibration = bounded_errors(done.problem.requirements), self.calibration
-            simulated = self._of_samples(made.record)
-            if simulated is not None:
-                calibration = simulated.corrected(calibration, errors, information)
-            needed = calibration.alpha(errors, information)
+            needed = self._needed(done, made.record, information, sets)
+            if needed <= alpha * (1.0 + SETTLED) and sets == 1:
+                told = self.of_record(done, made.record, information)
+                if too_few(told, self.calibration.probability):
+                    sets = _SETS
+                    needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED):
                 break
             alpha = needed
@@ -116,6 +130,14 @@ class ExactConfidence:
         ratio = worst_ratio(done.problem.requirements)(information)
         return replace(made, record=replace(made.record, worst_ratio=ratio))
 
+    def _needed(self, done: Designed, record: Record, information: Array, sets: int) -> float:
+        """The alpha of these samples, which tell this much (k, k)."""
+        errors, calibration = bounded_errors(done.problem.requirements), self.calibration
+        simulated = self._of_samples(record)
+        if simulated is not None:
+            calibration = replace(simulated, sets=sets).corrected(calibration, errors, information)
+        return calibration.alpha(errors, information)
+
     def of_record(self, done: Designed, record: Record, information: Array) -> Coverage:
         """How many of fresh estimates keep the bounds with these samples, which tell this much (k, k)."""
         return self._coverage(done, information, self._of_samples(record))
@@ -126,12 +148,14 @@ class ExactConfidence:
         coverage = self.calibration.coverage(errors, information, within)
         return coverage if simulated is None else simulated.checked(coverage, errors, within)
 
-    def _simulated(self, done: Designed, request: RecordRequest) -> SimulatedEstimates | None:
+    def _simulated(self, done: Designed, request: RecordRequest, sets: int) -> SimulatedEstimates | None:
         """Estimates of records of the designed spectrum; None where they are not asked for, or not made."""
         samples = as_long(request, done.experiment)
         if self.simulator is None or samples is None or not done.design.result.x.any():
             return None
-        return self.simulator.of(redrawn(request, done.design, done.experiment.inputs, samples), samples)
+        drawn = redrawn(request, done.design, done.experiment.inputs, samples)
+        found = self.simulator.of(drawn, samples)
+        return found and replace(found, sets=sets)
 
     def _of_samples(self, record: Record) -> SimulatedEstimates | None:
         if self.simulator is None:

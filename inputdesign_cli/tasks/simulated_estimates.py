@@ -31,12 +31,14 @@ class SimulatedEstimates:
     Attributes:
         nominal: in raw parameters, as long as the records.
         step: time between samples in the unit of the experiment's frequencies.
+        sets: of so many runs each that correct; those that check are none of them.
     """
 
     nominal: Experiment
     excitation: Excitation
     runs: int
     step: float
+    sets: int = 1
 
     def corrected(
         self, calibration: Calibration, errors: Sequence[ModelError], information: Array
@@ -47,7 +49,9 @@ class SimulatedEstimates:
             InaccurateError: `confidence-not-settled`: more runs are without an estimate than may leave r_adm.
             OutOfTimeError: see `seconds_left`.
         """
-        found = calibration.corrected(errors, information, self._estimates(_TO_CORRECT))
+        streams = [_TO_CORRECT, *range(_TO_CHECK + 1, _TO_CHECK + self.sets)]
+        estimates = np.concatenate([self._estimates(stream) for stream in streams])
+        found = calibration.corrected(errors, information, estimates)
         if not np.isfinite(found.excess):
             raise InaccurateError.because(
                 "confidence-not-settled",

@@ -94,6 +94,10 @@ def test_a_campaign_ends_with_the_true_parameters(run, tmp_path, name, true):
         assert code == 0
         if result["status"] != "running":
             break
+        plan = result["campaign"]["rounds"][-1]["plan"]
+        if name == "two":  # where the power of the inputs is paid for
+            assert plan["part_cost"] == pytest.approx(plan["part_power"])
+        assert plan["part_cost"] <= 10.0 * result["campaign"]["first_cost"] * (1 + 1e-9)
     assert result["status"] == "stopped"
     last = result["campaign"]["rounds"][-1]
     for parameter, value in true.items():

@@ -125,6 +125,12 @@ def overlap(one, other):
     return min(both.width, both.height) if both else 0.0
 
 
+def test_a_single_sample_is_a_dot(page):
+    drawn = page(SignalCurves(T[:1], {"u1": np.array([0.3])}))
+    (line,) = drawn.axes[0].lines
+    assert line.get_marker() == "o"
+
+
 @pytest.mark.parametrize(("kind", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
 def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kind, begins):
     results = Results({}, "", curves={"bound": CURVES["bound"]})

@@ -58,3 +58,17 @@ def test_of_one_system_the_probability_is_uniform():
         y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u) + rng.standard_normal((2, 250))
         found.append(jointly(*zip(u, y, strict=True), model=model).alike[0])
     assert scipy.stats.kstest(found, "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
+    """It has no information in most directions, exactly none in some."""
+    u, y = recorded(1.0, 200, seed)
+    with np.errstate(all="raise", under="ignore"):
+        found = identify(
+            SYSTEMS["arx"], u[:, None], y[:, None], experiments=[samples, 200 - samples], rest=True
+        )
+    matrix = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
+    np.testing.assert_allclose(found.theta, np.linalg.lstsq(matrix, y, rcond=None)[0], rtol=1e-6)
+    assert np.all(np.array(found.alike) > 0.01)

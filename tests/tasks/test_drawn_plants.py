@@ -128,6 +128,7 @@ def test_what_cannot_be_drawn_is_said(text, stated, code, key):
         ("intervals: {b1: [4, 3]}", "bad-interval"),
         (f"covariance: {COVARIANCE}, scenarios: 5000", "too-large"),
         (f"covariance: {COVARIANCE}, discard: 0.7", "out-of-range"),
+        (f"covariance: {COVARIANCE}, discard: 0.1, risk: 0.1", "conflicting-keys"),
     ],
 )
 def test_what_contradicts_itself_is_said(stated, code):

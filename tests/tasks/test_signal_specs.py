@@ -125,7 +125,7 @@ def test_limits_that_no_length_makes_up_for():
 def test_the_shortest_experiment_delivers_the_longer_record():
     text = BASE.replace("experiment: {samples: 500}\n", "objective: shortest_experiment\n")
     outcome = solve(
-        parse_spec(text + "limits: {input_power: 0.6, amplitude: 0.7}\nsignal: {candidates: 2}\n")
+        parse_spec(text + "limits: {input_power: 0.3, amplitude: 0.55}\nsignal: {candidates: 2}\n")
     )
     signal = outcome.result["signal"]
     assert signal["samples"] > outcome.result["samples"]

@@ -48,8 +48,8 @@ class Campaign(Section):
     )
     power_cap: Positive | None = Field(
         default=None,
-        description="Largest cost of a sample, relative to the first plan; a plan beyond it is made longer "
-        "(default: 10).",
+        description="Largest cost of a sample, relative to the first plan; a plan beyond it is made longer, "
+        "a part weaker (default: 10).",
     )
     last: Literal["robust", "nominal"] = Field(
         default="robust",

@@ -132,6 +132,10 @@ class Uncertainty(Section):
         if self.worst_case is not None and self.discard:
             message = "{key} leaves plants out, and worst_case adds the worst ones"
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", ("discard",))
+        if self.risk is not None and self.discard:
+            message = "{key} leaves plants out, and risk draws as many as it takes where none is"
+            hint = "state scenarios: 200 in place of risk; what is missed then is what the fresh plants tell"
+            yield PathDiagnostic("conflicting-keys", message, hint, ("discard",))
         for key in ("covariance", "information"):
             matrix = self.covariance if key == "covariance" else self.information
             if isinstance(matrix, tuple):

@@ -12,7 +12,7 @@ import numpy as np
 
 from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
-from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -29,6 +29,7 @@ from inputdesign_cli.tasks.build.uncertainty import farthest_radius
 from inputdesign_cli.tasks.campaign import REACHED, Kind, Planned, Rules, Standing
 from inputdesign_cli.tasks.given import GivenExcitation
 from inputdesign_cli.tasks.identification import ModelQuestion
+from inputdesign_cli.tasks.part_cost import within_caps
 from inputdesign_cli.tasks.record import RecordRequest, design_cost, given_record
 from inputdesign_cli.tasks.record_search import fitting_record
 from inputdesign_cli.tasks.result.design import Designed, design_result
@@ -62,13 +63,17 @@ class SpecPlanner:
 
     def radius(self, model: Model) -> float:
         """Of the farthest pole of the plant, or of its loop."""
-        controller = self.spec.experiment.controller
-        if controller is None:
-            return model.radius
         try:
-            return build_loop(self.spec, model, controller).radius
+            loop = self._experiment(model).loop
         except SpecError:
             return np.inf
+        return model.radius if loop is None else loop.radius
+
+    def _experiment(self, model: Model) -> Experiment:
+        """The experiment on another plant, in raw parameters."""
+        controller = self.spec.experiment.controller
+        loop = None if controller is None else build_loop(self.spec, model, controller)
+        return replace(self.nominal, model=model, loop=loop)
 
     def question(self, model: Model, information: Array) -> ModelQuestion:
         """What is asked, at a model and in coordinates where the information of the data is I."""
@@ -76,12 +81,19 @@ class SpecPlanner:
         return ask(restated(self.spec, model, _SOURCE), self.nominal.samples, factor)
 
     def plan(
-        self, rules: Rules, known: Standing | None, done: int, seed: int, first: float | None
+        self,
+        rules: Rules,
+        known: Standing | None,
+        done: int,
+        seed: int,
+        first: float | None,
+        before: Array | None = None,
     ) -> Planned:
         """The experiment after so many samples."""
         take = rules.schedule.take(done)
+        earlier = np.zeros((0, self.nominal.inputs)) if before is None else before
         if known is None and done == 0 and rules.pilot_power is not None:
-            return self._pilot(rules.pilot_power, take, seed)
+            return self._kept(self._pilot(rules.pilot_power, take, seed), rules, np.inf, None, earlier)
         cap = rules.cap(first)
         if first is None and known is not None and rules.learns_first:
             cap = _ELSEWHERE * self._unlearned
@@ -94,18 +106,22 @@ class SpecPlanner:
             with suppress(IdesignError):
                 found = self._designed(changes, known)
                 if found.cost <= cap * REACHED:
-                    return self._kept(found.planned.cut(take), cap)
+                    return self._kept(found.planned.cut(take), rules, cap, known, earlier)
         changes = self._changes(known, rest, seed, white=rules.white, goes_on=on)
         if known is None and rules.robust_last:
             del changes["uncertainty"]  # what the spec knows of the plant
         try:
-            return self._kept(self._affordable(changes, known, cap, longest).cut(take), cap)
+            plan = self._affordable(changes, known, cap, longest).cut(take)
+            # The first plan sets the cap, which its own part keeps as well.
+            own = rules.cap(plan.cost) if first is None else np.inf
+            return self._kept(plan, rules, min(cap, own), known, earlier)
         except IdesignError as error:
             if known is None:
                 raise
             # The estimate may be far off, and the next part will tell: nothing is decided by it.
             cost = np.inf if first is None else min(cap, first)
-            return self._kept(self._stopgap(rules, cost, rest, seed, error).cut(take), cap)
+            gap = self._stopgap(rules, cost, rest, seed, error).cut(take)
+            return self._kept(gap, rules, cap, None, earlier)
 
     @cached_property
     def _unlearned(self) -> float:
@@ -116,21 +132,22 @@ class SpecPlanner:
             return np.inf
         return cost or np.inf
 
-    def _kept(self, plan: Planned, cap: float) -> Planned:
-        """The plan whose first part costs no more than the cap at the plant of the spec as well.
+    def _kept(
+        self, plan: Planned, rules: Rules, cap: float, known: Standing | None, before: Array
+    ) -> Planned:
+        """The plan whose first part costs no more than the cap, at its estimate and at the plant of the spec.
 
         A part may be stronger than its plan is on average. And where outputs are paid for, what costs little
         at an estimate (that of a sensor which is not connected) may cost any amount elsewhere; plants differ,
         so that the cap is wide there.
         """
-        if not np.isfinite(cap):
-            return plan
-        weights, applied = build_cost(self.spec), plan.applied
-        at = FiniteRecord(replace(self.nominal, samples=len(applied)), len(applied), record_step(self.spec))
-        cost = weighted_sum(weights, {kind: at.mean_squares(kind, applied).tolist() for kind in weights})
-        if any(self.nominal.depends_on_plant(kind) for kind in weights):
-            cap *= _ELSEWHERE
-        return plan if cost <= cap * REACHED else plan.weaker(cap / cost)
+        if before.size:
+            plan = plan.following(before[-1], rules.rate)
+        weights, caps = build_cost(self.spec), [(self.nominal, cap)]
+        if known is not None:
+            wide = _ELSEWHERE if any(map(self.nominal.depends_on_plant, weights)) else 1.0
+            caps = [(self._experiment(known.model), cap), (self.nominal, wide * cap)]
+        return within_caps(plan, caps, weights, record_step(self.spec), before)
 
     def cheapest(self, model: Model) -> float:
         """Cost, summed over the samples, of the design that knows the plant: the oracle."""
