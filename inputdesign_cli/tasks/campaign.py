@@ -85,6 +85,13 @@ class Rules:
     stops: bool = True
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
+    seed: int = 0  # that the spec states for its signal
+
+    def seed_of(self, number: int) -> int:
+        """Of the record of the round with this number; each has its own."""
+        if not self.seed:
+            return number
+        return int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
 
     def cap(self, first: float | None) -> float:
         """Largest cost of a sample, where one of the first plan costs so much; infinite without either."""
