@@ -206,6 +206,18 @@ class Planned:
         return replace(self, record=record, share=share)
 
 
+@dataclass(frozen=True)
+class Oracle:
+    """What an experiment costs whose design knows the true plant, summed over its samples.
+
+    Attributes:
+        cost: of the spectrum; `record`: of the record that is delivered, on the true plant, None without one.
+    """
+
+    cost: float
+    record: float | None = None
+
+
 class Planner(Protocol):
     """Asks and plans at any estimate."""
 
@@ -243,7 +255,14 @@ class Planner(Protocol):
         """
 
     def cheapest(self, model: Model) -> float:
-        """Cost, summed over the samples, of the design that knows the plant: the oracle.
+        """Cost, summed over the samples, of the spectrum of the design that knows the plant.
+
+        Raises:
+            IdesignError: there is none.
+        """
+
+    def knowing(self, model: Model) -> tuple[float, Array | None]:
+        """That cost, and the record (samples, r) of that design; None where none fits.
 
         Raises:
             IdesignError: there is none.
