@@ -43,7 +43,7 @@ def begun(decide: Decide, folder: Path, directory: Path) -> Results:
         "records": [],
         "rounds": [],
     }
-    return _decided(decision, campaign, {}, seed=1)
+    return _decided(decision, campaign, {})
 
 
 def advanced(
@@ -113,7 +113,7 @@ def _again(
     counting = [str(record["file"]) for record in records if not record["withdrawn"]]
     campaign = {**memory.campaign, "records": records}
     campaign |= {"regardless": True} if regardless else {}
-    last, seed = campaign.get("last"), len(campaign["rounds"]) + 1
+    last = campaign.get("last")
     with _on_disc(files, counting, given) as paths:
         past = Past(
             records=paths,
@@ -121,14 +121,14 @@ def _again(
             applied=_applied(files, records),
             last=None if last is None else np.array(list(last.values()), dtype=float),
             first_cost=campaign.get("first_cost"),
-            seed=seed,
+            number=len(campaign["rounds"]) + 1,
             regardless=bool(campaign.get("regardless", False)),
         )
         decision = decide(past)
     if decision.refuted:
         told = _refuted(memory.directory, records, past.done, decision.rules.end)
         decision = replace(decision, notes=(told, *decision.notes))
-    results = _decided(decision, campaign, files, seed=seed)
+    results = _decided(decision, campaign, files)
     return replace(results, result={**results.result, "made_from": list(memory.made_from)})
 
 
@@ -209,9 +209,7 @@ def _check_new(
             )
 
 
-def _decided(
-    decision: Decision, campaign: Mapping[str, Json], files: dict[str, bytes], *, seed: int
-) -> Results:
+def _decided(decision: Decision, campaign: Mapping[str, Json], files: dict[str, bytes]) -> Results:
     """The directory after a decision."""
     number = len(campaign["records"]) + 1
     plan, stands = decision.plan, decision.standing
@@ -256,7 +254,7 @@ def _decided(
             "part_cost": plan.part_cost,
             "kind": plan.kind,
             "capped": plan.capped,
-            "seed": seed,
+            "seed": decision.rules.seed_of(len(campaign["rounds"]) + 1),
             "offset": decision.offsets.tolist(),
             **({} if plan.claim is None else {"design": plan.claim()}),
             **({"why": plan.why} if plan.why else {}),

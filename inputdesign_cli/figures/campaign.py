@@ -12,6 +12,7 @@ from inputdesign_cli.figures.style import (
     BLACK,
     BLUE,
     DASHED,
+    DOTTED,
     ORANGE,
     PALETTE,
     legend_above,
@@ -107,7 +108,7 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
 
 
 def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
-    """Mean cost against the share of runs within r_adm, each with its spread; the oracle at cost one."""
+    """Mean cost against the share of runs within r_adm, each with its spread; the oracle's at cost one."""
     axes = page.add_subplot()
     handles: list[Artist] = []
     for (name, point), colour in zip(curves.points.items(), PALETTE, strict=False):
@@ -117,10 +118,13 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
         axes.plot([cost], [100 * share], "o", color=colour, markersize=7)
         handles.append(Line2D([], [], color=colour, marker="o", label=name.replace("_", " ")))
     axes.axvline(1.0, color=BLACK, linestyle=DASHED)
-    handles.append(Line2D([], [], color=BLACK, linestyle=DASHED, label="knows the plant"))
+    handles.append(Line2D([], [], color=BLACK, linestyle=DASHED, label="knows the plant: its spectrum"))
+    if curves.record is not None:
+        axes.axvline(curves.record, color=BLACK, linestyle=DOTTED)
+        handles.append(Line2D([], [], color=BLACK, linestyle=DOTTED, label="knows the plant: its record"))
     if max(dear for _, _, dear, *_ in curves.points.values()) > WIDE:
         plain_decades(axes, "x")
-    axes.set_xlabel("cost over that of the design that knows the plant\n(mean, 5 to 95 %)")
+    axes.set_xlabel("cost over that of the spectrum that knows the plant\n(mean, 5 to 95 %)")
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)
     legend_over_all(page, handles)

@@ -180,7 +180,8 @@ _CAPTIONED: Mapping[type[Curves], Callable[[Any], str]] = {
     of.SpectrumCurves: _spectrum_caption,
     of.TradeCurves: _always(
         "What campaigns and experiments in one shot cost, against the share of runs whose model is within "
-        "r_adm of the true plant."
+        "r_adm of the true plant. Costs are over that of the spectrum of the design that knows the plant; "
+        "the record that such a design delivers costs something else (dotted)."
     ),
 }
 _TOLD: Mapping[type[Curves], Callable[[Any, str], str]] = {

@@ -173,12 +173,10 @@ def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
     if "fresh" in found:
         told = found["fresh"]
         low, high = (f"{100 * share:.3g}" for share in told["limits"])
-        worse = f"are less sure than these, with errors up to {told['largest']:.4g} times as large"
         yield (
             "fresh plants",
-            f"of {told['draws']} more, drawn alike, {told['missed']} "
-            f"{worse if best and told['missed'] else 'get less than that'}: {per_cent(told['share'])} "
-            f"({low} to {high})" + (f"; at {told['dearer']} it costs more" if told.get("dearer") else ""),
+            f"of {told['draws']} more, drawn alike, {_missed(told, best)}: {per_cent(told['share'])} "
+            f"({low} to {high})",
             "said of plants drawn as the spec says, not of the true plant",
         )
         if "beyond_limits" in told:
@@ -189,6 +187,17 @@ def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
                 f"{peaks['draws']} go beyond, up to {per_cent(peaks['largest'])} of a limit",
                 "without noise",
             )
+
+
+def _missed(told: Mapping[str, Json], best: bool) -> str:
+    """How many plants miss what, of those that were tried."""
+    missed, less, dearer = told["missed"], told.get("less", told["missed"]), told.get("dearer", 0)
+    if best and missed:
+        return f"{missed} are less sure than these, with errors up to {told['largest']:.4g} times as large"
+    if not dearer:
+        return f"{missed} get less than that"
+    both = f" ({less + dearer - missed} of them both)" if less + dearer > missed else ""
+    return f"{less} get less than that, {dearer} cost more{both}, {missed} in all"
 
 
 def _bound_by(item: Mapping[str, Json]) -> str:

@@ -174,12 +174,14 @@ class RatioCurves(Curves):
 
 @dataclass(frozen=True)
 class TradeCurves(Curves):
-    """Cost over that of the design that knows the plant, against the share of runs within r_adm.
+    """Cost over that of the spectrum of the design that knows the plant, against the share within r_adm.
 
-    Of each way: mean, 5 % and 95 % of the cost; the share and its 95 % limits.
+    Of each way: mean, 5 % and 95 % of the cost; the share and its 95 % limits. `record`: cost of the record
+    that the design delivers which knows the plant.
     """
 
     points: Mapping[str, tuple[float, float, float, float, float, float]]
+    record: float | None = None
 
 
 @dataclass(frozen=True)

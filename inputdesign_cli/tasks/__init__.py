@@ -161,10 +161,12 @@ def next_round(spec: Spec, past: Past) -> Decision:
         DataError: a record cannot be used.
         InfeasibleError, InaccurateError: nothing can be planned.
     """
-    from inputdesign_cli.tasks.build.campaign import build_rounds
+    from inputdesign_cli.tasks.build.campaign import build_rounds, check_applied_in_parts
     from inputdesign_cli.tasks.campaign_rounds import decide
 
     with _placed(spec), time_limit(spec.solver.time_limit):
+        if not past.done:  # one that has begun goes on
+            check_applied_in_parts(spec)
         return decide(build_rounds(spec), past)
 
 

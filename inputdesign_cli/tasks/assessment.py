@@ -37,7 +37,7 @@ from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.faults import faults
 from inputdesign_cli.tasks.result.levels import level_notes
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
-from inputdesign_cli.tasks.result.nominal import from_nominal
+from inputdesign_cli.tasks.result.nominal import from_nominal, of_first_part
 from inputdesign_cli.tasks.result.refutations import contradictions, differences, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors, rival_notes
@@ -105,11 +105,14 @@ def check_assessable(task: Identification) -> None:
         )
 
 
-def judge(task: Identification, found: Identified, started: float) -> Assessment:
+def judge(
+    task: Identification, found: Identified, started: float, *, first: bool | None = None
+) -> Assessment:
     """What an estimate and its data say of what is asked, without a top-up.
 
     Args:
         started: `time.perf_counter()` when the work began.
+        first: of an experiment in parts, whose plans rest on estimates, whether this is the first one.
     """
     identification = identification_results(task, found, started)
     listed: list[dict[str, Json]] = []
@@ -146,6 +149,8 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
         assessment["variations"] = [entry for of_structure, entry in entries if not of_structure]
     if found.question is not None:
         assessment["nominal"], told_apart = _from_nominal(task, found, found.question)
+        if first is not None and told_apart:
+            told_apart = of_first_part(assessment["nominal"]) if first else []
         notes += [] if broken else told_apart
     if verdict == "met":
         notes += unseen(task.header.units, without)

@@ -85,6 +85,13 @@ class Rules:
     stops: bool = True
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
+    seed: int = 0  # that the spec states for its signal
+
+    def seed_of(self, number: int) -> int:
+        """Of the record of the round with this number; each has its own."""
+        if not self.seed:
+            return number
+        return int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
 
     def cap(self, first: float | None) -> float:
         """Largest cost of a sample, where one of the first plan costs so much; infinite without either."""
@@ -207,6 +214,18 @@ class Planned:
         return replace(self, record=record, share=share)
 
 
+@dataclass(frozen=True)
+class Oracle:
+    """What an experiment costs whose design knows the true plant, summed over its samples.
+
+    Attributes:
+        cost: of the spectrum; `record`: of the record that is delivered, on the true plant, None without one.
+    """
+
+    cost: float
+    record: float | None = None
+
+
 class Planner(Protocol):
     """Asks and plans at any estimate."""
 
@@ -251,7 +270,14 @@ class Planner(Protocol):
         """
 
     def cheapest(self, model: Model) -> float:
-        """Cost, summed over the samples, of the design that knows the plant: the oracle.
+        """Cost, summed over the samples, of the spectrum of the design that knows the plant.
+
+        Raises:
+            IdesignError: there is none.
+        """
+
+    def knowing(self, model: Model) -> tuple[float, Array | None]:
+        """That cost, and the record (samples, r) of that design; None where none fits.
 
         Raises:
             IdesignError: there is none.

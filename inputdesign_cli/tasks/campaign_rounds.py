@@ -62,7 +62,7 @@ class Past:
         applied: (n, r) of these samples, as they were planned; None before any.
         last: (k,) the estimate that was built on before; None before any.
         first_cost: of a sample of the first plan, None before it.
-        seed: of the next record.
+        number: of the round.
         regardless: whether to go on where tests refute the structure.
     """
 
@@ -71,7 +71,7 @@ class Past:
     applied: Array | None
     last: Array | None
     first_cost: float | None
-    seed: int
+    number: int
     regardless: bool = False
 
 
@@ -142,7 +142,7 @@ def decide(task: Rounds, past: Past) -> Decision:
                 raise
             notes.append(f"no estimate yet: {told(error)}")
         else:
-            assessment = judge(task.identification, found, started)
+            assessment = judge(task.identification, found, started, first=past.last is None)
             assessed, stands = assessment.results, _standing(task, found, past)
             notes += _shrunk(found, stands)
             looks = task.rules.schedule.looks
@@ -164,7 +164,8 @@ def decide(task: Rounds, past: Past) -> Decision:
             header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes), refuted
         )
     before = None if past.applied is None else past.applied - task.offsets
-    plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost, before)
+    seed = task.rules.seed_of(past.number)
+    plan = task.planner.plan(task.rules, stands, past.done, seed, past.first_cost, before)
     part = _part(task, plan, past.done)
     more = _of_the_plan(plan, task, past)
     return Decision(header, task.rules, state, stands, assessed, plan, part, task.offsets, (*notes, *more))

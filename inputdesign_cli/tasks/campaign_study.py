@@ -14,8 +14,8 @@ from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.tasks.campaign import Planner, Rules, Schedule
-from inputdesign_cli.tasks.campaign_trials import CampaignJob, Ended, run_campaigns
+from inputdesign_cli.tasks.campaign import Oracle, Planner, Rules, Schedule
+from inputdesign_cli.tasks.campaign_trials import CampaignJob, Ended, energy_of, run_campaigns
 from inputdesign_cli.tasks.convex import ConvexTask
 from inputdesign_cli.tasks.result.campaign_study import campaigns_curves, campaigns_entry
 
@@ -82,10 +82,7 @@ def studied(study: CampaignStudy, results: Results, executor: Executor | None) -
         executor: where the runs are computed (default: in this process); the result does not depend on it.
     """
     started = time.perf_counter()
-    try:
-        oracle = study.planner.cheapest(study.true.model)
-    except IdesignError:  # the true system cannot be asked what the spec asks
-        oracle = None
+    oracle = oracle_of(study)
     ways = {name: tried(study, rules, executor) for name, rules in ways_of(study).items()}
     result = dict(results.result)
     result["simulation"] = campaigns_entry(study.true, ways, oracle, runs=study.runs, seed=study.seed)
@@ -94,6 +91,16 @@ def studied(study: CampaignStudy, results: Results, executor: Executor | None) -
     return replace(
         results, result=result, tables={**results.tables, **tables}, curves={**results.curves, **curves}
     )
+
+
+def oracle_of(study: CampaignStudy) -> Oracle | None:
+    """What knowing the plant would cost; None where the true system cannot be asked what the spec asks."""
+    try:
+        cost, record = study.planner.knowing(study.true.model)
+    except IdesignError:
+        return None
+    energy = 0.0 if record is None else energy_of(record, study.true, study.step, study.cost)
+    return Oracle(cost, energy or None)
 
 
 def ways_of(study: CampaignStudy) -> dict[str, Rules]:

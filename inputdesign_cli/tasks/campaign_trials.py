@@ -52,8 +52,7 @@ class Ended:
         energy: cost per sample times samples, on the true plant.
         within: whether the estimate is off by no more than r_adm of the truth, of itself, of the plant of the
             spec; None where it cannot be asked.
-        trail: after each part the samples, the worst ratio at the estimate, and the energy.
-        shrunk: parts after which the estimate was not built on as it is.
+        parts: that were applied; `shrunk`: those after which the estimate was not built on as it is.
     """
 
     status: Ending
@@ -62,7 +61,7 @@ class Ended:
     theta: Array
     ratio: float | None
     within: Mapping[str, bool | None]
-    trail: tuple[tuple[int, float, float], ...]
+    parts: int
     shrunk: int
 
 
@@ -79,8 +78,8 @@ class _Run:
     rng: np.random.Generator
     known: Standing | None = None
     first: float | None = None
-    shrunk: int = 0
-    trail: list[tuple[int, float, float]] = field(default_factory=list)
+    parts: int = 0
+    shrunk: set[int] = field(default_factory=set)  # parts, by their numbers
 
     def __post_init__(self) -> None:
         true = self.job.true
@@ -103,6 +102,7 @@ class _Run:
                 self.first = plan.cost
             self.r = np.concatenate([self.r, plan.applied])
             u, y = self._measured()
+            self.parts += 1
             self._estimate(u, y)
             met = self.known is not None and self.known.met
             over = rules.over(len(self.r), met=met)
@@ -176,30 +176,23 @@ class _Run:
         if stands is None:
             return
         self.known, self.last = stands, stands.model
+        self.shrunk.discard(self.parts)  # a part may be estimated anew
         if stands.share == 1.0:
             self.sound = stands.model
         else:
-            self.shrunk += 1
-        self.trail.append((len(self.r), stands.ratio, self._energy()))
-
-    def _energy(self) -> float:
-        true = FiniteRecord(self.job.true, len(self.r), self.job.step)
-        powers: dict[PowerKind, list[float]] = {
-            kind: np.mean(true.signals(kind, self.r) ** 2, axis=0).tolist() for kind in POWER_KINDS
-        }
-        return len(self.r) * weighted_sum(self.job.cost, powers)
+            self.shrunk.add(self.parts)
 
     def _ended(self, status: Ending) -> Ended:
         samples = len(self.r)
         return Ended(
             status,
             samples,
-            self._energy() if samples else 0.0,
+            energy_of(self.r, self.job.true, self.job.step, self.job.cost) if samples else 0.0,
             self.last.theta,
             self._true_ratio() if samples else None,
             {of: within(self.job, self.last, of) for of in ("true", "estimate", "design")},
-            tuple(self.trail),
-            self.shrunk,
+            self.parts,
+            len(self.shrunk),
         )
 
     def _true_ratio(self) -> float | None:
@@ -213,6 +206,15 @@ class _Run:
             return ratio_of(question, question.information)
         except (IdesignError, np.linalg.LinAlgError):
             return None
+
+
+def energy_of(r: Array, true: Experiment, step: float, cost: Mapping[PowerKind, Weight]) -> float:
+    """Cost on the true plant of a record (n, r), summed over its samples; see `CampaignJob`."""
+    at = FiniteRecord(true, len(r), step)
+    powers: dict[PowerKind, list[float]] = {
+        kind: np.mean(at.signals(kind, r) ** 2, axis=0).tolist() for kind in POWER_KINDS
+    }
+    return len(r) * weighted_sum(cost, powers)
 
 
 def within(job: CampaignJob, estimate: Model, of: str) -> bool | None:

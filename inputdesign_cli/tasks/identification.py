@@ -193,10 +193,7 @@ def identification_results(task: Identification, found: Identified, started: flo
     elif found.preparation.levels:
         result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
-    against = [
-        *speaking_against(task, found),
-        *hardly_explained(header.units, found.model, estimate),
-    ]
+    against = [*speaking_against(task, found), *hardly_explained(header.units, found.model, estimate)]
     notes = identification_notes(found.data.notes, found.model, estimate, against)
     notes += differences(estimate, [name for name, _ in found.data.files])
     notes += prior_notes(estimate, stated=task.has_prior)

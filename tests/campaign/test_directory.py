@@ -259,3 +259,20 @@ def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
         if campaign["records"]:
             break
     assert run("status", "c")[0] == 0
+
+
+@pytest.mark.parametrize(("gain", "sign"), [(2.0, False), (-2.0, True)])
+def test_a_poor_plant_of_the_spec_is_told_once(run, begun, tmp_path, gain, sign):
+    """It is why an experiment goes in parts; the plans after the first one rest on estimates."""
+    told = []
+    for number in (1, 2):
+        record = applied(begun, tmp_path / f"r{number}.csv", gain=gain)
+        out = run("next", "c", record, "--json", "--no-figures")[1]
+        result = json.loads(out)
+        assert result["assessment"]["nominal"]["deviations"] > 5.0
+        told.append([note for note in result.get("notes", []) if "plant of the spec" in note])
+    ((note,), later) = told
+    assert "standard deviations from the plant of the spec" in note
+    assert ("opposite sign" in note) == sign
+    assert len(note) < 200
+    assert later == []

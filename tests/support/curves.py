@@ -143,6 +143,7 @@ CURVES = {
     "estimates": EstimateCurves(T[20:80:20], {"b1": W[:3], "f1": W[3:6]}, {"b1": W[:3], "f1": W[:3]}),
     "true ratios": RatioCurves({"campaign": 0.5 + W / 5, "one shot": 0.8 + W / 5}),
     "costs and shares": TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}),
+    "costs beside a record": TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}, 0.85),
     "cloud": CloudCurves(("b1", "f1"), ((0, 1),), np.stack([W, np.cos(W)], 1), np.ones(2), np.eye(2)),
     "deviations": DeviationCurves((DeviationPanel(W, G, 0.05 * G, 0.04 * G, None, "design"),)),
     "named bound": bound(BoundPanel(W, 1e-40 * G, G, 0.01 * G, names="heating → temperature")),

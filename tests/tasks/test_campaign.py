@@ -361,11 +361,28 @@ def test_whole_campaigns_are_simulated():
     campaign = told["inputs"]["campaign"]
     assert campaign["samples"]["mean"] >= 60
     # The oracle is the design that knows the true plant.
-    truth = solve(parse_spec(SPEC, overrides=["campaign=null", "plant={B: [0, 3.2], F: [1, -0.75]}"])).result
+    known = ["signal.candidates=1", "campaign=null", "plant={B: [0, 3.2], F: [1, -0.75]}"]
+    solved = solve(parse_spec(SPEC, overrides=known))
+    truth, applied = solved.result, solved.tables["signal"].columns["u1"]
     assert told["oracle_cost"] == pytest.approx(truth["cost"], rel=1e-6)
     assert campaign["cost_over_oracle"]["mean"] == pytest.approx(
         campaign["energy"]["mean"] / (200 * truth["cost"]), rel=1e-6
     )
+    # Who knows the plant applies a record, too, and one that was chosen.
+    assert told["oracle_record_cost"] == pytest.approx(np.mean(applied**2), rel=1e-9)
+    assert campaign["cost_over_oracle_record"]["mean"] == pytest.approx(
+        campaign["energy"]["mean"] / np.sum(applied**2), rel=1e-9
+    )
+    # The first part has 60 samples and others 140, the last one perhaps less; in one shot there is one.
+    later = (campaign["samples"]["mean"] - 60) / 140
+    assert later <= campaign["parts"]["mean"] - 1.0 < later + 1.0
+    assert [told["inputs"][way]["parts"]["mean"] for way in ("one_shot", "white")] == [1.0, 1.0]
+    # The names of the numbers in campaigns.csv.
+    table, numbers = results.tables["campaigns"].columns, told["numbers"]
+    for way, name in enumerate(numbers["way"]):
+        ended = table["status"][table["way"] == way]
+        for status, ending in enumerate(numbers["status"]):
+            assert np.sum(ended == status) == told["inputs"][name][ending]
     # Without anything to learn from, the experiment in one shot costs what its design costs.
     shot = told["inputs"]["one_shot"]
     assert shot["samples"]["mean"] == 200

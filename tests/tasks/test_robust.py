@@ -104,9 +104,28 @@ def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
     assert found["cost"] > 1.05 * mean["cost"]
     assert robust["dearest"]["cost"] == pytest.approx(found["cost"], rel=1e-6)
     assert robust["dearest"]["scenario"] in [one["scenario"] for one in robust["active"]]
-    assert 0 <= robust["fresh"]["dearer"] <= robust["fresh"]["missed"]
     assert robust["fresh"]["share"] <= robust["risk"]["after"]
     assert "dearest" not in mean["robust"]
+    assert "less" not in mean["robust"]["fresh"]
+
+
+def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
+    prior = "uncertainty={covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 60, cost: worst}"
+    task = build_convex(parse_spec(LOOP, overrides=[prior]))
+    done, _ = task.designed()
+    tried = [
+        one for batch in task.plants.afresh() for one in tried_on(done.design, done.experiment.samples, batch)
+    ]
+    less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
+    dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
+    found = task.solve().result
+    told = found["robust"]["fresh"]
+    assert (told["less"], told["dearer"], told["missed"]) == (len(less), len(dearer), len(less | dearer))
+    assert less > dearer > set()
+    (words,) = (text for name, text, _ in facts(found, "s") if name == "fresh plants")
+    both = len(less & dearer)
+    assert f"{len(less)} get less than that, {len(dearer)} cost more ({both} of them both)" in words
+    assert f"{len(less | dearer)} in all" in words
 
 
 def test_leaving_out_the_dearest_plants_makes_it_cheaper():

@@ -54,7 +54,7 @@ def test_templates_are_specs_that_can_be_designed(name):
         ("plant", "a kettle", "none of these"),
         ("plant", "gain 2, time constant -3", "positive"),
         ("plant", "gain 0, time constant 3", "gain"),
-        ("plant", "gain 2, time constant 3 parsecs", "\"parsecs\" is not understood"),
+        ("plant", "gain 2, time constant 3 parsecs", '"parsecs" is not understood'),
         ("plant", "gain 2, time constant 180, within 95 %", "less than 90"),
         ("plant", "log nothing.csv", "no file"),
         ("wish", "happiness", "per cent"),

@@ -11,6 +11,7 @@ from inputdesign_cli.specification.models.campaign import Campaign, Pilot
 from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.identification import build_identification
+from inputdesign_cli.tasks.build.signal_settings import operating_points
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.system import record_step
 from inputdesign_cli.tasks.campaign import Rules, Schedule
@@ -43,6 +44,7 @@ def build_rules(spec: Spec) -> Rules:
         robust_last=stated.last == "robust",
         stops=stated.stop == "data",
         rate=_rate(spec),
+        seed=spec.signal.seed or 0,
     )
 
 
@@ -141,6 +143,16 @@ def build_rounds(spec: Spec) -> Rounds:
         SpecError, DataError: see `build_rules` and the builders of a design.
     """
     rules, planner = build_rules(spec), SpecPlanner(spec)
-    offset = 0.0 if spec.signal.offset is None else spec.signal.offset
-    offsets = np.broadcast_to(np.asarray(offset, dtype=float), (planner.nominal.inputs,))
-    return Rounds(build_identification(spec), planner, rules, offsets)
+    return Rounds(build_identification(spec), planner, rules, operating_points(spec))
+
+
+def check_applied_in_parts(spec: Spec) -> None:
+    """Raise `SpecError` (`not-supported`) for what a spec asks of its record and no part has."""
+    unlike = {
+        "samples": (spec.signal.samples, "campaign.block or campaign.stages have the lengths of parts"),
+        "also": (spec.signal.also, "remove it: signal.csv is the file of a part"),
+    }
+    for name, (stated, hint) in unlike.items():
+        if stated is not None:
+            key = f"signal.{name}"
+            raise spec.complain("not-supported", f"parts of a campaign have no {key}", hint=hint, key=key)

@@ -150,13 +150,19 @@ class SpecPlanner:
         return within_caps(plan, caps, weights, record_step(self.spec), before)
 
     def cheapest(self, model: Model) -> float:
-        """Cost, summed over the samples, of the design that knows the plant: the oracle."""
-        changes = self._changes(None, self.nominal.samples, 1)
-        spec = restated(self.spec, model, _SOURCE).to_yaml()
-        overrides = _overrides({**changes, "solver.any_spectrum": False})
-        folder = self.spec.resolve_path(".")
-        done, _ = build_convex(parse_spec(spec, _SOURCE, overrides, folder=folder)).designed()
-        return done.experiment.samples * design_cost(done.design, done.cost)
+        """Cost, summed over the samples, of the spectrum of the design that knows the plant."""
+        return self.nominal.samples * self._knowing(model).cost
+
+    def knowing(self, model: Model) -> tuple[float, Array | None]:
+        """That cost, and the record of that design."""
+        found, record = self._knowing(model), None
+        with suppress(IdesignError):
+            record = found.planned.record
+        return self.nominal.samples * found.cost, record
+
+    def _knowing(self, model: Model) -> _Found:
+        changes = self._changes(None, self.nominal.samples, self.spec.signal.seed or 0)
+        return self._designed_at(model, changes)
 
     def _affordable(
         self, changes: Mapping[str, Json], known: Standing | None, cap: float, longest: int
@@ -195,7 +201,10 @@ class SpecPlanner:
         return found.planned.at_most(cap)
 
     def _designed(self, changes: Mapping[str, Json], known: Standing | None) -> _Found:
-        task = build_convex(self._spec({**changes, "solver.any_spectrum": False}, known))
+        return self._designed_at(None if known is None else known.model, changes)
+
+    def _designed_at(self, model: Model | None, changes: Mapping[str, Json]) -> _Found:
+        task = build_convex(self._spec({**changes, "solver.any_spectrum": False}, model))
         done, how = task.designed()
         kind: Kind = "white" if "spectrum" in changes else "nominal" if task.plants is None else "robust"
         return _Found(task.record, done, how, task.tolerance, kind)
@@ -222,8 +231,8 @@ class SpecPlanner:
         cost = power * unit
         return Planned(samples, rest, _power(samples), cost, "stopgap", why=why.diagnostics[0].message)
 
-    def _spec(self, changes: Mapping[str, Json], known: Standing | None) -> Spec:
-        spec = self.spec if known is None else restated(self.spec, known.model, _SOURCE)
+    def _spec(self, changes: Mapping[str, Json], model: Model | None) -> Spec:
+        spec = self.spec if model is None else restated(self.spec, model, _SOURCE)
         return parse_spec(
             spec.to_yaml(), file=_SOURCE, overrides=_overrides(changes), folder=self.spec.resolve_path(".")
         )

@@ -23,6 +23,7 @@ from inputdesign_cli.tasks.build.knowledge import build_knowledge
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.prior import build_earlier, stated_prior
 from inputdesign_cli.tasks.build.requirements import build_requirements
+from inputdesign_cli.tasks.build.signal_settings import operating_points
 from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
@@ -65,11 +66,10 @@ def build_identification(spec: Spec) -> Identification:
 
 
 def operating_point(spec: Spec) -> dict[str, float]:
-    """`signal.offset`, about which u varies; in closed loop r does, and nothing is known of u."""
+    """What u varies about, `signal.offset`; in closed loop r does, and nothing is known of u."""
     if spec.closed_loop or spec.signal.offset is None:
         return {}
-    levels = np.broadcast_to(np.asarray(spec.signal.offset, dtype=float), (spec.plant.inputs,))
-    return {f"u{j + 1}": float(level) for j, level in enumerate(levels)}
+    return {f"u{j + 1}": float(level) for j, level in enumerate(operating_points(spec))}
 
 
 def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:

@@ -53,7 +53,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         others=tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
         limit_keys=tuple(key for key, value in stated.items() if value is not None),
         delivery=Delivery(
-            operating_points=None if signal.offset is None else _operating_points(spec),
+            operating_points=None if signal.offset is None else operating_points(spec),
             also=signal.also or (),
             full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),
             sampling_rate=sampling_rate(spec),
@@ -126,7 +126,7 @@ def build_bounds(spec: Spec) -> Bounds:
     amplitude, output = stated_peaks(spec)
     if amplitude is not None and quantisers:
         amplitude = amplitude - np.abs(
-            per_channel(spec.signal.offset or 0.0, inputs) - _operating_points(spec)
+            per_channel(spec.signal.offset or 0.0, inputs) - operating_points(spec)
         )
     return Bounds(
         amplitude=amplitude,
@@ -149,7 +149,7 @@ def _quantisers(spec: Spec) -> tuple[Quantiser, ...]:
     )
 
 
-def _operating_points(spec: Spec) -> Array:
+def operating_points(spec: Spec) -> Array:
     """(r,): the offset of each input, or the value of its converter next to it."""
     quantisers = _quantisers(spec)
     if quantisers:
@@ -162,7 +162,7 @@ def deviations(spec: Spec, table: Table) -> Array:
     columns = build_units(spec).excitations
     values = np.stack([np.asarray(table.columns[name]) for name in columns], axis=1)
     given = spec.given is not None and spec.given.type == "signal"
-    return values if given else values - _operating_points(spec)
+    return values if given else values - operating_points(spec)
 
 
 def sampling_rate(spec: Spec) -> float:

@@ -11,6 +11,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.runs.curves import Curves, RatioCurves, TradeCurves
 from inputdesign_cli.runs.results import Json, Table
+from inputdesign_cli.tasks.campaign import Oracle
 from inputdesign_cli.tasks.campaign_trials import Ended, Ending
 
 _WITHIN = {"true": "within_r_adm_true", "estimate": "within_r_adm_estimate", "design": "within_r_adm"}
@@ -18,13 +19,13 @@ _ENDINGS: tuple[Ending, ...] = ("stopped", "missed", "undecided", "unplanned")
 
 
 def campaigns_entry(
-    true: Experiment, ways: Mapping[str, Sequence[Ended]], oracle: float | None, *, runs: int, seed: int
+    true: Experiment, ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None, *, runs: int, seed: int
 ) -> dict[str, Json]:
     """`simulation` of `result.json`.
 
     Args:
         ways: the runs of the campaign, and of what it is compared with.
-        oracle: cost, summed over the samples, of the design that knows the true plant.
+        oracle: what knowing the true plant would cost; None where it cannot be asked.
     """
     model = true.model
     entry: dict[str, Json] = {
@@ -34,11 +35,16 @@ def campaigns_entry(
         "true_parameters": dict(zip(model.names, model.theta.tolist(), strict=True)),
         "true_variance": float(model.covariance[0, 0]) if model.outputs == 1 else model.covariance,
         "inputs": {name: way_entry(ended, oracle) for name, ended in ways.items()},
+        "numbers": {"way": list(ways), "status": list(_ENDINGS)},
     }
-    return entry if oracle is None else {**entry, "oracle_cost": oracle / true.samples}
+    if oracle is not None:
+        entry["oracle_cost"] = oracle.cost / true.samples
+        if oracle.record is not None:
+            entry["oracle_record_cost"] = oracle.record / true.samples
+    return entry
 
 
-def way_entry(ended: Sequence[Ended], oracle: float | None) -> dict[str, Json]:
+def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> dict[str, Json]:
     """What the runs of one way of experimenting gave."""
     entry: dict[str, Json] = {}
     for of, name in _WITHIN.items():
@@ -52,12 +58,14 @@ def way_entry(ended: Sequence[Ended], oracle: float | None) -> dict[str, Json]:
         entry["true_ratio"] = _spread(ratios) | {"at_most_one": float(np.mean(np.array(ratios) <= 1.0))}
     energies = np.array([run.energy for run in ended])
     entry["energy"] = _spread(energies)
-    if oracle is not None and oracle > 0.0:
-        entry["cost_over_oracle"] = _spread(energies / oracle)
+    if oracle is not None and oracle.cost > 0.0:
+        entry["cost_over_oracle"] = _spread(energies / oracle.cost)
+        if oracle.record is not None:
+            entry["cost_over_oracle_record"] = _spread(energies / oracle.record)
     entry["samples"] = _spread([run.samples for run in ended])
     counts = Counter(run.status for run in ended)
     entry |= {status: counts[status] for status in _ENDINGS}
-    entry["parts"] = {"mean": float(np.mean([len(run.trail) for run in ended]))}
+    entry["parts"] = {"mean": float(np.mean([run.parts for run in ended]))}
     entry["shrunk"] = sum(run.shrunk for run in ended)
     return entry
 
@@ -67,7 +75,7 @@ def _spread(values: Sequence[float] | np.ndarray) -> dict[str, Json]:
 
 
 def campaigns_curves(
-    ways: Mapping[str, Sequence[Ended]], oracle: float | None
+    ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
     """campaigns.csv with a row for each run, the true ratios, and cost against coverage."""
     ratios = {name: [run.ratio for run in ended if run.ratio is not None] for name, ended in ways.items()}
@@ -81,14 +89,15 @@ def campaigns_curves(
     for name, ended in ways.items():
         kept, energies = sum(bool(run.within["true"]) for run in ended), [run.energy for run in ended]
         limits = binomial_limits(kept, len(ended))
-        costs = np.quantile(np.array(energies) / oracle, [0.05, 0.95])
-        points[name] = (float(np.mean(energies)) / oracle, *costs.tolist(), kept / len(ended), *limits)
-    curves["cost_coverage"] = TradeCurves(points)
+        costs = np.quantile(np.array(energies) / oracle.cost, [0.05, 0.95])
+        points[name] = (float(np.mean(energies)) / oracle.cost, *costs.tolist(), kept / len(ended), *limits)
+    record = None if oracle.record is None else oracle.record / oracle.cost
+    curves["cost_coverage"] = TradeCurves(points, record)
     return tables, curves
 
 
 def _table(ways: Mapping[str, Sequence[Ended]]) -> Table:
-    """A row for each run; the ways by their number in the order of the result.
+    """A row for each run; ways and endings by their numbers, of which the result has the names.
 
     Without the true ratios where some run has none, as where the true system has another structure.
     """

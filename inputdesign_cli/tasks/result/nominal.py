@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,17 @@ def from_nominal(
         f"the estimate contradicts the plant of the spec: {apart}{'; ' * bool(listed)}{', '.join(listed)}). "
         "The design rested on the plant of the spec; what is admitted here is that of the estimate. Check "
         "signs and units of the record; if they are right, put the estimate into the spec"
+    ]
+
+
+def of_first_part(told: Mapping[str, Json]) -> list[str]:
+    """The same note where an experiment in parts begins: a poor first estimate is why it goes in parts."""
+    if told["probability"] > _CHANCE:
+        return []
+    sign = " and G has the opposite sign at low frequency: check the signs of the record"
+    return [
+        f"the estimate lies {told['deviations']:.3g} standard deviations from the plant of the spec"
+        f"{sign if told.get('opposite_sign') else ''}. From now on plans rest on the estimates"
     ]
 
 

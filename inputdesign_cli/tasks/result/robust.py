@@ -173,7 +173,8 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
         return {}
     shares = np.array([one.share for one in tried])
     dearer = np.array([one.cost for one in tried]) > MET * done.design.result.objective  # of cost: worst
-    missed = int(np.sum((shares > MET) | dearer))
+    less = shares > MET
+    missed = int(np.sum(less | dearer))
     entry: dict[str, Json] = {
         "draws": len(tried),
         "rejected": rejected,
@@ -185,7 +186,7 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
     if peaks:
         entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
     promised = plants.paid == "worst" and done.problem.goal == "cost"
-    return entry | ({"dearer": int(np.sum(dearer))} if promised else {})
+    return entry | ({"less": int(np.sum(less)), "dearer": int(np.sum(dearer))} if promised else {})
 
 
 def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> dict[str, Json]:
