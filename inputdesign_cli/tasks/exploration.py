@@ -48,6 +48,11 @@ _LEAST_FIT = 5.0
 # One that is refuted besides needs more.
 _HALF = 50.0
 _DRIVE = "move the reference of the loop, or add dither to the input, and record again"
+_UNSTEADY = (
+    "a mode of the plant loses less than a hundredth in the whole record: it cannot be told from an "
+    "integrator, or from drift. Record in a loop or until the output settles, or remove the drift: --detrend "
+    "linear"
+)
 _KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
@@ -80,7 +85,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     log = without_drift(log, found)
     loose = (f"{told}: {_DRIVE}" for told in undriven)
     rising = like_integrators(found, log.step, log.time_unit)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *loose)
+    unsteady = () if found.steady or rising else (_UNSTEADY,)
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *unsteady, *loose)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))

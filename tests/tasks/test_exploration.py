@@ -134,6 +134,18 @@ def test_an_integrator_earns_no_trust_and_is_offered(tmp_path):
     assert not any("is asked" in note for note in result["notes"]), "this spec asks for nothing"
 
 
+@pytest.mark.slow
+def test_an_integrator_that_no_stable_model_explains_is_offered(tmp_path):
+    """y(t) - y(t-1) = 0.05 u(t-3): estimates from the whole record end on the limit of stability."""
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 8)
+    y = np.cumsum(np.concatenate([np.zeros(3), 0.05 * u[:-3]])) + 0.1 * rng.standard_normal(800)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+    (reason,) = explore(log, Preparation(sample_time=1.0)).reasons
+    assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.05, rel=0.05)
+
+
 def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):
     path = record(tmp_path / "log.csv")
     _, *rows = path.read_text().splitlines()

@@ -21,6 +21,9 @@ _AS_GOOD, _POINTS = 1.2, 2.0
 # Of a preference, what comes before the number of parameters.
 _CONDITIONS = 4
 
+Ranges = tuple[tuple[int, int | None], ...]
+"""Delays from the one to the other; None: no upper limit is told."""
+
 Shape = Orders | Process
 """A structure for one output."""
 
@@ -115,11 +118,14 @@ class Chosen:
         ]
         return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
 
-    def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
+    def ranges(self, candidate: Candidate) -> Ranges:
         """Of each input, the delays that 95 % of confidence leaves a candidate."""
         order = min(max(candidate.orders.order, 1), max(self.by_order))
         delays = candidate.orders.delays
-        return candidate.ranges or delay_ranges(self.estimated, order, delays, self.least, self.most)
+        found = candidate.ranges or delay_ranges(self.estimated, order, delays, self.least, self.most)
+        # A Gaussian estimate of a dead time may be wider than the record that it is made from.
+        longest = max(len(y) for _, y in self.estimated)
+        return tuple((low, high if high <= longest else None) for low, high in found)
 
     def best_of(self, *, physical: bool) -> Candidate | None:
         """The best with parameters of that kind among those that are about as good as any."""

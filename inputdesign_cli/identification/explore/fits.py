@@ -15,12 +15,16 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametrised, SampledModel
 from inputdesign_cli.plant.polynomial import Array
 
 Parts = Sequence[tuple[Array, Array]]
+NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)
+"""What ends the estimate of one structure, not that of others: warnings of arithmetic may be errors."""
+
 _BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
 # A mode that loses less than this over the whole record cannot be told from one on the stability limit.
@@ -104,8 +108,10 @@ def by_chance(samples: int, unknowns: int, tried: int) -> float:
     """Per cent that the best of `tried` simulations explains of white noise, with 5 % of probability at most.
 
     Levels, starts and an agreement by chance take a chi-squared share of its power; the probabilities of
-    the structures that were tried add up at most (Bonferroni).
+    the structures that were tried add up at most (Bonferroni). Of no samples it explains all.
     """
+    if samples == 0:
+        return 100.0
     share = scipy.special.chdtri(unknowns, _BY_CHANCE / tried) / samples
     return float(100.0 * (1.0 - np.sqrt(max(1.0 - share, 0.0))))
 

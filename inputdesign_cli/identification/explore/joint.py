@@ -13,8 +13,16 @@ from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore.busiest import busiest
-from inputdesign_cli.identification.explore.candidates import Candidate, Chosen
-from inputdesign_cli.identification.explore.fits import Fits, Parts, beside, fits, is_steady
+from inputdesign_cli.identification.explore.candidates import Candidate, Chosen, Ranges
+from inputdesign_cli.identification.explore.fits import (
+    NOT_COMPUTED,
+    Fits,
+    Parts,
+    beside,
+    fits,
+    is_steady,
+    output_error_form,
+)
 from inputdesign_cli.identification.explore.processes import process_models
 from inputdesign_cli.identification.explore.search import explore_structure
 from inputdesign_cli.plant import Model, PolynomialModel
@@ -50,7 +58,7 @@ class Found:
 
     outputs: tuple[Chosen, ...]
     taken: tuple[Candidate, ...]
-    ranges: tuple[tuple[tuple[int, int], ...], ...]
+    ranges: tuple[Ranges, ...]
     model: Model
     estimate: Estimate
     used: Parts
@@ -64,6 +72,11 @@ class Found:
     def moving(self) -> list[int]:
         """The other inputs."""
         return [j for j in range(self.model.inputs) if j not in self.still]
+
+    @property
+    def steady(self) -> bool:
+        """Whether the plant is stable, as far as the record tells."""
+        return is_steady(self.model, sum(len(y) for _, y in self.used))
 
 
 def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
@@ -147,9 +160,13 @@ def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
 def _estimated(
     found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool
 ) -> tuple[tuple[Candidate, ...], Estimate, Model]:
-    """The best structures on the whole record; simpler ones where these cannot be estimated there."""
-    inputs = used[0][0].shape[1]
+    """The best structures on the whole record; simpler ones where these cannot be estimated there.
+
+    Where all of them stand on the limit of stability, the first that is stable: it is like an integrator.
+    """
+    inputs, samples = used[0][0].shape[1], sum(len(y) for _, y in used)
     reason: SpecError | None = None
+    edge: tuple[tuple[Candidate, ...], Estimate, Model] | None = None
     for taken in _combinations(found):
         try:
             begun = taken
@@ -163,9 +180,15 @@ def _estimated(
         except SpecError as error:
             reason = error
             continue
+        except NOT_COMPUTED:
+            continue
         model = structure.at(estimate.theta, estimate.noise)
-        if is_steady(model, sum(len(y) for _, y in used)):
+        if is_steady(model, samples):
             return taken, estimate, model
+        if edge is None and output_error_form(model).radius < 1.0:
+            edge = (taken, estimate, model)
+    if edge is not None:
+        return edge
     raise reason or bad_spec(
         "no-structure",
         "no stable model explains the record",

@@ -8,12 +8,12 @@ says which one to take.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
@@ -28,6 +28,7 @@ from inputdesign_cli.identification.explore.candidates import (
     with_noise,
 )
 from inputdesign_cli.identification.explore.fits import (
+    NOT_COMPUTED,
     Parts,
     fits,
     is_steady,
@@ -79,13 +80,13 @@ class _Parts:
         return sum(len(y) for _, y in self.first)
 
     def candidate(self, orders: Shape) -> Candidate | None:
-        """A structure, quickly estimated from records that begin at rest, and judged."""
+        """A structure, quickly estimated from records that begin at rest, and judged; None: it cannot be."""
         n = min(max(orders.order, 1), max(self.quick))
         resting = self.resting[n]
         try:
             points = orders.starts(resting, self.quick[n], max(n, 2))
             return self._searched(orders, orders.model(), resting, points, free=False)
-        except (SpecError, np.linalg.LinAlgError):
+        except NOT_COMPUTED:
             return None
 
     def refined(self, candidate: Candidate) -> Candidate | None:
@@ -94,7 +95,7 @@ class _Parts:
             return self._searched(
                 candidate.orders, candidate.model, centred(self.first), candidate.theta[None], free=True
             )
-        except (SpecError, np.linalg.LinAlgError):
+        except NOT_COMPUTED:
             return None
 
     def _searched(
@@ -117,8 +118,11 @@ class _Parts:
         tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
         fitted = structure.at(found.point.theta, noise)
         on_first, on_second = (fits(fitted, part, self.late) for part in (self.first, self.second))
+        settled = orders.at(found.point.theta)
+        if max(settled.delays) >= max(len(y) for _, y in self.second):
+            raise ArithmeticError("a delay is longer than all that the model is to be judged by")
         return Candidate(
-            orders.at(found.point.theta),
+            settled,
             fitted,
             on_first.simulation[0],
             on_second.simulation[0] if output_error_form(fitted).radius < 1.0 else -np.inf,
@@ -228,7 +232,8 @@ def _best_arx(
         orders = arx(lags, a, b)
         if np.all(np.isfinite(theta)) and orders.size == theta.size:
             model = orders.model().at(theta)
-            if all(model.stable_outputs):
-                ranked.append((simulation_fit(model, second, late)[0], orders))
+            with suppress(*NOT_COMPUTED):
+                if all(model.stable_outputs):
+                    ranked.append((simulation_fit(model, second, late)[0], orders))
     ranked.sort(key=lambda pair: -pair[0])
     return (orders for _, orders in ranked[:_ARX_KEPT])

@@ -157,7 +157,7 @@ def prepared(
     Raises:
         DataError: `data-not-uniform`, the times jitter too much; `data-not-a-number`, no row is whole.
     """
-    sheet, rows, told = signals.sheet, signals.sheet.lines, list[str]()
+    sheet, rows, told = signals.sheet, signals.sheet.lines, list(signals.told)
     time = signals.time if signals.name else signals.time * step
     for name, x in zip(signals.inputs, signals.u.T, strict=True):
         there = ~np.isnan(x)

@@ -18,7 +18,7 @@ from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
-from inputdesign_cli.tasks.build.tables import evenly_rising, no_column
+from inputdesign_cli.tasks.build.tables import may_be_times, no_column
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
 _CHANNELS = {
@@ -87,10 +87,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     else:
         step = 1.0
         told.append("the file has no times and no --sample-time was given: the sample time is taken for 1")
-        told += [
-            f"{name} rises by even steps: if it holds the times, add time={name} to --columns"
-            for name in evenly_rising(sheet, [column.strip().lower() for column in given.columns.values()])
-        ]
+        told += may_be_times(sheet, [column.strip().lower() for column in given.columns.values()])
     if not np.isfinite(step):
         message = f"{path.name} has one time only, which tells no sample time"
         hint = "give it: --sample-time 0.5; or say which column holds the time (--columns)"
@@ -155,7 +152,7 @@ def _count(sheet: Sheet, letter: str, columns: Mapping[str, str]) -> int:
         return len(named)
     held = next((name for name in sheet.left_out if _CHANNELS[letter].fullmatch(name.lower())), None)
     if held is not None and not named:
-        raise DataError(no_column(sheet, held))
+        raise DataError(no_column(sheet, held, letter))
     what = "input" if letter == "u" else "output"
     header = sheet.contents or "it has no header"
     shown = f" ({header}; {len(sheet.columns)} columns)" if sheet.shown else ""

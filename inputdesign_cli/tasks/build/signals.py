@@ -13,8 +13,9 @@ from inputdesign_cli.tasks.build.column_hints import called, rising
 from inputdesign_cli.tasks.build.columns import channel_columns, time_column
 from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet
+from inputdesign_cli.tasks.build.files.sheet import elsewhere
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import columns_of, is_dated
+from inputdesign_cli.tasks.build.tables import column_named, columns_of
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class Signals:
         time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
         dated: whether the times stand as dates; they are counted in seconds then.
         inputs, outputs: what notes call the columns of u and y.
+        told: what was done to read them.
     """
 
     sheet: Sheet
@@ -35,6 +37,7 @@ class Signals:
     y: Array
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    told: tuple[str, ...] = ()
 
 
 def signals_of(
@@ -77,10 +80,21 @@ def signals_of(
     driving = (*_labels("u", inputs), *references)
     u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
-    dated = bool(name) and is_dated(sheet, name)
+    times = column_named(sheet, name) if name else None
     if name:
         _check_rising(kept, time[rows])
-    return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
+    told = (times.told if times else "", elsewhere(sheet.path, sheet.others).lstrip("; "))
+    return Signals(
+        kept,
+        time[rows],
+        name,
+        times is not None and times.dated,
+        u,
+        y,
+        driving,
+        _labels("y", outputs),
+        tuple(filter(None, told)),
+    )
 
 
 def _nothing_left(sheet: Sheet, preparation: Preparation, time: Array) -> DataError:

@@ -13,13 +13,19 @@ from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
+from inputdesign_cli.tasks.build.files.dates import AS_DATES
 from inputdesign_cli.tasks.build.files.layout import BLANK, LEFT_OUT
+from inputdesign_cli.tasks.build.files.sheet import Column
 from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 
 _TIME = re.compile(
     r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
+)
+# What clocks are called too, where nothing is called as times are; other things may be, so its numbers rise.
+_CLOCK = re.compile(
+    r"(uhrzeit|zeitpunkt|messzeit|datum|date|clock|hora|fecha|marca[ _]de[ _]tiempo)(?![^\W_]).*"
 )
 # The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
 _SHORT = re.compile(
@@ -106,15 +112,33 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
 
 
 def time_columns(sheet: Sheet) -> list[str]:
-    """Names, in small letters, of columns that hold times by their names; that of dates if there is none."""
+    """Names, in small letters, of columns that hold times by their names; the number of one without a name.
+
+    If there is none, those that are called as clocks are and rise; at last that of dates or times of day.
+    """
     header = sheet.header
     found = [
         name
         for name, column in zip(header, sheet.columns, strict=False)
         if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly_rises(column.numbers))
     ]
-    dated = [name for name, column in zip(header, sheet.columns, strict=False) if column.dated]
-    return found or [name for name in dated if name.startswith("dat")]
+    if found:
+        return found
+    clocks = [
+        (name or str(i + 1), column)
+        for i, (name, column) in enumerate(zip(header, sheet.columns, strict=False))
+        if (_advances(column.numbers) if column.dated else _mostly_rises(column.numbers))
+        and (column.dated or _CLOCK.fullmatch(name))
+    ]
+    # Dates and times of day that were joined say the same.
+    once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
+    return once if len(once) == 1 else [name for name in once if name.startswith("dat")]
+
+
+def _advances(x: Array) -> bool:
+    """Whether hardly any value is that of the row before; in which order the rows stand is told later."""
+    steps = np.diff(x[~np.isnan(x)])
+    return bool(np.mean(steps != 0.0) > _MOSTLY) if steps.size else False
 
 
 def _mostly_rises(x: Array) -> bool:
@@ -122,21 +146,26 @@ def _mostly_rises(x: Array) -> bool:
     return bool(np.mean(steps > 0.0) > _MOSTLY) if steps.size else False
 
 
-def evenly_rising(sheet: Sheet, taken: Collection[str]) -> list[str]:
-    """Names of columns not taken whose numbers rise by even steps: times, or a count of rows."""
-    found = []
-    for name, column in zip(sheet.names, sheet.columns, strict=False):
-        steps = np.diff(column.numbers)
+def may_be_times(sheet: Sheet, taken: Collection[str]) -> list[str]:
+    """What is said of columns not taken that may be times: they rise by even steps, or hold dates or text."""
+    told = []
+    for i, column in enumerate(sheet.columns):
+        name = sheet.names[i].strip() if i < len(sheet.names) else ""
+        steps = np.diff(column.numbers[~np.isnan(column.numbers)])
         middle = float(np.median(steps)) if steps.size > 1 else 0.0
-        even = middle > 0.0 and bool(np.all(np.abs(steps - middle) < _EVENLY * middle))
-        if even and name.strip().lower() not in taken and column.fault is None:
-            found.append(name.strip())
-    return found
+        even = middle > 0.0 and bool(np.mean(np.abs(steps - middle) < _EVENLY * middle) > _MOSTLY)
+        if name.lower() in taken or str(i + 1) in taken or column.fault is not None:
+            continue
+        called = name or f"column {i + 1}"
+        if column.dated or even:
+            what = "holds dates or times of day" if column.dated else "rises by even steps"
+            told.append(f"{called} {what}: if it holds the times, add time={name or i + 1} to --columns")
+    return [*told, *(f"{name} is not used: it holds {what}" for name, what in sheet.left_out.items())]
 
 
-def is_dated(sheet: Sheet, name: str) -> bool:
-    """Whether a column holds dates, as seconds since the first."""
-    return sheet.columns[named_columns(sheet, name.strip().lower())[0]].dated
+def column_named(sheet: Sheet, name: str) -> Column:
+    """The first column of a name, or that of a number."""
+    return sheet.columns[named_columns(sheet, name.strip().lower())[0]]
 
 
 def read_header(path: Path, *, key: str) -> list[str]:
@@ -168,9 +197,10 @@ def named_columns(sheet: Sheet, start: str) -> list[int]:
 def _unclear(sheet: Sheet, what: str, wanted: Mapping[str, str]) -> Diagnostic:
     """The error about columns, by role, of which there is none or several."""
     names = list(wanted.values())
-    held = next((name for name in sheet.left_out if name.lower() in map(str.lower, names)), None)
+    asked = {start.strip().lower(): role for role, start in wanted.items()}
+    held = next((name for name in sheet.left_out if name.lower() in asked), None)
     if held is not None:
-        return no_column(sheet, held)
+        return no_column(sheet, held, asked[held.lower()])
     hint = f"name one column {' and one '.join(names)}"
     said = [role for role, start in wanted.items() if not role.startswith(start)]
     if not sheet.key:
@@ -195,12 +225,13 @@ def _unclear(sheet: Sheet, what: str, wanted: Mapping[str, str]) -> Diagnostic:
     return sheet.error("data-missing-column", message, hint)
 
 
-def no_column(sheet: Sheet, name: str) -> Diagnostic:
+def no_column(sheet: Sheet, name: str, role: str) -> Diagnostic:
     """The error about what a file holds under a name, and what is no column of numbers."""
-    message = (
-        f"{name} in {sheet.path.name} holds {sheet.left_out[name]}: a signal is a column of real numbers"
-    )
+    message = f"{name} in {sheet.path.name} holds {sheet.left_out[name]}: "
+    message += "times are numbers or dates" if role == "time" else "a signal is a column of real numbers"
     hint = "save it as an array of numbers, a sample in each row and a channel in each column"
+    if role == "time":
+        hint = AS_DATES
     return sheet.error("data-missing-column", message, hint)
 
 

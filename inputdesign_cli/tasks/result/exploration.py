@@ -84,6 +84,10 @@ def exploration_entry(
     }
 
 
+def _between(low: int, high: int | None) -> str:
+    return f"{low} to {high}" if high is not None else f"{low} at least; no upper limit is told"
+
+
 def _structure(candidate: Candidate) -> dict[str, Json]:
     return {
         "family": candidate.orders.family,
@@ -109,7 +113,7 @@ def exploration_notes(
         name = "y" if single else f"y{i + 1}"
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
         delays = " and ".join(
-            f"{delay} from {'u' if alone else f'u{j + 1}'} (95 %: {low} to {high})"
+            f"{delay} from {'u' if alone else f'u{j + 1}'} (95 %: {_between(low, high)})"
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
         )
         notes.append(

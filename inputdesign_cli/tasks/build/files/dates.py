@@ -24,13 +24,19 @@ AS_DATES = (
     "10:15 AM, 12-Mar-2024 10:15:00, where they tell day from month; or as seconds"
 )
 _CLOCK = re.compile(r"\d:\d\d")
+# What a time of a day without a date is read as.
+_MIDNIGHT = datetime(1900, 1, 1)
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Seconds (n,) since the first; None where dates can be read in two ways that differ."""
+    """Seconds (n,) since the first; None where dates can be read in two ways that differ.
+
+    Of times of a day without a date, `clock` is what the first counts from midnight.
+    """
 
     seconds: NDArray[np.float64] | None
+    clock: float | None = None
 
 
 def moments_of(cells: Sequence[str]) -> Moments | None:
@@ -44,11 +50,15 @@ def moments_of(cells: Sequence[str]) -> Moments | None:
     iso = _iso(texts)
     if iso is not None:
         return Moments(iso)
+    of_day = _parsed(texts, _TIMES)
+    if of_day is not None:
+        return Moments(_since_first(of_day), (of_day[0] - _MIDNIGHT).total_seconds())
     found: list[NDArray[np.float64]] = []
-    for day in ("", *_DAYS):
-        moments = _parsed(texts, [f"{day} {time}".strip() for time in ("", *_TIMES) if day or time])
-        if moments is not None and not any(np.array_equal(moments, other) for other in found):
-            found.append(moments)
+    for day in _DAYS:
+        moments = _parsed(texts, [f"{day} {time}".strip() for time in ("", *_TIMES)])
+        seconds = _since_first(moments or [])
+        if moments is not None and not any(np.array_equal(seconds, other) for other in found):
+            found.append(seconds)
     return Moments(found[0] if len(found) == 1 else None) if found else None
 
 
@@ -69,7 +79,7 @@ def _iso(texts: Sequence[str]) -> NDArray[np.float64] | None:
         return None
 
 
-def _parsed(texts: Sequence[str], formats: Sequence[str]) -> NDArray[np.float64] | None:
+def _parsed(texts: Sequence[str], formats: Sequence[str]) -> list[datetime] | None:
     """Of one order of day, month and year; fractions of a second may be left out in some cells."""
     found, last = [], formats[0]
     for text in texts:
@@ -82,7 +92,7 @@ def _parsed(texts: Sequence[str], formats: Sequence[str]) -> NDArray[np.float64]
             break
         else:
             return None
-    return _since_first(found)
+    return found
 
 
 def _since_first(moments: Iterable[datetime]) -> NDArray[np.float64]:

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.isolated import divided
-from inputdesign_cli.tasks.build.files.sheet import Sheet, of_arrays, unreadable
-from inputdesign_cli.tasks.build.files.text import read_text
+from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, elsewhere, of_arrays, unreadable
+from inputdesign_cli.tasks.build.files.text import column_of, read_text
 
 PARQUET = (".parquet", ".pq")
 EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
@@ -30,24 +31,71 @@ def read_parquet(path: Path, key: str, raw: bytes) -> Sheet:
     Raises:
         DataError: `data-unreadable`.
     """
-    frame = _loaded(path, key, "a parquet file", lambda pandas: pandas.read_parquet(io.BytesIO(raw)))
-    arrays = {str(name): np.asarray(frame[name]) for name in frame}
-    found = divided({name: _bare(array) for name, array in arrays.items()})
-    return replace(of_arrays(path, key, list(found.arrays.items())), left_out=found.left_out)
+    every = _loaded(path, key, "a parquet file", lambda pandas: _series(pandas, io.BytesIO(raw)))
+    arrays = {name: _bare(array) for name, array in every.items()}
+    dated = {name: column for name, array in arrays.items() for column in _dated(array)}
+    found = divided({name: dated[name].numbers if name in dated else arrays[name] for name in arrays})
+    sheet = of_arrays(path, key, list(found.arrays.items()))
+    columns = (dated.get(name, column) for name, column in zip(sheet.names, sheet.columns, strict=True))
+    return replace(sheet, columns=tuple(columns), left_out=found.left_out)
 
 
-def read_workbook(path: Path, key: str, raw: bytes) -> Sheet:
-    """The table in the first sheet of a workbook, found as in a file of text; lines are its rows.
+def read_workbook(path: Path, key: str, raw: bytes, named: str = "") -> Sheet:
+    """The table in a sheet of a workbook, found as in a file of text; lines are its rows.
+
+    Args:
+        named: the sheet; empty: the first.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    frame = _loaded(
-        path, key, "an Excel workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), header=None)
+    frames = _loaded(
+        path,
+        key,
+        "an Excel workbook",
+        lambda pandas: pandas.read_excel(io.BytesIO(raw), header=None, sheet_name=None),
     )
-    rows = frame.astype(object).to_numpy()
+    if named and named not in frames:
+        raise unreadable(path, key, "has no such sheet", f"the sheets are {', '.join(frames)}")
+    first = next(iter(frames))
+    others = () if named else tuple(name for name in frames if name != first)
+    rows = frames[named or first].astype(object).to_numpy()
     text = "\n".join("\t".join(map(_written, row)) for row in rows)
-    return read_text(path, key, text, separated_by="\t")
+    try:
+        return replace(read_text(path, key, text, separated_by="\t"), others=others)
+    except DataError as error:
+        told = elsewhere(path, others)
+        raise DataError([replace(d, hint=f"{d.hint}{told}") for d in error.diagnostics]) from None
+
+
+def _series(pandas: Any, file: io.BytesIO) -> dict[str, NDArray]:
+    """The columns of a frame by their names, before them what stands in its index; times of a zone in UTC."""
+    frame = pandas.read_parquet(file)
+    levels = [frame.index.get_level_values(i) for i in range(frame.index.nlevels)]
+    found: dict[str, NDArray] = {}
+    for level in levels:
+        if level.name is not None or not isinstance(level, pandas.RangeIndex):
+            dated = pandas.api.types.is_datetime64_any_dtype(level.dtype)
+            name = level.name if level.name is not None else "time" if dated else "index"
+            if str(name) not in map(str, frame):
+                found[str(name)] = _plain(pandas, level.to_series())
+    return found | {str(name): _plain(pandas, frame[name]) for name in frame}
+
+
+def _plain(pandas: Any, series: Any) -> NDArray:
+    if isinstance(series.dtype, pandas.DatetimeTZDtype):
+        return np.asarray(series.dt.tz_convert(None))
+    if pandas.api.types.is_extension_array_dtype(series.dtype) and pandas.api.types.is_numeric_dtype(series):
+        return np.asarray(series.to_numpy(dtype=float, na_value=np.nan))
+    return np.asarray(series)
+
+
+def _dated(array: NDArray) -> list[Column]:
+    """The column of dates and times that cells of text or of Python's dates are; none where they are not."""
+    if array.dtype.kind not in "OUT":
+        return []
+    column = column_of([_written(cell) for cell in array.ravel()])
+    return [column] if column.dated else []
 
 
 def _loaded(path: Path, key: str, kind: str, load: Callable[[Any], Any]) -> Any:

@@ -34,6 +34,8 @@ _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+", re.ASCII)
 _MARKED = re.compile(r"[-+\u2212]?\d[\d.,'\u2019_\s]*")
 # Numbers below a million in whole numbers, with a mark between thousands, and those that have one.
 _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
+# Numbers with one mark between all thousands, and another before decimals, if there are any.
+_GROUPED = re.compile(r"([+-]?\d{1,3}([.,'\u2019 \u00a0\u202f])\d{3}(?:\2\d{3})*)((?!\2)[.,]\d+)?", re.ASCII)
 _LOOKED_AT = 200
 # What may separate fields; None stands for blanks. Of equally good ones the first.
 _SEPARATORS = ("\t", ";", "|", None, ",")
@@ -292,6 +294,17 @@ def between_thousands(cells: Sequence[str]) -> int | None:
         return None
     hundreds = any("." not in cell and len(cell.lstrip("+-")) == 3 for cell in written)
     return next((i for i, cell in enumerate(cells) if "." in cell), None) if hundreds else None
+
+
+def with_point(cell: str) -> str:
+    """A cell that is a number with a decimal comma, with a point; others as they are."""
+    return cell.replace(",", ".") if _COMMA.fullmatch(cell.strip()) else cell
+
+
+def without_thousands(text: str) -> str | None:
+    """A number that has marks between thousands, such as 1.250,50 or 1'250.5, without; None of others."""
+    found = _GROUPED.fullmatch(text)
+    return None if found is None else re.sub(r"[^-+\d]", "", found[1]) + (found[3] or "")
 
 
 def is_comma(cell: str) -> bool:

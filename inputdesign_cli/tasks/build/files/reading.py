@@ -7,6 +7,7 @@ from pathlib import Path
 from inputdesign_cli.errors import STANDARD_INPUT
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.tasks.build.files.arrays import read_mat, read_npz
+from inputdesign_cli.tasks.build.files.clocks import with_days
 from inputdesign_cli.tasks.build.files.decoding import decoded
 from inputdesign_cli.tasks.build.files.frames import EXCEL, PARQUET, read_parquet, read_workbook
 from inputdesign_cli.tasks.build.files.sheet import Sheet, unreadable
@@ -18,7 +19,7 @@ _SHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 
 
 def read_sheet(path: Path, *, key: str) -> Sheet:
-    """The columns of a data file.
+    """The columns of a data file, its times of a day with their days.
 
     Args:
         key: the key of the spec that names the file, for diagnostics.
@@ -26,10 +27,17 @@ def read_sheet(path: Path, *, key: str) -> Sheet:
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    raw = _bytes(path, key)
+    return with_days(_read(path, key))
+
+
+def _read(path: Path, key: str) -> Sheet:
+    file, _, named = path.name.partition("#")
+    kind = Path(file).suffix.lower()
+    if kind not in EXCEL:  # whose sheets alone have names
+        kind, named = path.suffix.lower(), ""
+    raw = _bytes(path.with_name(file) if named else path, key)
     if len(raw) > _MOST_BYTES:
         raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
-    kind = path.suffix.lower()
     if kind == ".npz":
         return read_npz(path, key, raw)
     if kind == ".mat":
@@ -37,7 +45,7 @@ def read_sheet(path: Path, *, key: str) -> Sheet:
     if kind in PARQUET:
         return read_parquet(path, key, raw)
     if kind in EXCEL:
-        return read_workbook(path, key, raw)
+        return read_workbook(path, key, raw, named)
     if raw.startswith(_SHEETS):
         hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
         raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)

@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 class Column:
     """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
 
-    Dates and times are `dated`: seconds since the first. What is `wrong` with a fault, and how to mend it,
-    goes into messages.
+    Dates and times are `dated`: seconds since the first; of times of a day without a date, `clock` is what
+    the first counts from midnight. What is `wrong` with a fault, and how to mend it, goes into messages;
+    `told` is what was done to make times of a column.
     """
 
     numbers: Array
@@ -31,6 +32,8 @@ class Column:
         "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands, one "
         "row a line; dates as 2024-03-12 10:15:00"
     )
+    clock: float | None = None
+    told: str = ""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Sheet:
         shown: whether messages may show what the file holds: it is a table of numbers, and no secret.
         pace: the sample time and its unit, as the file says itself.
         left_out: what the file holds besides that is no column, and what it holds instead of numbers.
+        others: sheets of the workbook that were not read, where none was named.
         passed: lines between rows of numbers that are no rows, and what they are: see `layout`.
     """
 
@@ -61,6 +65,7 @@ class Sheet:
     pace: Pace = field(default_factory=Pace)
     passed: tuple[tuple[int, str], ...] = ()
     left_out: Mapping[str, str] = field(default_factory=dict)
+    others: tuple[str, ...] = ()
 
     @property
     def header(self) -> list[str]:
@@ -77,7 +82,9 @@ class Sheet:
         return "; ".join(told)
 
     def error(self, code: str, message: str, hint: str, row: int | None = None) -> Diagnostic:
-        """A diagnostic that points at a row, or at the header."""
+        """A diagnostic that points at a row, or at the header; what is missing may be in another sheet."""
+        if code == "data-missing-column":
+            hint += elsewhere(self.path, self.others)
         line, text = self.head
         if row is not None:
             line, text = int(self.lines[row]), self.texts[row] if self.texts else ""
@@ -90,6 +97,14 @@ def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = No
     """The error about a file that cannot be read at all, in a line of it where one is at fault."""
     location = None if line is None else Location(str(path), line, 1)
     return DataError.because("data-unreadable", f"the file {path} {what}", hint, key, location)
+
+
+def elsewhere(path: Path, others: Sequence[str]) -> str:
+    """What messages say of sheets of a workbook that were not read."""
+    if not others:
+        return ""
+    listed = ", ".join(others)
+    return f"; only the first sheet was read, beside it stand {listed}: name one as '{path.name}#{others[0]}'"
 
 
 def of_arrays(path: Path, key: str, arrays: Sequence[tuple[str, NDArray]]) -> Sheet:

@@ -28,7 +28,9 @@ from inputdesign_cli.tasks.build.files.layout import (
     rows_of,
     separator_of,
     table_begins,
+    with_point,
     within,
+    without_thousands,
 )
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, unreadable
 
@@ -54,8 +56,9 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
         hint = "keep one sample a line, its numbers separated by commas, semicolons, tabs or blanks"
         raise unreadable(path, key, f"is no table: {error}", hint, error.line) from None
     rows = rows[table_begins(rows, separator) :]
+    written = dict(rows)
     if decimal_commas(rows, separator):
-        rows = [(line, [cell.replace(",", ".") for cell in row]) for line, row in rows]
+        rows = [(line, [with_point(cell) for cell in row]) for line, row in rows]
     head, names, body = headed(rows, comment, separator)
     if not body:
         raise unreadable(path, key, "holds no rows of numbers", "write a header line and rows below it")
@@ -63,7 +66,7 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
     width = len(names) or max(len(row) for _, row in body)
-    columns = tuple(_column([row[i] if i < len(row) else "" for _, row in body]) for i in range(width))
+    columns = tuple(column_of([row[i] if i < len(row) else "" for _, row in body]) for i in range(width))
     mark = separator or " "
     sheet = Sheet(
         path,
@@ -72,7 +75,7 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
         columns,
         np.array([line for line, _ in body]),
         head,
-        [mark.join(row) for _, row in body],
+        [mark.join(written.get(line, row)) for line, row in body],
         _of_numbers(body, columns),
         passed=between,
     )
@@ -100,7 +103,8 @@ def _leading_comment(lines: Sequence[str]) -> tuple[str, int]:
     return comment, len(lines)
 
 
-def _column(cells: list[str]) -> Column:
+def column_of(cells: list[str]) -> Column:
+    """The numbers, or the dates and times, that cells say."""
     try:
         text = "".join(cells)
         if "_" in text or not text.isascii():  # what float takes, and is_number does not
@@ -117,6 +121,10 @@ def _column(cells: list[str]) -> Column:
             f"if it is a decimal mark, write {fault[1].replace(',', '.')}; between thousands nothing stands"
         )
         return Column(numbers, fault, wrong=wrong, hint=hint)
+    plain = without_thousands(fault[1]) if fault is not None else None
+    if plain is not None:
+        wrong = f"is not a finite number: it has a mark between thousands (without: {plain})"
+        return Column(numbers, fault, wrong=wrong)
     thousand = between_thousands(cells) if fault is None else None
     if thousand is not None:
         wrong = "may have a mark between thousands, or three decimals: other cells have none"
@@ -132,7 +140,7 @@ def _of_dates(cells: list[str], otherwise: Column) -> Column:
     if moments is not None and moments.seconds is not None:
         seconds = np.full(len(cells), np.nan)
         seconds[there] = moments.seconds
-        return Column(seconds, dated=True)
+        return Column(seconds, dated=True, clock=moments.clock)
     if moments is not None:
         fault = (there[0], written[0])
         return Column(otherwise.numbers, fault, wrong="may have the day or the month first", hint=AS_DATES)
