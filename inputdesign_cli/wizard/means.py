@@ -211,11 +211,11 @@ def _seconds_apart(path: Path) -> float | None:
     """The time between the rows of a file, where a column tells it."""
     from inputdesign_cli.tasks.build.columns import time_unit_in
     from inputdesign_cli.tasks.build.files import read_sheet
-    from inputdesign_cli.tasks.build.tables import columns_of, is_dated, time_columns
+    from inputdesign_cli.tasks.build.tables import column_named, columns_of, time_columns
 
     sheet = read_sheet(path, key="noise")
     for name in time_columns(sheet)[:1]:
-        unit = "s" if is_dated(sheet, name) else time_unit_in(sheet, name) or "s"
+        unit = "s" if column_named(sheet, name).dated else time_unit_in(sheet, name) or "s"
         apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"])))
         return seconds(f"{apart!r} {unit}", "noise") if apart > 0.0 else None
     return None
