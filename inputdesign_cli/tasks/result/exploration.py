@@ -127,10 +127,10 @@ def exploration_notes(
         for j in found.still
     ]
     notes += [
-        f"past outputs help to predict {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by chance): "
-        "the data may come from a loop. The direct method is used; the noise model must then be right, and "
-        "without a reference that moves the plant may not be identifiable: add a reference or dither, and "
-        "write experiment.controller. An input that answers at once is taken to act with a delay"
+        f"the noise of the outputs helps to tell {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by "
+        "chance): the data may come from a loop. The direct method is used; the noise model must then be "
+        "right, and without a reference that moves the plant may not be identifiable: add a reference or "
+        "dither, and write experiment.controller. An input that answers at once is taken to act with a delay"
         for j, p in loops
     ]
     needed = max(candidate.orders.unknowns for candidate in found.taken)
