@@ -12,6 +12,7 @@ import numpy as np
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import frequency_response, silent_in
 from inputdesign_cli.identification.explore import (
+    Fits,
     Found,
     answers_output,
     by_chance,
@@ -248,15 +249,36 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)
     table, curves = validation_curves(header.units, data.time, data.u, data.y, found)
+    reasons = _too_little(found)
     result: dict[str, Json] = {
         "format": 1,
         "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
         "status": "validated",
         "samples": len(data.y),
-        "validation": validation_entry(found),
-        "notes": list(data.notes),
+        "validation": {**validation_entry(found), "reasons": list(reasons)},
+        "notes": [*data.notes, *(f"no trust: {reason}" for reason in reasons)],
         "timing_s": {"validation": time.perf_counter() - started},
     }
     return Exploration(
-        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves})
+        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
+        reasons,
     )
+
+
+def _too_little(found: Fits) -> tuple[str, ...]:
+    """Why a model that is judged is none of these data."""
+    single = len(found.simulation) == 1
+    told = []
+    for i, fit in enumerate(found.simulation):
+        if fit < _LEAST_FIT:
+            output = "y" if single else f"y{i + 1}"
+            what = (
+                f"the simulation explains {fit:.1f} % of {output}, and less than {_LEAST_FIT:g} % is nothing: "
+                "a level alone explains as much"
+                if np.isfinite(fit)
+                else f"the model has no simulation of {output}: its plant is unstable"
+            )
+            told.append(
+                f"{what}; see whether the model is of this plant, and gain, delay, units and columns agree"
+            )
+    return tuple(told)

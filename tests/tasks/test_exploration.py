@@ -280,3 +280,26 @@ def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
     (told,) = [note for note in found.result["notes"] if note.startswith("L of a dead time")]
     deviation = found.result["identification"]["standard_deviation"]["L"]
     assert float(told.split(": ")[1].split()[0]) == pytest.approx(1.96 * deviation, rel=0.01)
+
+
+def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
+    """Its simulation is worse than a level: -100 % where the model is the plant with its sign changed."""
+    log = record(tmp_path / "log.csv", seed=1)
+    model = tmp_path / "opposite.yaml"
+    model.write_text(
+        "sample_time: 0.5\ntime_unit: min\nplant: {B: [0, 0, 0, -0.2], F: [1, -0.8]}\nnoise: {variance: 1}\n"
+    )
+    told = CliRunner().invoke(app, ["explore", str(log), "--validate", str(model), "--no-output"])
+    assert told.exit_code == 1
+    assert "less than 5 % is nothing" in re.sub(r"\s+", " ", told.stdout)
+    judged = explore(log, model=load_spec(model, design=False))
+    assert judged.results.result["validation"]["reasons"] == list(judged.reasons)
+    assert len(judged.reasons) == 1
+
+
+def test_a_model_without_a_sample_time_is_named(tmp_path):
+    model = tmp_path / "timeless.yaml"
+    model.write_text("time_unit: min\nplant: {B: [0, 0, 0, 0.2], F: [1, -0.8]}\nnoise: {variance: 1}\n")
+    with pytest.raises(DataError, match=r"none is stated.*in timeless.yaml") as caught:
+        explore(record(tmp_path / "log.csv", seed=1), model=load_spec(model, design=False))
+    assert "write sample_time: 0.5 in it" in caught.value.diagnostics[0].hint
