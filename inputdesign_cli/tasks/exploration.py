@@ -42,6 +42,7 @@ from inputdesign_cli.tasks.result.integrating import like_integrators
 from inputdesign_cli.tasks.result.refutations import refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
+from inputdesign_cli.tasks.result.unidentified import unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
 
 # A simulation that explains less than this of data it has not seen is no model.
@@ -81,14 +82,16 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     log = without_drift(log, found)
     loose = (f"{told}: {_DRIVE}" for told in undriven)
     rising = like_integrators(found, log.step, log.time_unit)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *loose)
+    moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
+    order = order_of_excitation(moving)
+    unseen = unidentified(found, order, log.step, log.time_unit)
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *unseen, *loose)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
     times = np.concatenate([log.step * np.arange(length) for length in lengths])
-    moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
-    heard = exploration_notes(log, found, loops, order_of_excitation(moving))
+    heard = exploration_notes(log, found, loops)
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
         task,
@@ -273,8 +276,8 @@ def _too_little(found: Fits) -> tuple[str, ...]:
         if fit < _LEAST_FIT:
             output = "y" if single else f"y{i + 1}"
             what = (
-                f"the simulation explains {fit:.1f} % of {output}, and less than {_LEAST_FIT:g} % is nothing: "
-                "a level alone explains as much"
+                f"the simulation explains {fit:.1f} % of {output}, and less than {_LEAST_FIT:g} % is "
+                "nothing: a level alone explains as much"
                 if np.isfinite(fit)
                 else f"the model has no simulation of {output}: its plant is unstable"
             )

@@ -303,3 +303,16 @@ def test_a_model_without_a_sample_time_is_named(tmp_path):
     with pytest.raises(DataError, match=r"none is stated.*in timeless.yaml") as caught:
         explore(record(tmp_path / "log.csv", seed=1), model=load_spec(model, design=False))
     assert "write sample_time: 0.5 in it" in caught.value.diagnostics[0].hint
+
+
+@pytest.mark.slow
+def test_a_steady_sinusoid_tells_no_plant_of_three_parameters(tmp_path):
+    """Gain 1 after three samples: amplitude and phase at 0.3 rad/sample are all that the record has."""
+    rng = np.random.default_rng(21)
+    u = np.sin(0.3 * np.arange(1400.0))
+    y = scipy.signal.lfilter([0, 0, 0, 0.06], [1, -1.5, 0.56], u) + 0.05 * rng.standard_normal(1400)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{a:.8g},{b:.8g}\n" for a, b in zip(u[600:], y[600:], strict=True))
+    path.write_text("u,y\n" + rows)
+    found = explore(path)
+    assert any("exciting of order 2 only" in reason for reason in found.reasons)

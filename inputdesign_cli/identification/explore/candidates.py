@@ -36,7 +36,7 @@ class Candidate:
         criterion: log of the variance + k log(N) / N (BIC) on the first part; in a loop
             + 2 k log(log(N)) / N [hannan-quinn-1979].
         failed: tests of the residuals that refute it.
-        steady: whether its plant is stable, as far as the record tells.
+        steady: whether its plant is stable, as far as the record tells, and within what it shows.
         ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
         feedback: whether the record is from a loop.
     """

@@ -16,12 +16,14 @@ _CONTROLLER, _NOTHING = 6, 1e-6
 def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) -> int:
     """The order to which all inputs together are persistently exciting, `most` at most.
 
-    The largest n for which n delays of every input are linearly independent ([ljung-1999], Section 13.2).
+    The largest n for which n delays of every input, and a level, are linearly independent ([ljung-1999],
+    Section 13.2): a sinusoid over a part of a period has a mean, which tells no more than the level does.
     """
     longest = max((u for u, _ in parts), key=len)
     x = longest - longest.mean(axis=0)
     n = max(min(most, len(x) // (3 * x.shape[1])), 1)
     columns = np.stack([x[n - lag : len(x) - lag] for lag in range(n)], axis=1).reshape(len(x) - n, -1)
+    columns = columns - columns.mean(axis=0)
     gram = columns.T @ columns
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     normal = gram / np.outer(scale, scale)

@@ -137,7 +137,7 @@ class _Parts:
             float(np.log(max(noise[0, 0], 1e-300)) + orders.size * self._price / self.samples),
             tuple(test.name for test in failed(tests)),
             found.converged,
-            is_steady(fitted, self.samples),
+            is_steady(fitted, self.samples) and not orders.beyond(found.point.theta, self.samples),
             orders.ranges(found.point.theta, deviations),
             self.feedback,
         )
