@@ -92,11 +92,10 @@ class Excites:
         return self.peak / float(np.sqrt(self.power)) if self.power else 1.0
 
 
-def excites(u: Array, period: int) -> list[Excites]:
-    """What the channels of a record (N, r) excite, of which a whole number of periods is looked at."""
+def excites(u: Array) -> list[Excites]:
+    """What the channels of a record (N, r) excite, all of its samples looked at."""
     found = []
-    whole = u[: len(u) // period * period]
-    for channel in whole.T:
+    for channel in u.T:
         mean = float(channel.mean())
         power = np.abs(np.fft.rfft(channel - mean)) ** 2
         power[1 : (len(channel) + 1) // 2] *= 2.0

@@ -196,7 +196,7 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
         DataError: the log cannot be used, or tells no model at all.
         InaccurateError: the numbers of the log leave the range of double precision.
     """
-    from inputdesign_cli.tasks.build.exploration import model_to_judge
+    from inputdesign_cli.tasks.build.exploration import model_to_judge, naming_model
     from inputdesign_cli.tasks.build.header import build_header
     from inputdesign_cli.tasks.build.preparation import Preparation
     from inputdesign_cli.tasks.exploration import explore as explore_log, judge
@@ -205,7 +205,7 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
     if model is None:
         with sound_arithmetic(most_extreme({})):
             return explore_log(_paths(data), prepared)
-    with _placed(model):
+    with _placed(model), naming_model(model):
         return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import frequency_response, silent_in
 from inputdesign_cli.identification.explore import (
+    Fits,
     Found,
     answers_output,
     by_chance,
@@ -41,6 +42,7 @@ from inputdesign_cli.tasks.result.integrating import like_integrators
 from inputdesign_cli.tasks.result.refutations import refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
+from inputdesign_cli.tasks.result.unidentified import unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
 
 # A simulation that explains less than this of data it has not seen is no model.
@@ -85,15 +87,17 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     log = without_drift(log, found)
     loose = (f"{told}: {_DRIVE}" for told in undriven)
     rising = like_integrators(found, log.step, log.time_unit)
-    unsteady = () if found.steady or rising else (_UNSTEADY,)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *unsteady, *loose)
+    moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
+    order = order_of_excitation(moving)
+    unseen = unidentified(found, order, log.step, log.time_unit)
+    unsteady = () if found.steady or rising or unseen else (_UNSTEADY,)
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *unseen, *unsteady, *loose)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
     times = np.concatenate([log.step * np.arange(length) for length in lengths])
-    moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
-    heard = exploration_notes(log, found, loops, order_of_excitation(moving))
+    heard = exploration_notes(log, found, loops)
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
         task,
@@ -248,15 +252,36 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)
     table, curves = validation_curves(header.units, data, found)
+    reasons = _too_little(found)
     result: dict[str, Json] = {
         "format": 1,
         "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
         "status": "validated",
         "samples": len(data.y),
-        "validation": validation_entry(found),
-        "notes": list(data.notes),
+        "validation": {**validation_entry(found), "reasons": list(reasons)},
+        "notes": [*data.notes, *(f"no trust: {reason}" for reason in reasons)],
         "timing_s": {"validation": time.perf_counter() - started},
     }
     return Exploration(
-        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves})
+        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
+        reasons,
     )
+
+
+def _too_little(found: Fits) -> tuple[str, ...]:
+    """Why a model that is judged is none of these data."""
+    single = len(found.simulation) == 1
+    told = []
+    for i, fit in enumerate(found.simulation):
+        if fit < _LEAST_FIT:
+            output = "y" if single else f"y{i + 1}"
+            what = (
+                f"the simulation explains {fit:.1f} % of {output}, and less than {_LEAST_FIT:g} % is "
+                "nothing: a level alone explains as much"
+                if np.isfinite(fit)
+                else f"the model has no simulation of {output}: its plant is unstable"
+            )
+            told.append(
+                f"{what}; see whether the model is of this plant, and gain, delay, units and columns agree"
+            )
+    return tuple(told)

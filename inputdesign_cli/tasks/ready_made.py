@@ -72,7 +72,7 @@ def make_signal(asked: ReadyMade) -> Results:
         "time_unit": asked.time_unit,
         "channels": {},
     }
-    for name, one in zip(channels, excites(record, period), strict=True):
+    for name, one in zip(channels, excites(record), strict=True):
         entry["channels"][name] = {
             "mean": one.mean,
             "power": one.power,
@@ -86,7 +86,7 @@ def make_signal(asked: ReadyMade) -> Results:
         "",
         asked.time_unit,
         {"signal": Table({f"time_{asked.time_unit}": time, **channels})},
-        {"signal": SignalCurves(time, channels), "spectrum": _lines(asked, record, period)},
+        {"signal": SignalCurves(time, channels), "spectrum": _lines(asked, record)},
     )
 
 
@@ -186,14 +186,13 @@ def _band(asked: ReadyMade) -> tuple[float, float]:
     return lo * asked.sample_time, min(hi, nyquist) * asked.sample_time
 
 
-def _lines(asked: ReadyMade, record: Array, period: int) -> Curves:
-    """The powers of the lines of the first period, means left out."""
-    whole = record[: len(record) // period * period]
-    columns = np.fft.rfft(whole - whole.mean(axis=0), axis=0)[1:] / len(whole)
+def _lines(asked: ReadyMade, record: Array) -> Curves:
+    """The powers of the lines of the record, means left out."""
+    columns = np.fft.rfft(record - record.mean(axis=0), axis=0)[1:] / len(record)
     powers = 2.0 * np.abs(columns) ** 2
-    if len(whole) % 2 == 0:
+    if len(record) % 2 == 0:
         powers[-1] *= 0.5
     kept = np.any(powers > 1e-9 * powers.max(initial=1e-300), axis=1)
-    w = 2.0 * np.pi * np.arange(1, len(powers) + 1) / len(whole) / asked.sample_time
+    w = 2.0 * np.pi * np.arange(1, len(powers) + 1) / len(record) / asked.sample_time
     diagonal = np.einsum("lr,rs->lrs", powers[kept], np.eye(record.shape[1])).astype(complex)
     return SpectrumCurves(w[kept], diagonal, lines=True)

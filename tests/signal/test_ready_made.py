@@ -20,7 +20,7 @@ def test_a_prbs_is_white_over_its_period(bits):
     assert np.array_equal(u[:period], u[period:])
     lag = np.fft.irfft(np.abs(np.fft.rfft(u[:period, 0])) ** 2, period) / period
     assert lag[1:] == pytest.approx(np.full(period - 1, -1.0 / period), abs=1e-12)
-    (found,) = excites(u, period)
+    (found,) = excites(u)
     assert found.order == period - 1  # every line of the circle but the mean
     assert abs(found.mean) == pytest.approx(1.0 / period)
     assert found.power == pytest.approx(1.0 - 1.0 / period**2)
@@ -40,7 +40,7 @@ def test_a_multisine_has_equal_lines_of_a_low_peak(odd):
     assert lines.size == 25
     assert not odd or np.all(lines % 2 == 1)
     assert power[lines] == pytest.approx(np.full(25, power[lines[0]]))
-    (found,) = excites(u, 600)
+    (found,) = excites(u)
     assert found.order == 50
     assert found.crest_factor < 1.8  # random phases: about 3
     low, high = found.band
@@ -56,7 +56,7 @@ def test_inputs_of_a_multisine_are_orthogonal():
 def test_a_chirp_sweeps_its_band():
     u = chirp(20000, (0.1, 1.0))
     assert np.abs(u).max() <= 1.0
-    (found,) = excites(u, 20000)
+    (found,) = excites(u)
     # Power is even over the band, and a twentieth lies on either side.
     assert found.band == pytest.approx((0.145, 0.955), abs=0.01)
     assert found.crest_factor == pytest.approx(np.sqrt(2), rel=0.02)
@@ -75,7 +75,7 @@ def test_ranges_are_those_asked_for():
 
 
 def test_a_constant_excites_nothing():
-    (found,) = excites(np.ones((10, 1)), 10)
+    (found,) = excites(np.ones((10, 1)))
     assert (found.order, found.power, found.crest_factor) == (0, 0.0, 1.0)
 
 
@@ -117,3 +117,14 @@ def test_inputs_of_a_period_are_independent_or_refused(bits):
         u = np.stack([values for name, values in columns.items() if name.startswith("u")], axis=1)
         singular = np.linalg.svd(u - u.mean(axis=0), compute_uv=False)
         assert singular[-1] > 0.1
+
+
+def test_what_is_told_is_that_of_the_samples_that_are_made():
+    """A hundred samples of a sequence of 31 end within a period: its mean, power and lines are others."""
+    results = make_signal(ReadyMade("prbs", bits=5, samples=100))
+    u, told = results.tables["signal"].columns["u1"], results.result["signal"]["channels"]["u1"]
+    assert told["mean"] == pytest.approx(np.mean(u))
+    assert told["power"] == pytest.approx(np.var(u))
+    assert told["peak"] == pytest.approx(np.abs(u - np.mean(u)).max())
+    circle = np.stack([np.roll(u - np.mean(u), lag) for lag in range(100)])
+    assert told["order_of_excitation"] == np.linalg.matrix_rank(circle @ circle.T, hermitian=True)

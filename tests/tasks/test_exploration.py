@@ -350,3 +350,39 @@ def test_files_that_a_model_is_judged_by_follow_each_other(run, tmp_path):
     assert judged.curves["fit"].lengths == (100, 100)
     np.testing.assert_allclose(judged.curves["fit"].time, 0.5 * np.arange(200.0))
     np.testing.assert_array_equal(judged.tables["fit"].columns["record"], np.repeat([1.0, 2.0], 100))
+
+
+def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
+    """Its simulation is worse than a level: -100 % where the model is the plant with its sign changed."""
+    log = record(tmp_path / "log.csv", seed=1)
+    model = tmp_path / "opposite.yaml"
+    model.write_text(
+        "sample_time: 0.5\ntime_unit: min\nplant: {B: [0, 0, 0, -0.2], F: [1, -0.8]}\nnoise: {variance: 1}\n"
+    )
+    told = CliRunner().invoke(app, ["explore", str(log), "--validate", str(model), "--no-output"])
+    assert told.exit_code == 1
+    assert "less than 5 % is nothing" in re.sub(r"\s+", " ", told.stdout)
+    judged = explore(log, model=load_spec(model, design=False))
+    assert judged.results.result["validation"]["reasons"] == list(judged.reasons)
+    assert len(judged.reasons) == 1
+
+
+def test_a_model_without_a_sample_time_is_named(tmp_path):
+    model = tmp_path / "timeless.yaml"
+    model.write_text("time_unit: min\nplant: {B: [0, 0, 0, 0.2], F: [1, -0.8]}\nnoise: {variance: 1}\n")
+    with pytest.raises(DataError, match=r"none is stated.*in timeless.yaml") as caught:
+        explore(record(tmp_path / "log.csv", seed=1), model=load_spec(model, design=False))
+    assert "write sample_time: 0.5 in it" in caught.value.diagnostics[0].hint
+
+
+@pytest.mark.slow
+def test_a_steady_sinusoid_tells_no_plant_of_three_parameters(tmp_path):
+    """Gain 1 after three samples: amplitude and phase at 0.3 rad/sample are all that the record has."""
+    rng = np.random.default_rng(21)
+    u = np.sin(0.3 * np.arange(1400.0))
+    y = scipy.signal.lfilter([0, 0, 0, 0.06], [1, -1.5, 0.56], u) + 0.05 * rng.standard_normal(1400)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{a:.8g},{b:.8g}\n" for a, b in zip(u[600:], y[600:], strict=True))
+    path.write_text("u,y\n" + rows)
+    found = explore(path)
+    assert any("exciting of order 2 only" in reason for reason in found.reasons)

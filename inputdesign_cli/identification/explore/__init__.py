@@ -12,9 +12,9 @@ from inputdesign_cli.identification.explore.fits import (
     output_error_form as output_error_form,
 )
 from inputdesign_cli.identification.explore.inputs import (
-    answers_output as answers_output,
     only_answers as only_answers,
     order_of_excitation as order_of_excitation,
 )
 from inputdesign_cli.identification.explore.joint import Found as Found
+from inputdesign_cli.identification.explore.loops import answers_output as answers_output
 from inputdesign_cli.identification.explore.search import explore_structure as explore_structure

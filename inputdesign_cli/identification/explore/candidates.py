@@ -36,9 +36,10 @@ class Candidate:
         orders: the structure; `model` is it, estimated on the first part.
         estimation, validation: per cent that the simulation explains of the two parts.
         prediction: per cent one step ahead, on the second part.
-        criterion: log of the variance + k log(N) / N (BIC), on the first part.
+        criterion: log of the variance + k log(N) / N (BIC) on the first part; in a loop
+            + 2 k log(log(N)) / N [hannan-quinn-1979].
         failed: tests of the residuals that refute it.
-        steady: whether its plant is stable, as far as the record tells.
+        steady: whether its plant is stable, as far as the record tells, and within what it shows.
         ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
         feedback: whether the record is from a loop.
     """
@@ -133,16 +134,32 @@ class Chosen:
 
 
 def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
-    """The plant that simulates best with filtered noise, and simpler ones that do so about as well."""
+    """The plant that simulates best with filtered noise, and simpler ones that do so about as well.
+
+    In a loop all of them: a plant with the wrong noise is none.
+    """
+    if plain[0].feedback:
+        return [shape for c in plain for shape in c.orders.with_coloured_noise()]
     best, most = max(plain, key=lambda c: c.validation), _most_error(plain)
     near = [c for c in plain if 100.0 - c.validation <= most and c.unknowns < best.unknowns]
     return [*best.orders.with_coloured_noise(), *(c.orders.with_coloured_noise()[0] for c in near)]
 
 
 def about_as_good(usable: Sequence[Candidate]) -> list[Candidate]:
-    """Those that simulate about as well as any, the one to take first."""
+    """Those that simulate about as well as any, the one to take first; in a loop, the likeliest first."""
+    if usable[0].feedback:
+        return sorted(usable, key=lambda c: (not c.settled, not c.steady, bool(c.failed), c.criterion))
     most = _most_error(usable)
     return sorted((c for c in usable if 100.0 - c.validation <= most), key=_preference)
+
+
+def likeliest(c: Candidate) -> float:
+    """By this they are ordered: the error of the simulation of unseen data, in a loop the criterion.
+
+    An input that answers the noise tells of it, so that in a loop a wrong plant may simulate the output
+    better than the right one. Prediction errors do not err ([ljung-1999], Section 13.4).
+    """
+    return c.criterion if c.feedback else -c.validation
 
 
 def noise_first(good: Sequence[Candidate], filtered: Sequence[Candidate]) -> list[Candidate]:

@@ -69,6 +69,10 @@ class Orders:
         """None: delays are no parameters."""
         return ()
 
+    def beyond(self, theta: Array, longest: int) -> list[tuple[str, float]]:
+        """None: poles in q^-1 are those of the samples."""
+        return []
+
     def at(self, theta: Array) -> Orders:
         """The same: its delays are stated."""
         return self

@@ -43,6 +43,8 @@ _ZERO = 0.5
 _LEAST = 0.05
 # A dead time this near below a whole number of samples is that number.
 _ROUNDED = 0.01
+# Below this damping a pair of poles rings; of longest records so many make what is slow a line.
+_RINGING, _LONGER = 0.7, 10.0
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
 _LONGEST = 1e6
 
@@ -109,6 +111,20 @@ class Process:
         late, width = self._late(theta), _NORMAL * self._late(deviations)
         low, high = (self._first(np.maximum(x, 0.0)) for x in (late - width, late + width))
         return tuple(zip(low, high, strict=True))
+
+    def beyond(self, theta: Array, longest: int) -> list[tuple[str, float]]:
+        """Letters and values, of parameters (k,), of poles that a record of so many samples cannot show.
+
+        A resonance beyond the Nyquist frequency is one that sampling has folded, and what is as slow as many
+        records is a line in each of them.
+        """
+        width, found = len(self.letters), list[tuple[str, float]]()
+        for own in theta[: width * len(self.delays)].reshape(-1, width):
+            named = dict(zip(self.letters, own.tolist(), strict=True))
+            fast = named["T"] * np.pi < self.step and named.get("zeta", 1.0) < _RINGING
+            slow = max(named["T"], named.get("T3", 0.0)) > _LONGER * longest * self.step
+            found += [("T", named["T"])] * (fast or slow)
+        return found
 
     def _late(self, theta: Array) -> Array:
         """(r,): the dead times."""

@@ -21,6 +21,8 @@ _ITERATIONS = 8
 _RIDGE = 1e-12
 _CHI2 = 3.84  # 95 % for one degree of freedom
 _WIDTH = 6
+# The order of an ARX model that makes noise white.
+_WHITENING = 20
 _COARSE = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150)
 
 
@@ -163,6 +165,27 @@ def normal_solution(gram: Array, moment: Array) -> Array:
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
     return np.asarray(np.linalg.solve(scaled, moment / scale) / scale)
+
+
+def whitened(parts: Parts) -> list[tuple[Array, Array]]:
+    """The records through what makes the noise of the output white: A of a long ARX model.
+
+    The plant between them is the same. Output errors of these records are prediction errors of the others, so
+    that their sum of squares is a likelihood, and tells the plant in a loop as well ([ljung-1999], Section
+    13.4). The samples that A needs to begin are lost.
+    """
+    inputs = parts[0][0].shape[1]
+    order = max(min(_WHITENING, sum(len(y) for _, y in parts) // (10 * (inputs + 1))), 1)
+    long = [(u, y) for u, y in _begun(parts) if len(y) > 2 * order]
+    blocks = []
+    for u, y in long:
+        columns = [_lagged(x, lag) for x in (y, *u.T) for lag in range(1, order + 1)]
+        blocks.append((np.stack([*columns, np.ones(len(y))], axis=1)[order:], y[order:]))
+    solution = _solve(blocks, own=order * (inputs + 1))
+    if not blocks or not np.all(np.isfinite(solution)):
+        return list(parts)
+    A = np.concatenate([[1.0], -solution[:order]])
+    return [(filtered(A, [1.0], u, axis=0)[order:], filtered(A, [1.0], y)[order:, None]) for u, y in long]
 
 
 def best_delays(

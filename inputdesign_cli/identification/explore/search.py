@@ -24,6 +24,7 @@ from inputdesign_cli.identification.explore.candidates import (
     Chosen,
     Shape,
     about_as_good,
+    likeliest,
     noise_first,
     with_noise,
 )
@@ -35,7 +36,7 @@ from inputdesign_cli.identification.explore.fits import (
     output_error_form,
     simulation_fit,
 )
-from inputdesign_cli.identification.explore.inputs import acts_late
+from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import processes
 from inputdesign_cli.identification.explore.regression import (
@@ -44,6 +45,7 @@ from inputdesign_cli.identification.explore.regression import (
     best_delays,
     from_rest,
     numerators,
+    whitened,
 )
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
@@ -78,6 +80,15 @@ class _Parts:
     @property
     def samples(self) -> int:
         return sum(len(y) for _, y in self.first)
+
+    @property
+    def _price(self) -> float:
+        """Of a parameter: that of BIC; in a loop, where a plant that is too simple is biased, less.
+
+        The least that is consistent ([hannan-quinn-1979]).
+        """
+        logarithm = float(np.log(self.samples))
+        return 2.0 * float(np.log(logarithm)) if self.feedback else logarithm
 
     def candidate(self, orders: Shape) -> Candidate | None:
         """A structure, quickly estimated from records that begin at rest, and judged; None: it cannot be."""
@@ -127,10 +138,10 @@ class _Parts:
             on_first.simulation[0],
             on_second.simulation[0] if output_error_form(fitted).radius < 1.0 else -np.inf,
             on_second.prediction[0],
-            float(np.log(max(noise[0, 0], 1e-300)) + orders.size * np.log(self.samples) / self.samples),
+            float(np.log(max(noise[0, 0], 1e-300)) + orders.size * self._price / self.samples),
             tuple(test.name for test in failed(tests)),
             found.converged,
-            is_steady(fitted, self.samples),
+            is_steady(fitted, self.samples) and not orders.beyond(found.point.theta, self.samples),
             orders.ranges(found.point.theta, deviations),
             self.feedback,
         )
@@ -152,11 +163,13 @@ def explore_structure(
     r = first[0][0].shape[1]
     most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // 6), 1)
     highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
-    least = _least_delays(first, most) if feedback else (0,) * r
+    # In a loop an input answers the noise; what is left of it must be white to tell the plant.
+    clean = whitened(first) if feedback else first
+    least = _least_delays(first, clean, most) if feedback else (0,) * r
     delays = least
     quick = dict[int, SharedDenominator]()
     for n in range(1, highest + 1):
-        quick[n] = best_delays(first, n, max(n, 2), most, delays, least)
+        quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)
         delays = quick[n].delays
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
     penalty = np.log(samples) / samples
@@ -172,7 +185,7 @@ def explore_structure(
         families.update(dict.fromkeys(shape.family for shape in small))
         return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
 
-    tried: list[Shape] = [static_gain(best_delays(first, 0, 1, most, quick[1].delays, least).delays)]
+    tried: list[Shape] = [static_gain(best_delays(clean, 0, 1, most, quick[1].delays, least).delays)]
     for n in sorted({*range(1, min(highest, _ALWAYS) + 1), near}):
         tried += plant_order(n, quick[n].delays)
     begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(least))]
@@ -190,28 +203,28 @@ def explore_structure(
     if not usable:
         return None
     good = about_as_good(usable)
-    if good[0].failed and not good[0].orders.coloured:
+    if good[0].failed and not (feedback or good[0].orders.coloured):
         filtered = map(parts.refined, judged(good[0].orders.with_coloured_noise()))
         good = noise_first(good, [c for c in filtered if c is not None])
     best = good[0]
     known = {c.orders: c for c in (*found, *good)}
-    rest = sorted((c for c in known.values() if c.orders != best.orders), key=lambda c: -c.validation)
+    rest = sorted((c for c in known.values() if c.orders != best.orders), key=likeliest)
     estimated = {c.orders.family for c in found}
     dropped = tuple(family for family in families if family not in estimated)
     return Chosen((best, *rest), by_order, tuple(good), first, least, most, dropped)
 
 
-def _least_delays(parts: Parts, most: int) -> tuple[int, ...]:
-    """Of each input in a loop the shortest delay to look for."""
+def _least_delays(parts: Parts, clean: Parts, most: int) -> tuple[int, ...]:
+    """Of each input in a loop the shortest delay to look for, `clean` being the records with white noise."""
     one = (1,) * parts[0][0].shape[1]
-    found = best_delays(parts, 1, 2, most, one, one)
-    return tuple(int(late) for late in acts_late(parts, numerators(parts, found, 2).sum(axis=1)))
+    found = best_delays(clean, 1, 2, most, one, one)
+    return tuple(int(late) for late in acts_late(parts, numerators(clean, found, 2).sum(axis=1)))
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
     """The best of every family; those with coloured noise beside the plain ones, of which they are made."""
     kept: list[Candidate] = []
-    for candidate in sorted(found, key=lambda c: -c.validation):
+    for candidate in sorted(found, key=likeliest):
         alike = sum(
             (c.orders.family, c.orders.coloured) == (candidate.orders.family, candidate.orders.coloured)
             for c in kept

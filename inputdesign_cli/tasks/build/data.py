@@ -43,6 +43,8 @@ from inputdesign_cli.tasks.build.preparation import (
 from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
+_UNSTATED = " (what it is where none is stated)"
+
 
 @dataclass(frozen=True)
 class Recorded:
@@ -302,11 +304,14 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
     typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
     if abs(typical - units.sample_time) <= (EVEN if stated else MOST_JITTER) * units.sample_time:
         return
-    raise DataError.because(
-        "data-not-uniform",
-        f"the data are sampled every {typical:.6g} {units.time_unit}, but sample_time is "
-        f"{units.sample_time:g} {units.time_unit}",
-        f"if that is right, set sample_time: {typical:.6g} and design anew",
-        "sample_time",
-        Location(str(sheet.path), int(sheet.lines[min(1, len(sheet.lines) - 1)]), 1, ""),
+    raise DataError(
+        Diagnostic(
+            "data-not-uniform",
+            f"the data are sampled every {typical:.6g} {units.time_unit}, but sample_time is "
+            f"{units.sample_time:g} {units.time_unit}{_UNSTATED * (units.sample_time == 1.0)}",
+            f"if that is right, set sample_time: {typical:.6g} and design anew",
+            "sample_time",
+            Location(str(sheet.path), int(sheet.lines[min(1, len(sheet.lines) - 1)]), 1, ""),
+            {"data_sample_time": typical},
+        )
     )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
 from inputdesign_cli.identification.explore import Found, output_error_form
 from inputdesign_cli.plant import Model
 from inputdesign_cli.specification import Spec, parse_spec
@@ -99,6 +101,29 @@ def _numbers(values: Sequence[float]) -> str:
 def build_explored(text: str) -> Identification:
     """What `identify` runs on, of a spec that was written for a log."""
     return build_identification(parse_spec(text, "spec.yaml"))
+
+
+@contextmanager
+def naming_model(model: Spec) -> Iterator[None]:
+    """Errors of time name the file of the model, which is what counts otherwise than the data."""
+    try:
+        yield
+    except DataError as error:
+        place = model.locate("")
+        name = Path(place.file).name if place else "the model"
+        raise DataError([_named(one, name) for one in error.diagnostics]) from error
+
+
+def _named(one: Diagnostic, model: str) -> Diagnostic:
+    if one.code == "data-wrong-unit":
+        return replace(one, message=f"{one.message}: {model} does")
+    if "data_sample_time" not in one.details:
+        return one
+    hint = (
+        f"if {model} is of data sampled like these, write sample_time: {one.details['data_sample_time']:.6g} "
+        "in it; a model of another sample time cannot be judged by them"
+    )
+    return replace(one, message=f"{one.message} in {model}", hint=hint)
 
 
 def model_to_judge(spec: Spec) -> Model:

@@ -103,9 +103,7 @@ def _structure(candidate: Candidate) -> dict[str, Json]:
     }
 
 
-def exploration_notes(
-    log: Log, found: Found, loops: Sequence[tuple[int, float]], excitation: int
-) -> list[str]:
+def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]) -> list[str]:
     """What a user should know of the record and of how the model was chosen."""
     single, alone = found.model.outputs == 1, found.model.inputs == 1
     notes = []
@@ -131,18 +129,12 @@ def exploration_notes(
         for j in found.still
     ]
     notes += [
-        f"past outputs help to predict {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by chance): "
-        "the data may come from a loop. The direct method is used; the noise model must then be right, and "
-        "without a reference that moves the plant may not be identifiable: add a reference or dither, and "
-        "write experiment.controller. An input that answers at once is taken to act with a delay"
+        f"the noise of the outputs helps to tell {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by "
+        "chance): the data may come from a loop. The direct method is used; the noise model must then be "
+        "right, and without a reference that moves the plant may not be identifiable: add a reference or "
+        "dither, and write experiment.controller. An input that answers at once is taken to act with a delay"
         for j, p in loops
     ]
-    needed = max(candidate.orders.unknowns for candidate in found.taken)
-    if excitation < needed:
-        notes.append(
-            f"the input is persistently exciting of order {excitation} only, and the model needs {needed}: "
-            "other models explain this record as well; apply an input that moves more"
-        )
     used = sum(len(y) for _, y in found.used)
     if used < len(log.y):
         notes.append(f"the model is estimated from the {used} samples in which the inputs move most")

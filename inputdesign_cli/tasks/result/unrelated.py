@@ -22,14 +22,14 @@ _DEPENDENT, _LEFT = 1e-8, 1e-4
 
 
 def answering(units: Units, estimate: Estimate, data: Data) -> list[str]:
-    """A sentence for every input that past prediction errors predict, where the spec has no loop."""
+    """A sentence for every input that prediction errors help to tell, where the spec has no loop."""
     if units.closed_loop:
         return []
     ends = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, ends), np.split(data.y, ends), strict=True))
     errors = np.split(estimate.errors, ends)
     return [
-        f"past prediction errors help to tell {_name(units, j)} (probability {chance(probability)}), and no "
+        f"prediction errors help to tell {_name(units, j)} (probability {chance(probability)}), and no "
         "input in open loop answers the noise: it was logged late, columns are swapped, or the data come "
         "from a loop; mend the columns, or state the loop as experiment.controller"
         for j, probability in answers_output(parts, errors)

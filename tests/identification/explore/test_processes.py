@@ -106,3 +106,13 @@ def test_coloured_noise_does_not_displace_the_plain_structure():
     best = explore_structure([(u[:150], y[:150])], [(u[150:], y[150:])], step=STEP).best.orders
     assert (best.family, best.noise) == ("FOPDT", 0)
     assert abs(best.delays[0] - 3) <= 1
+
+
+@pytest.mark.parametrize(
+    ("T", "zeta", "told"),
+    [(0.2, 0.1, False), (0.2, 2.0, True), (4.0, 0.1, True), (900.0, 1.0, True), (1100.0, 1.0, False)],
+)
+def test_a_resonance_beyond_nyquist_or_a_lag_of_many_records_is_not_told(T, zeta, told):
+    """Samples a unit of time apart, a hundred of them: resonances end at pi, time constants at 1000."""
+    shape = Process((1,), 2, 1.0)
+    assert (shape.beyond(np.array([1.0, T, zeta, 0.5]), 100) == []) == told

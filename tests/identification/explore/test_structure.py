@@ -208,6 +208,13 @@ def test_sinusoids_excite_twice_their_number():
     assert order_of_excitation([(noise, noise)], most=20) == 20
 
 
+@pytest.mark.parametrize("digits", [5, 8, 15])
+def test_a_part_of_a_period_tells_no_more_than_whole_ones(digits):
+    """The mean of a sinusoid that ends within a period is no excitation, nor is what rounding adds."""
+    u = np.round(np.sin(0.3 * np.arange(790.0) + 1.0) + 5.0, digits)[:, None]
+    assert order_of_excitation([(u, u)]) == 2
+
+
 def test_every_input_moves_in_both_parts():
     u = np.zeros((1000, 2))
     u[:500, 0], u[500:, 1] = held(np.random.default_rng(1), 500), held(np.random.default_rng(2), 500)
