@@ -51,6 +51,32 @@ def told(ratio=0.5, there=None, solve=None, limits=None, **robust):
     return " ".join(verdict(spec, result, solve or (lambda other: missing), there).sentences)
 
 
+def told_of_the_margin(**robust):
+    """The sentences about an own controller with 6 dB, where the loop is among what is required."""
+    spec = compose({**ENGINEER, "wish": "own loop with 6 dB, Kp 0.5, Ti 180"}, "x", Path()).spec()
+    loop = {"gain_margin": 2.0, "phase_margin": 29.0}
+    signal = {"worst_ratio": 0.3, "input_peak": [5.0]}
+    result = {"samples": 720, "signal": signal, "requirements": [{"loop": loop}], "robust": robust}
+    return " ".join(verdict(spec, result, lambda other: {"signal": {}}).sentences)
+
+
+def test_no_margin_is_promised_at_a_plant_that_the_controller_does_not_fit():
+    promised = told_of_the_margin(scenarios=30)
+    assert "enough: the model" in promised
+    assert "The peak of |S| of the loop stays below 6 dB for every plant" in promised
+    worst = {"scenario": 3, "peak": 10 ** (13.5 / 20), "parameters": {"gain": 1.2, "dead_time": 24.0}}
+    floor = {"share": 0.1, "raised": [3, 5, 7], "lost": [3, 5], "worst": [worst]}
+    said = told_of_the_margin(
+        scenarios=30, floor=floor, fresh={"missed": 0, "largest": 0.9, "draws": 200, "lost": 51}
+    )
+    assert "enough wherever this controller has the margin at all" in said
+    assert "at 2 of the 30 other plants that were tried and at 51 of 200 more" in said
+    assert "such as gain 1.2, dead_time 24, where |S| reaches 13.5 dB" in said
+    assert "the verdict of assess will be undecided" in said
+    assert "At the other plants the peak of |S|" in said
+    assert "At 1 of the plants that were tried the controller has less than 0.1 of the room" in said
+
+
 def test_a_rate_that_binds_is_said():
     assert "60 min at plus/minus 5 is enough" in told()
     said = told(limits="rate 0.01")
