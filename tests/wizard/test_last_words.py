@@ -15,7 +15,7 @@ from inputdesign_cli.wizard.solving import lasting, verdict
 from tests.wizard.test_wizard import ENGINEER
 
 
-def words(applied, caused, offset=None):
+def words(applied, caused, offset=None, **of_signal):
     spec = SimpleNamespace(signal=SimpleNamespace(offset=offset), sample_time=2.0, time_unit="s")
     tables = {
         "signal": SimpleNamespace(columns=dict.fromkeys(["time_s", *applied])),
@@ -23,13 +23,19 @@ def words(applied, caused, offset=None):
             columns=dict.fromkeys(["time_s", *caused, *(f"{y}_noise_deviation" for y in caused)])
         ),
     }
-    return to_log(spec, SimpleNamespace(tables=tables), "spec.yaml")
+    return to_log(spec, SimpleNamespace(tables=tables, result={"signal": of_signal}), "spec.yaml")
 
 
 def test_all_channels_are_logged():
     apply, judge = words(["u1", "u2"], ["y1", "y2"], [40.0, 5.0])
     assert "apply signal.csv, and log time, u1, u2, y1 and y2 every 2 s" in apply
     assert "--operating-point u1=40,u2=5,y1=REST,y2=REST" in judge
+
+
+def test_the_operating_point_is_the_one_that_the_record_swings_about():
+    """A converter of 31 steps of 24/31 V has no level of 10 V."""
+    _, judge = words(["u1"], ["y1"], 10.0, operating_point=[10.5])
+    assert "--operating-point u1=10.5,y1=REST" in judge
 
 
 def test_a_reference_is_no_position_of_the_actuator():
