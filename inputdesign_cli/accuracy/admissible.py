@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant import Loop, Model, ScalarTransfer
+from inputdesign_cli.plant import Loop, Model, ScalarTransfer, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _NOWHERE = np.zeros(0)
@@ -38,6 +38,10 @@ class AdmissibleError(Protocol):
     def kept(self) -> Sensitivity | None:
         """The loop whose margins this keeps; None where it is about no loop."""
 
+    @property
+    def floored(self) -> Floored | None:
+        """What stands in for the r_adm of a plant where that vanishes; None where nothing does."""
+
     def at(self, w: ArrayLike) -> Array:
         """r_adm (n,) at frequencies `w` (n,)."""
 
@@ -51,6 +55,7 @@ class Relative:
     entry: tuple[int, int] | None = None
     knots = _NOWHERE
     kept = None
+    floored = None
 
     @cached_property
     def singularities(self) -> ComplexArray:
@@ -74,6 +79,7 @@ class Absolute:
     level: float
     knots = _NOWHERE
     kept = None
+    floored = None
     singularities = _NOWHERE.astype(complex)
 
     def at(self, w: ArrayLike) -> Array:
@@ -91,6 +97,7 @@ class Table:
     frequency: Array  # (n,) ascending, rad/sample
     value: Array  # (n,) positive
     kept = None
+    floored = None
     singularities = _NOWHERE.astype(complex)
 
     @property
@@ -120,6 +127,7 @@ class Sensitivity:
     weight: ScalarTransfer
     settings: Mapping[str, float] | None = None
     knots = _NOWHERE
+    floored = None
 
     @property
     def kept(self) -> Sensitivity:
@@ -169,6 +177,11 @@ class Weighted:
         return self.inner.kept
 
     @property
+    def floored(self) -> Floored | None:
+        """That of the error without the weight, which is positive."""
+        return self.inner.floored
+
+    @property
     def knots(self) -> Array:
         """Frequencies at which r_adm may have a kink."""
         return self.inner.knots
@@ -198,6 +211,22 @@ class Floored:
     def kept(self) -> Sensitivity | None:
         """That of the scenario."""
         return self.own.kept
+
+    @property
+    def floored(self) -> Floored:
+        """Itself."""
+        return self
+
+    def lost(self, grid: Array) -> bool:
+        """Whether r_adm of the scenario itself vanishes on the grid or between: no model is that good."""
+        own = -self.own.at(grid)
+        return bool(
+            np.max(own) >= 0.0 or np.any(local_maxima(lambda w: -self.own.at(w), grid, own)[1] >= 0.0)
+        )
+
+    def raised(self, grid: Array) -> bool:
+        """Whether it is smaller than what stands in for it, somewhere on the grid."""
+        return bool(np.any(self.own.at(grid) < self.share * self.nominal.at(grid)))
 
     @cached_property
     def singularities(self) -> ComplexArray:

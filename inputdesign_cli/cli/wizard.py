@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from inputdesign_cli.runs.results import Result
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.wizard.composing import Draft
+    from inputdesign_cli.wizard.questions import Question
 
 
 def wizard(
@@ -126,23 +127,31 @@ def _result(spec: Spec) -> Result:
 
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
     """The draft of somebody at the terminal, who is asked again where an answer cannot be used."""
-    import questionary
-
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.conversation import Conversation
     talk = Conversation(known, output.stem, output.parent)
     while (one := talk.question) is not None:
         typer.echo(f"  {one.allowed}", err=True)
-        try:
-            text = questionary.text(one.asks, default=one.default or "").unsafe_ask()
-        except EOFError:  # Ctrl-D
-            raise KeyboardInterrupt from None
+        text = _typed(one)
         with status("thinking ...", quiet=quiet):
             wrong = talk.answer(text)
         if wrong is not None:
             complain(wrong)
     assert talk.draft is not None
     return talk.draft
+
+
+def _typed(one: Question) -> str:
+    """What is typed at the prompt of a question; its default stands there greyed until something is."""
+    import questionary
+
+    default = one.default or ""
+    asks = f"{one.asks} (Enter: {default})" if default else one.asks
+    try:
+        text: str = questionary.text(asks, placeholder=[("class:placeholder", default)]).unsafe_ask()
+    except EOFError:  # Ctrl-D
+        raise KeyboardInterrupt from None
+    return text if text.strip() else default
 
 
 def _refuse(unanswered: list[str]) -> None:

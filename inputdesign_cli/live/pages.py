@@ -40,12 +40,12 @@ class Followed:
         pictures: bool = True,
         painters: Executor | None = None,
     ) -> Followed:
-        """With the design that stands in `run` now; without `pictures` these are still being drawn."""
+        """With the design in `run` and nothing wrong; without `pictures` these are still being drawn."""
         made = run_page(run, Trail(), pictures=pictures, painters=painters) | {"clock": clock}
         told = (
             f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
         )
-        return replace(self, state="done", told=told, designs=(made, *self.designs[:1]))
+        return replace(self, state="done", told=told, designs=(made, *self.designs[:1]), errors=())
 
     def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:
         """With what is wrong; `lines` are those of `file`, the spec as it was read."""

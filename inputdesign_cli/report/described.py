@@ -70,8 +70,8 @@ def _fan_caption(curves: of.FanCurves) -> str:
     named = "those that bind" if binding <= MOST_NAMED else f"{MOST_NAMED} of the {binding} that bind"
     return (
         "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at each, "
-        f"{named} in colour. The plants are those that the uncertainty of the spec describes; nothing is "
-        "said of the true plant."
+        f"{named} in colour. The plants are those that the uncertainty of the spec describes, each with no "
+        "less than its floor admitted; nothing is said of the true plant."
     )
 
 

@@ -12,6 +12,9 @@ from inputdesign_cli.runs.shares import per_cent
 # Gaps below this are told as such.
 _CLOSED = 1e-6
 
+# A plant that errs by so little more than those that bind errs as much as they do.
+_AS_MUCH = 1e-4
+
 # By so much more than what was asked an exact confidence is told to be exceeded.
 _ROOM = 0.005
 
@@ -59,7 +62,7 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
             f"not {error['alpha']:.4g}",
         )
     if "robust" in result:
-        yield from _robust(result["robust"], result.get("objective", {}).get("kind") == "accuracy_factor")
+        yield from _robust(result["robust"], result.get("objective", {}))
     if "mean_squared_error" in result:
         error = result["mean_squared_error"]
         parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"
@@ -143,8 +146,9 @@ def _paid(result: Result) -> str:
     )
 
 
-def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
+def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterator[Fact]:
     """What holds at the plants that the true one might be, and at others drawn in the same way."""
+    best = objective.get("kind") == "accuracy_factor"
     kept = found["scenarios"] - found["discarded"]
     bound = [_bound_by(item) for item in found["active"][:3]]
     more = ", .." if len(found["active"]) > len(bound) else ""
@@ -157,6 +161,15 @@ def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
     sought = f" and {added} that a search found" if added else ""
     holds = f"what is asked holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
     yield "plants", holds, again
+    if "floor" in found:
+        raised, lost = (len(found["floor"][name]) for name in ("raised", "lost"))
+        never = f"; at {lost} of them no model keeps what is asked" if lost else ""
+        yield (
+            "floor",
+            f"of these plants {raised} are held to {found['floor']['share']:g} of the r_adm of the plant of "
+            f"the spec only{never}",
+            "see the notes",
+        )
     if bound:
         yield "binding", ", ".join(bound) + more, ""
     if "dearest" in found:
@@ -167,7 +180,7 @@ def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
         told = found["searched"]
         yield (
             "worst plant",
-            f"{told['share']:.4g} of what is admitted is the worst that was found in {told['region']}",
+            _worst_found(told, objective),
             f"searched by ascent from {told['tried']} plants, not proved",
         )
     if "fresh" in found:
@@ -198,6 +211,18 @@ def _missed(told: Mapping[str, Json], best: bool) -> str:
         return f"{missed} get less than that"
     both = f" ({less + dearer - missed} of them both)" if less + dearer > missed else ""
     return f"{less} get less than that, {dearer} cost more{both}, {missed} in all"
+
+
+def _worst_found(told: Mapping[str, Json], objective: Mapping[str, Json]) -> str:
+    """How bad the worst plant is: of the best accuracy `share` is one of the ratio that is reached."""
+    share, kind = told["share"], objective.get("kind")
+    if kind in ("least_cost", "shortest_experiment"):
+        return f"{share:.4g} of what is admitted is the worst that was found in {told['region']}"
+    reached = f": {share * objective['value']:.4g} of what is admitted" if kind == "accuracy_factor" else ""
+    if share <= 1.0 + _AS_MUCH:
+        return f"none was found in {told['region']} that errs more than those that the design is for{reached}"
+    more = f"errs {per_cent(share - 1.0)} more than those that the design is for"
+    return f"the worst that was found in {told['region']} {more}{reached}"
 
 
 def _bound_by(item: Mapping[str, Json]) -> str:

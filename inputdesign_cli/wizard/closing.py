@@ -20,7 +20,9 @@ def to_log(spec: Spec, results: Results, file: str) -> list[str]:
     )
     numbers = [name[1:] for name in applied]
     inputs, outputs = [f"u{n}" for n in numbers], [name for name in caused if name.startswith("y")]
-    levels = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), len(inputs))
+    # A coarse converter holds none but levels of its own, and the record swings about one of these.
+    point_of = results.result.get("signal", {}).get("operating_point", spec.signal.offset or 0.0)
+    levels = np.broadcast_to(np.asarray(point_of, dtype=float), len(inputs))
     references = any(name.startswith("r") for name in applied)
     what = ", ".join(["time", *inputs, *outputs[:-1]])
     known = [f"{name}={level:g}" for name, level in zip(inputs, levels, strict=True)]

@@ -105,7 +105,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     plant = plant or understand_plant(said["plant"], stem, folder)
     step = plant.sample_time
     if there < LEAST * step:
-        why = "as it is recorded" if plant.sampling is not None else "a twentieth of the time constant"
+        why = "a twentieth of the time constant" if plant.sampling is None else plant.why_sampling
         told = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
         raise bad_answer("time", told)
     duration = min(there, _MOST * step)
@@ -120,12 +120,12 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         f"sample_time: {short(step)}  # {_why_step(plant)}",
         "time_unit: s",
         *plant.lines,
+        *(f"# against this model: {one}" for one in plant.against),
     ]
     if plant.explored is None:
         heads += noise_lines(said["noise"], said["drift"], folder, step)
     else:
         heads[2:4] = []  # the included file has them
-        heads += [f"# against this model: {one}" for one in plant.against]
         heads += log_noise_lines(plant.explored, plant.source, said["noise"], said["drift"], folder)
     heads += _uncertain(plant, nonparametric)
     if controller is not None:
@@ -145,7 +145,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
 
 def _why_step(plant: PlantAnswer) -> str:
     if plant.sampling is not None:
-        return "as the plant is sampled"
+        return plant.why_sampling
     return f"a twentieth of the time constant of {short(plant.slow)} s, or a little less"
 
 

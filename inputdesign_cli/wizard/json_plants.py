@@ -12,10 +12,11 @@ import numpy as np
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.wizard.phrases import LARGEST, short
-from inputdesign_cli.wizard.plant_answer import PlantAnswer
+from inputdesign_cli.wizard.plant_answer import PlantAnswer, round_step
 from inputdesign_cli.wizard.questions import bad_answer
 
 _KEYS = {"num", "den", "delay", "dt"}
+_OF_DEAD_TIME = 0.5  # the sample time of a plant that has no time constant
 
 
 def system_of(path: Path) -> PlantAnswer:
@@ -25,7 +26,7 @@ def system_of(path: Path) -> PlantAnswer:
         SpecError, DataError: `bad-answer`.
     """
     try:
-        data = json.loads(read_regular(path))
+        data = json.loads(read_regular(path), object_pairs_hook=_once)
         if not isinstance(data, dict):
             raise ValueError("it is no mapping in braces")
         num, den = (_numbers(name, data.get(name)) for name in ("num", "den"))
@@ -50,18 +51,41 @@ def system_of(path: Path) -> PlantAnswer:
         num, den = num[:-1], den[:-1]
     poles = np.roots(den)
     decays = -poles.real[poles.real < 0]
-    if not decays.size:
-        raise bad_answer(
-            "plant", f"the system of {path.name} has no stable pole: its time constant is not known"
-        )
+    if not decays.size and not (den[-1] == 0.0 and late):
+        raise bad_answer("plant", _no_time(path.name, den[-1] == 0.0))
     lines, values = _integrating(num, den, late) if den[-1] == 0.0 else _as_given(num, den, late)
     return PlantAnswer(
         (f"plant:  # from {path.name}", *lines, "  sample: zoh"),
-        float(1.0 / decays.min()),
+        float(1.0 / decays.min()) if decays.size else late,
         late,
         values=values,
+        sampling=None if decays.size else round_step(_OF_DEAD_TIME * late),
+        why_sampling="half the dead time, or a little less, for it has no time constant",
         tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
     )
+
+
+def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """A mapping in JSON.
+
+    Raises:
+        ValueError: a key stands there twice.
+    """
+    names = [name for name, _ in pairs]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise ValueError(f"it says {twice} more than once")
+    return dict(pairs)
+
+
+def _no_time(file: str, integrates: bool) -> str:
+    """What is wrong with a system whose poles tell no time constant."""
+    if integrates:
+        return (
+            f"the system of {file} integrates and has no other pole and no delay, which would tell how "
+            'fast it is to be sampled: write its dead time ("delay": 5), however small, or the lag of what moves it '
+            'into den, such as "den": [10, 1, 0]'
+        )
+    return f"the system of {file} has no stable pole: its time constant is not known"
 
 
 def _numbers(name: str, value: object) -> list[float]:

@@ -24,7 +24,7 @@ class PlantAnswer:
         controller: under which it usually runs, as YAML.
         files: to be written beside the spec, by name.
         covariance: the one of them that tells how good the estimate is.
-        sampling: seconds between samples, where that is known already.
+        sampling: seconds between samples, where that is known already, and why.
         tunable: whether rules of tuning know it.
         channels: the larger number of its inputs and outputs.
         explored: the model of a log, whose noise is told in the spec.
@@ -41,6 +41,7 @@ class PlantAnswer:
     files: Mapping[str, bytes] = field(default_factory=dict)
     covariance: str | None = None
     sampling: float | None = None
+    why_sampling: str = "as the plant is sampled"
     tunable: bool = False
     channels: int = 1
     explored: Spec | None = None
@@ -52,6 +53,10 @@ class PlantAnswer:
         """A twentieth of the time constant, rounded down to 1, 2 or 5 times a power of ten."""
         if self.sampling is not None:
             return self.sampling
-        wanted = self.slow / 20.0
-        decade = 10.0 ** np.floor(np.log10(wanted))
-        return float(decade * max(step for step in _STEPS if step * decade <= wanted * (1 + 1e-9)))
+        return round_step(self.slow / 20.0)
+
+
+def round_step(wanted: float) -> float:
+    """Rounded down to 1, 2 or 5 times a power of ten."""
+    decade = 10.0 ** np.floor(np.log10(wanted))
+    return float(decade * max(step for step in _STEPS if step * decade <= wanted * (1 + 1e-9)))

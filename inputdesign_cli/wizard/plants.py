@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from inputdesign_cli.wizard.questions import bad_answer, file_of
 
 _QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
 _LEAST_ROWS = 10  # of a step response
+_GAP = 1.5  # sample times from one row to the next: a sample is missing
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
 
@@ -151,6 +153,14 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
     if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
         raise bad_answer("plant", f"{path.name} needs {_LEAST_ROWS} rows at least, at times that grow")
     step, moved = float(np.median(np.diff(t))), u - u[0]
+    if np.any(wide := np.diff(t) > _GAP * step):
+        row, longest = int(np.argmax(wide)) + 3, float(np.max(np.diff(t)))
+        raise bad_answer(
+            "plant",
+            f"the times in {path.name} have a gap before line {row} ({short(longest)} s, where rows are "
+            f"{short(step)} s apart): a step response is one record without gaps; cut it to the part that "
+            "has the step, or fill it in",
+        )
     begun = int(np.argmax(np.abs(moved) > 0.5 * np.max(np.abs(moved))))
     if not np.any(moved) or begun + 5 >= t.size:
         raise bad_answer("plant", f"the input in {path.name} does not step")
@@ -170,7 +180,8 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
         design=False,
     )
     point = {"u1": float(u[0]), "y1": float(np.mean(y[: max(begun, 1)]))}
-    model = tasks.identify(structure, path, operating_point=point).files["model.yaml"]
+    identified = tasks.identify(structure, path, operating_point=point)
+    model, failed = identified.files["model.yaml"], identified.result["identification"]["failed"]
     name, fitted = f"{stem}-model.yaml", parse_spec(model.decode(), design=False).plant
     assert fitted.kind == "continuous"
     values = {one.label: one.value for one in fitted.named_parameters}
@@ -184,6 +195,20 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
         covariance=name,
         sampling=step,
         tunable=True,
+        source=path.name,
+        against=_rejected(path, failed),
+    )
+
+
+def _rejected(path: Path, failed: Sequence[str]) -> tuple[str, ...]:
+    """What to say of a step response that a gain, a time constant and a dead time do not explain."""
+    if not failed:
+        return ()
+    tests = ", ".join(name.replace("_", " ") for name in failed)
+    return (
+        f"tests reject a gain, a time constant and a dead time ({tests}): the plant has another structure, "
+        "or its level drifts, and neither the values nor how well they are told to be known are to be trusted; "
+        f'"log {path.name}" explores other structures',
     )
 
 

@@ -10,8 +10,8 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.wizard.composing import LEAST
+from inputdesign_cli.wizard.margins import margins_kept, some_are_lost
 from inputdesign_cli.wizard.phrases import short
 from inputdesign_cli.wizard.spectra import Solve
 
@@ -62,16 +62,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
                 f"Of the {lasting(there)} that there are, {lasting(taken)} were used, which are "
                 f"{result['samples']} samples: write duration: {short(needed)} into the spec, and solve it."
             )
-    loop = next((item["loop"] for item in result.get("requirements", []) if "loop" in item), None)
-    kept = spec.accuracy.loop
-    if kept is not None and loop and (ratio <= 1.0):
-        peak = 20.0 * np.log10(kept.peak)
-        sure = 100.0 * (kept.confidence or DEFAULT_CONFIDENCE)
-        said.append(
-            f"The peak of |S| of the loop stays below {peak:.3g} dB for every plant within the error of the "
-            f"model (r_u, to first order, {sure:.3g} % confidence): a gain margin of "
-            f"{loop['gain_margin']:.3g} and a phase margin of {loop['phase_margin']:.3g} degrees are kept."
-        )
+    said += margins_kept(spec, result, enough=ratio <= 1.0)
     return Verdict(ratio, (*said, *_elsewhere(result, ratio), *_open_dead_times(result)))
 
 
@@ -80,6 +71,8 @@ def _for_which(result: Result, ratio: float) -> str:
     if ratio > 1.0:
         return "not enough"
     robust = result.get("robust", {})
+    if some_are_lost(robust):
+        return "enough wherever this controller has the margin at all, which it does not at every plant"
     fresh = robust.get("fresh") or {"missed": 0, "largest": 0.0}
     if not fresh["missed"] or fresh["largest"] * ratio <= 1.0:
         return "enough"

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.specification import Spec
@@ -35,6 +37,11 @@ class _Tried:
     value: float
     bound: float | None
     rivals: bool
+
+    @property
+    def family(self) -> str:
+        """What it has in common with those that differ in their size only."""
+        return self.words.partition(",")[0]
 
     @property
     def near(self) -> bool:
@@ -66,7 +73,7 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     for words, what in _spectra(draft.spec()):
         with in_their_words(draft.said):
             one = _solved(draft, words, what, solve)
-        idle = idle + 1 if tried and one.value * _NO_BETTER >= min(t.value for t in tried) else 0
+        idle = 0 if _improves(one, tried) else idle + 1
         tried.append(one)
         if (one.near and not one.rivals) or idle == _IDLE:
             break
@@ -74,6 +81,12 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     least = min(one.value for one in clear)
     best = next(one for one in clear if one.value <= _ENOUGH * least)
     return draft.with_spectrum(best.words, best.told)
+
+
+def _improves(one: _Tried, tried: list[_Tried]) -> bool:
+    """Whether it is better than all before it, or than the last of its family, which may yet overtake."""
+    alike = [other.value for other in tried if other.family == one.family][-1:]
+    return one.value * _NO_BETTER < max([min((t.value for t in tried), default=np.inf), *alike])
 
 
 def _spectra(spec: Spec) -> list[tuple[str, str]]:

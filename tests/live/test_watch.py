@@ -80,7 +80,9 @@ def test_a_saved_file_is_solved_and_stands_beside_what_was_good(spec, tmp_path):
         spec.unlink()
         assert "The last good design" in page_with(address, "file-missing")
         spec.write_text(SPEC % "")
-        assert answers(page_with(address, "Computed at"))[0] == first
+        text = page_with(address, "Computed at")
+        assert answers(text)[0] == first
+        assert "What is wrong" not in text  # what has been mended is wrong no longer
 
 
 def test_the_answer_is_shown_before_the_pictures_are_drawn(spec, tmp_path):

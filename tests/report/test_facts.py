@@ -50,8 +50,37 @@ def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
     result = {"objective": {"kind": "accuracy_factor", "value": 0.5}, "robust": robust, "limits": limits}
     told = {name: value for name, value, _ in facts(result, "s")}
     assert told["plants"].endswith("the plant of the spec and 30 drawn and 1 that a search found")
-    assert told["worst plant"] == "1 of what is admitted is the worst that was found in the intervals"
     assert told["limits"] == "input amplitude exhausted"
+
+
+@pytest.mark.parametrize(
+    ("objective", "share", "words"),
+    [
+        (
+            {"kind": "accuracy_factor", "value": 0.148},
+            1.0 + 1e-9,
+            "none was found in the intervals that errs more than those that the design is for: 0.148 of "
+            "what is admitted",
+        ),
+        (
+            {"kind": "accuracy_factor", "value": 0.5},
+            1.002,
+            "the worst that was found in the intervals errs 0.2 % more than those that the design is for: "
+            "0.501 of what is admitted",
+        ),
+        (
+            {"kind": "least_cost", "value": 3.0},
+            0.9,
+            "0.9 of what is admitted is the worst that was found in the intervals",
+        ),
+    ],
+)
+def test_the_worst_plant_is_measured_by_what_is_admitted_whatever_is_sought(objective, share, words):
+    """`share` is one of the ratio that is reached where the best accuracy is sought: times that ratio."""
+    robust = {"source": "intervals", "scenarios": 31, "discarded": 0, "rejected": 0, "active": []}
+    robust["searched"] = {"share": share, "region": "the intervals", "added": 1, "tried": 40}
+    told = {name: value for name, value, _ in facts({"objective": objective, "robust": robust}, "s")}
+    assert told["worst plant"] == words
 
 
 def test_the_terminal_tells_estimates_with_their_deviations():

@@ -32,6 +32,9 @@ _TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
         ('{"num": [1], "den": [1, 1], "dealy": 25}', "it has dealy, too"),
         ('{"num": [1], "den": [1, 1], "delay": null}', "null in delay is no number"),
         ('{"num": [1], "den": [1, 1], "delay": NaN}', "a number of delay is not finite"),
+        ('{"num": [2], "den": [180, 1], "delay": 25, "delay": 400}', "it says delay more than once"),
+        ('{"num": [2], "den": [1, 0]}', 'write its dead time ("delay": 5), however small, or the lag'),
+        ('{"num": [2], "den": [1, 0, 1], "delay": 5}', "has no stable pole"),
     ],
 )
 def test_what_is_wrong_is_told(tmp_path, text, words):
@@ -53,6 +56,15 @@ def test_an_integrator_is_known(tmp_path):
     s = 1j * np.array([1e-4, 1e-2, 1.0])
     found = np.polyval(matrix.numerator_matrix[0][0], s) / np.polyval(matrix.denominator_matrix[0][0], s)
     assert found == pytest.approx(np.polyval(_TANK["num"], s) / np.polyval(_TANK["den"], s), rel=1e-12)
+
+
+def test_a_pure_integrator_is_sampled_by_its_dead_time(tmp_path):
+    """As the template `tank`: 0.05 exp(-5 s)/s."""
+    (tmp_path / "p.json").write_text(json.dumps({"num": [0.05], "den": [1, 0], "delay": 5}))
+    draft = compose(GOOD | {"plant": "p.json", "loop": "PI Kp 0.8, Ti 60"}, "s", tmp_path)
+    assert "sample_time: 2  # half the dead time, or a little less" in draft.text
+    plant = draft.spec().plant
+    assert {one.label for one in plant.named_parameters} == {"b0", "L"}
 
 
 def test_a_zero_that_cancels_the_integrator_leaves_none(tmp_path):

@@ -15,7 +15,7 @@ from inputdesign_cli.wizard.solving import lasting, verdict
 from tests.wizard.test_wizard import ENGINEER
 
 
-def words(applied, caused, offset=None):
+def words(applied, caused, offset=None, **of_signal):
     spec = SimpleNamespace(signal=SimpleNamespace(offset=offset), sample_time=2.0, time_unit="s")
     tables = {
         "signal": SimpleNamespace(columns=dict.fromkeys(["time_s", *applied])),
@@ -23,13 +23,19 @@ def words(applied, caused, offset=None):
             columns=dict.fromkeys(["time_s", *caused, *(f"{y}_noise_deviation" for y in caused)])
         ),
     }
-    return to_log(spec, SimpleNamespace(tables=tables), "spec.yaml")
+    return to_log(spec, SimpleNamespace(tables=tables, result={"signal": of_signal}), "spec.yaml")
 
 
 def test_all_channels_are_logged():
     apply, judge = words(["u1", "u2"], ["y1", "y2"], [40.0, 5.0])
     assert "apply signal.csv, and log time, u1, u2, y1 and y2 every 2 s" in apply
     assert "--operating-point u1=40,u2=5,y1=REST,y2=REST" in judge
+
+
+def test_the_operating_point_is_the_one_that_the_record_swings_about():
+    """A converter of 31 steps of 24/31 V has no level of 10 V."""
+    _, judge = words(["u1"], ["y1"], 10.0, operating_point=[10.5])
+    assert "--operating-point u1=10.5,y1=REST" in judge
 
 
 def test_a_reference_is_no_position_of_the_actuator():
@@ -49,6 +55,32 @@ def told(ratio=0.5, there=None, solve=None, limits=None, **robust):
     result = {"samples": 720, "signal": signal, **({"robust": robust} if robust else {})}
     missing = {"signal": {}}
     return " ".join(verdict(spec, result, solve or (lambda other: missing), there).sentences)
+
+
+def told_of_the_margin(**robust):
+    """The sentences about an own controller with 6 dB, where the loop is among what is required."""
+    spec = compose({**ENGINEER, "wish": "own loop with 6 dB, Kp 0.5, Ti 180"}, "x", Path()).spec()
+    loop = {"gain_margin": 2.0, "phase_margin": 29.0}
+    signal = {"worst_ratio": 0.3, "input_peak": [5.0]}
+    result = {"samples": 720, "signal": signal, "requirements": [{"loop": loop}], "robust": robust}
+    return " ".join(verdict(spec, result, lambda other: {"signal": {}}).sentences)
+
+
+def test_no_margin_is_promised_at_a_plant_that_the_controller_does_not_fit():
+    promised = told_of_the_margin(scenarios=30)
+    assert "enough: the model" in promised
+    assert "The peak of |S| of the loop stays below 6 dB for every plant" in promised
+    worst = {"scenario": 3, "peak": 10 ** (13.5 / 20), "parameters": {"gain": 1.2, "dead_time": 24.0}}
+    floor = {"share": 0.1, "raised": [3, 5, 7], "lost": [3, 5], "worst": [worst]}
+    said = told_of_the_margin(
+        scenarios=30, floor=floor, fresh={"missed": 0, "largest": 0.9, "draws": 200, "lost": 51}
+    )
+    assert "enough wherever this controller has the margin at all" in said
+    assert "at 2 of the 30 other plants that were tried and at 51 of 200 more" in said
+    assert "such as gain 1.2, dead_time 24, where |S| reaches 13.5 dB" in said
+    assert "the verdict of assess will be undecided" in said
+    assert "At the other plants the peak of |S|" in said
+    assert "At 1 of the plants that were tried the controller has less than 0.1 of the room" in said
 
 
 def test_a_rate_that_binds_is_said():

@@ -20,6 +20,7 @@ from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed, costs_of
 from inputdesign_cli.tasks.result.fan import fan_curves
+from inputdesign_cli.tasks.result.floor import floor_at, floor_entry, floor_notes, floor_of
 from inputdesign_cli.tasks.robust import (
     CONFIDENCE,
     MET,
@@ -85,11 +86,15 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
         costs = costs_of(done, found.basis, found.x)
         dearest = int(np.argmax(costs))
         entry["dearest"] = {"scenario": numbers[dearest], "cost": costs[dearest]}
+    floors = [floor_at((*one.requirements, *one.side)) for one in done.problem.scenarios[1:]]
+    chosen = batch.thetas[kept]
+    floored = floor_entry(floors, numbers[1:], plants.names, chosen)
+    entry |= {"floor": floored} if floored else {}
     if plants.searched is not None:
         entry["searched"] = _searched(units, plants, plants.searched)
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
-    notes = _unstable(batch)
+    notes = (*_unstable(batch), *floor_notes(floored, len(kept)))
     if plants.afresh is not None:
         fresh = _fresh(done, plants, plants.afresh(), peak)
         entry |= {"fresh": fresh} if fresh else {}
@@ -139,6 +144,9 @@ def _searched(units: Units, plants: Plants, found: Searched) -> dict[str, Json]:
     if found.kept.frequency is not None:
         entry["frequency"] = found.kept.frequency / units.frequency
     entry["parameters"] = dict(zip(plants.names, found.theta.tolist(), strict=True))
+    plant = None if plants.at is None else plants.at(found.theta)
+    if plant is not None and (floor := floor_of(plant)).lost:
+        entry |= {"lost": True} | ({} if floor.peak is None else {"peak": floor.peak})
     return entry | {"added": found.added, "tried": found.tried}
 
 
@@ -159,13 +167,14 @@ def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
 
 def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak | None) -> dict[str, Json]:
     """How many of other plants from the same distribution the design misses, as many as there is time for."""
-    tried, peaks, rejected, largest = list[Kept](), list[float](), 0, 0.0
+    tried, peaks, rejected, largest, lost = list[Kept](), list[float](), 0, 0.0, 0
     for batch in afresh:
         try:
             tried += tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
         except OutOfTimeError:
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
+        lost += sum(floor_of(plant).lost for plant in batch.plants)
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
@@ -183,6 +192,8 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
         "limits": list(binomial_limits(missed, len(tried))),
         "largest": largest,
     }
+    if lost:
+        entry["lost"] = lost
     if peaks:
         entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
     promised = plants.paid == "worst" and done.problem.goal == "cost"
