@@ -82,8 +82,8 @@ def _no_time(file: str, integrates: bool) -> str:
     if integrates:
         return (
             f"the system of {file} integrates and has no other pole and no delay, which would tell how "
-            'fast it is to be sampled: write its dead time ("delay": 5), however small, or the lag of what moves it '
-            'into den, such as "den": [10, 1, 0]'
+            'fast it is to be sampled: write its dead time ("delay": 5), however small, or the lag of what '
+            'moves it into den, such as "den": [10, 1, 0]'
         )
     return f"the system of {file} has no stable pole: its time constant is not known"
 

@@ -207,8 +207,8 @@ def _rejected(path: Path, failed: Sequence[str]) -> tuple[str, ...]:
     tests = ", ".join(name.replace("_", " ") for name in failed)
     return (
         f"tests reject a gain, a time constant and a dead time ({tests}): the plant has another structure, "
-        "or its level drifts, and neither the values nor how well they are told to be known are to be trusted; "
-        f'"log {path.name}" explores other structures',
+        "or its level drifts, and neither the values nor how well they are told to be known are to be "
+        f'trusted; "log {path.name}" explores other structures',
     )
 
 
