@@ -57,11 +57,10 @@ def illustration_1(folder: Path) -> None:
     u = np.sqrt(0.1) * np.random.default_rng(7).standard_normal(400)
     initial = record(folder / "initial.csv", u, seed=8)
     idesign("identify", str(initial), "--spec", spec, "-o", str(folder / "initial"))
-    blocks = (folder / "initial" / "model.yaml").read_text(encoding="utf-8").split("\n# Covariance")[0]
     rest = (SPECS / "first_order.yaml").read_text(encoding="utf-8").splitlines()
     kept = [line for line in rest if not line.startswith(("sample_time:", "plant:", "noise:"))]
     designed = folder / "first_order.yaml"
-    designed.write_text("\n".join([*kept, blocks]), encoding="utf-8")
+    designed.write_text("\n".join(["include: initial/model.yaml", *kept, ""]), encoding="utf-8")
     idesign("solve", str(designed), "-o", str(folder / "design"))
     signal = read_csv(folder / "design" / "signal.csv")["u1"]
     data = record(folder / "experiment.csv", signal, seed=9)

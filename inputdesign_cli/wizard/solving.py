@@ -90,7 +90,7 @@ def _used(spec: Spec, result: Result) -> str:
         return told
     limits = result["signal"].get("of_limits", {})
     why = [_LIMITS[name] for name, share in limits.items() if name in _LIMITS and share >= _MOST_OF]
-    binding = f", for {' and '.join(why)} does not let it go further" if why else ""
+    binding = f"; {' and '.join(why)} {'is' if len(why) == 1 else 'are'} at the limit" if why else ""
     return f"{told} (it moves by {moved:.3g} at most{binding})"
 
 

@@ -87,7 +87,7 @@ def test_a_rate_that_binds_is_said():
     assert "60 min at plus/minus 5 is enough" in told()
     said = told(limits="rate 0.01")
     assert (
-        "plus/minus 5 (it moves by 1.25 at most, for the rate does not let it go further) is enough" in said
+        "plus/minus 5 (it moves by 1.25 at most; the rate is at the limit) is enough" in said
     )
 
 
