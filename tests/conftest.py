@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,11 @@ from inputdesign_cli.tasks.build.system import build_experiment
 SPECS = Path(__file__).parent.parent / "specs"
 # New objects before the collector of cycles looks at them: by itself it does so every 700.
 _NEW_OBJECTS = 50_000
+
+# `nohup` and the background of a shell hand on that these are ignored, and commands under test would obey.
+for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, handler)
 
 
 def pytest_collection_finish():

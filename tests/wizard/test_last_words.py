@@ -86,9 +86,7 @@ def test_no_margin_is_promised_at_a_plant_that_the_controller_does_not_fit():
 def test_a_rate_that_binds_is_said():
     assert "60 min at plus/minus 5 is enough" in told()
     said = told(limits="rate 0.01")
-    assert (
-        "plus/minus 5 (it moves by 1.25 at most; the rate is at the limit) is enough" in said
-    )
+    assert "plus/minus 5 (it moves by 1.25 at most; the rate is at the limit) is enough" in said
 
 
 def test_a_length_that_would_do_is_shorter_than_the_record_that_does():
