@@ -329,7 +329,7 @@ def test_the_page_is_among_the_files_that_are_named(tmp_path):
     assert "report.html" in there
 
 
-@pytest.mark.parametrize("inputs", [1, 2])
+@pytest.mark.parametrize("inputs", [2, pytest.param(1, marks=pytest.mark.slow)])
 def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
     rng = np.random.default_rng(3)
     u = 1e5 + np.repeat(rng.choice([0.0, 1.0, 5.0], (60, inputs), p=[0.6, 0.3, 0.1]), 5, axis=0)
