@@ -18,6 +18,8 @@ _SHORTEST = 10
 _LAGS, _MOST, _RIDGE = 150, 5000, 1e-9
 _PER_LAG = 6
 _PASSES, _USUAL = 3, 4.0
+# Of an autoregression, with so many samples to a parameter at least: enough for a few resonances.
+_ORDER = 8
 
 
 def outliers(name: str, x: Array, lines: NDArray[np.int64]) -> list[str]:
@@ -28,12 +30,13 @@ def outliers(name: str, x: Array, lines: NDArray[np.int64]) -> list[str]:
 def strange_values(name: str, y: Array, u: Array, lines: NDArray[np.int64]) -> list[str]:
     """Values of an output y (n,) far from the median, or more of them far from their neighbours: spikes.
 
-    What the inputs u (n, r), NaN where missing, explain is neither: a plant answers pulses and jumps.
+    What the inputs u (n, r), NaN where missing, explain is neither: a plant answers pulses and jumps. Nor is
+    a swing that the values before it explain.
     """
     far, alone = _far(y), _alone(y)
     if np.any(far) or np.any(alone):
         left = y - _caused(u, y)
-        far, alone = far & _far(left), alone & _alone(left)
+        far, alone = far & _far(left), alone & _unforeseen(left, _alone(left))
     told = _outlying(name, far, y, lines)
     if told or alone.sum() <= OFTEN * y.size:
         return told
@@ -83,16 +86,36 @@ def _caused(u: Array, y: Array) -> Array:
     # Inputs from before the record act on its first samples.
     columns = np.column_stack([columns, np.ones(len(columns))])[lags:]
     level = float(np.median(y))
-    wanted = y[some] - level
-    kept = np.ones(len(wanted), dtype=bool)
-    for _ in range(_PASSES):
-        theirs = columns[kept]
-        gram = theirs.T @ theirs + _RIDGE * samples * np.eye(theirs.shape[1])
-        solution = np.linalg.solve(gram, theirs.T @ wanted[kept])
-        # The faults themselves must not decide what is explained.
-        off = np.abs(wanted - columns @ solution)
-        kept = off <= _USUAL * np.median(off)
+    solution = _usual_solution(columns, y[some] - level)
     responses = np.split(solution[:-1], r)
     return sum(
         (np.convolve(x, h)[:samples] for x, h in zip(moved.T, responses, strict=True)), level + solution[-1]
     )
+
+
+def _unforeseen(x: Array, suspected: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Those of the suspected values that are far from what an autoregression of the others foresees."""
+    order = min(_ORDER, x.size // (2 * _PER_LAG))
+    spread = spread_of(x)
+    if order == 0 or spread == 0.0 or not np.any(suspected):
+        return suspected
+    scaled = (x - np.median(x)) / spread
+    # Faults would speak for what follows them.
+    plain = np.where(suspected, scipy.ndimage.median_filter(scaled, 5), scaled)
+    columns, wanted = np.lib.stride_tricks.sliding_window_view(plain, order)[:-1], scaled[order:]
+    off = np.abs(wanted - columns @ _usual_solution(columns[:_MOST], wanted[:_MOST]))
+    found = suspected.copy()
+    found[order:] &= off > _OUTLYING * 1.4826 * np.median(off)
+    return found
+
+
+def _usual_solution(columns: Array, wanted: Array) -> Array:
+    """Least squares, in which faults do not decide what is explained."""
+    kept = np.ones(len(wanted), dtype=bool)
+    for _ in range(_PASSES):
+        theirs = columns[kept]
+        gram = theirs.T @ theirs + _RIDGE * len(columns) * np.eye(theirs.shape[1])
+        solution: Array = np.linalg.solve(gram, theirs.T @ wanted[kept])
+        off = np.abs(wanted - columns @ solution)
+        kept = off <= _USUAL * np.median(off)
+    return solution

@@ -66,3 +66,22 @@ def test_an_input_without_numbers_beside_the_output_explains_nothing():
     y[10] = 90.0
     (told,) = strange_values("y", y, np.full((N, 2), np.nan), LINES)
     assert told == "y has 1 outlying value (row 12): look at the record"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize("angle", [1.3, 2.4])
+@pytest.mark.parametrize("samples", [100, N])
+def test_the_noise_of_a_resonance_is_no_fault_and_spikes_upon_it_are(angle, samples, noise):
+    """Noise through poles of radius 0.97, in which every third value may lie between its neighbours."""
+    A = np.convolve([1.0, -1.94 * np.cos(angle), 0.9409], [1.0, -1.6, 0.92])
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        u = np.zeros((samples, 1))
+        y = scipy.signal.lfilter([1.0], A, rng.standard_normal(samples)) + noise * rng.standard_normal(
+            samples
+        )
+        assert strange_values("y", y, u, LINES[:samples]) == []
+        at = np.arange(6, samples, 12)
+        y[at] += 60.0 * np.std(y)
+        (told,) = strange_values("y", y, u, LINES[:samples])
+        assert told.startswith(f"y has {at.size} values")
