@@ -31,5 +31,6 @@ def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     name = "y" if curves.output is None else f"y{curves.output + 1}"
     worse = f"; below {_LEAST_SHOWN:g}: there" if least < _LEAST_SHOWN else ""
-    axes.set_ylabel(f"fit of {name} on unseen data (%{worse})")
+    which = "unseen data" if curves.unseen else "the data that estimate"
+    axes.set_ylabel(f"fit of {name} on {which} (%{worse})")
     legend_over_all(page, handles)

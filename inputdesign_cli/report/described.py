@@ -82,6 +82,10 @@ def _fit_caption(curves: of.FitCurves) -> str:
 
 def _orders_caption(curves: of.OrderCurves) -> str:
     which = "" if curves.output is None else f" for y{curves.output + 1}"
+    if not curves.unseen:
+        return (
+            f"How well each structure that was tried{which} simulates the record that it is estimated from."
+        )
     return (
         f"How well each structure that was tried{which}, estimated on one part of the record, simulates the "
         "other."

@@ -65,6 +65,8 @@ def _judging(result: Result) -> str:
     """What `validation` is about: all data for a model that was given, or a part and an estimate without."""
     if "exploration" not in result:
         return "these data"
+    if result["exploration"].get("split") == "none":
+        return "the data that it is estimated from"
     return "one part, estimated from the other alone (the parameters above: from the whole record)"
 
 
@@ -96,7 +98,7 @@ def _explained(result: Result) -> str:
 
 def _unseen(result: Result) -> Iterator[str]:
     """The same of an estimate that has not seen what it is judged by, if there is one."""
-    if "validation" in result:
+    if "validation" in result and result.get("exploration", {}).get("split") != "none":
         explained = _per_cent(result["validation"]["simulation_fit_percent"])
         yield f"The same structure, estimated from one part of them alone, explains {explained} of the other."
 

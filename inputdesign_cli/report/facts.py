@@ -159,7 +159,8 @@ def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterato
     )
     added = found.get("searched", {}).get("added", 0)
     sought = f" and {added} that a search found" if added else ""
-    holds = f"what is asked holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
+    asked = "what is asked, or the floor below," if "floor" in found else "what is asked"
+    holds = f"{asked} holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
     yield "plants", holds, again
     if "floor" in found:
         raised, lost = (len(found["floor"][name]) for name in ("raised", "lost"))
@@ -190,7 +191,7 @@ def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterato
             "fresh plants",
             f"of {told['draws']} more, drawn alike, {_missed(told, best)}: {per_cent(told['share'])} "
             f"({low} to {high})",
-            "said of plants drawn as the spec says, not of the true plant",
+            _held(told) or "said of plants drawn as the spec says, not of the true plant",
         )
         if "beyond_limits" in told:
             peaks = told["beyond_limits"]
@@ -200,6 +201,14 @@ def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterato
                 f"{peaks['draws']} go beyond, up to {per_cent(peaks['largest'])} of a limit",
                 "without noise",
             )
+
+
+def _held(told: Mapping[str, Json]) -> str:
+    """What counts as getting what is asked, where r_adm is the floor at some of the fresh plants."""
+    if not told.get("raised"):
+        return ""
+    lost = f", {told['lost']} of which no model keeps what is asked" if told.get("lost") else ""
+    return f"{told['raised']} are held to the floor only{lost}"
 
 
 def _missed(told: Mapping[str, Json], best: bool) -> str:

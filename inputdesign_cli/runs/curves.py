@@ -274,11 +274,12 @@ class ResidualCurves(Curves):
 
 @dataclass(frozen=True)
 class OrderCurves(Curves):
-    """How well structures simulate data that they have not seen: per family the fit over the parameters."""
+    """How well structures simulate data, `unseen` or their own: per family the fit over the parameters."""
 
     fits: Mapping[str, tuple[Array, Array]]  # family -> numbers of parameters, per cent
     chosen: tuple[float, float]
     output: int | None = None  # from zero; None: the only one
+    unseen: bool = True
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,14 @@ class ConvexTask:
         self._check_length(result)
         solved = time.perf_counter()
         loose = 0.0 if self.reach.attained else self.tolerance
-        audit(done, result, on_grid=self.grid is not None, loose=loose)
+        try:
+            audit(done, result, on_grid=self.grid is not None, loose=loose)
+        except InaccurateError as error:
+            if not self.reach.note:
+                raise
+            # What is only approached drives numbers to where digits end.
+            told = [replace(one, hint=f"{self.reach.note}; or {one.hint}") for one in error.diagnostics]
+            raise InaccurateError(told) from error
         checked = time.perf_counter()
         if "ended_by" in how:
             notes = unfinished_notes(result)

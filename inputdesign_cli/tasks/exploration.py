@@ -91,7 +91,16 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     order = order_of_excitation(moving)
     unseen = unidentified(found, order, log.step, log.time_unit)
     unsteady = () if found.steady or rising or unseen else (_UNSTEADY,)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *unseen, *unsteady, *loose)
+    reasons = (
+        *_unjudged(found),
+        *_reasons(found),
+        *_idle(found),
+        *_refuted(found),
+        *rising,
+        *unseen,
+        *unsteady,
+        *loose,
+    )
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
@@ -168,8 +177,21 @@ def _asked(task: Identification, identified: Identified) -> Identified:
     return replace(identified, question=question)
 
 
+def _unjudged(found: Found) -> tuple[str, ...]:
+    """That no data are left to judge by."""
+    if found.split != "none":
+        return ()
+    return (
+        "the inputs move in one stretch of the record only, which cannot both estimate a model and judge it: "
+        "the model was chosen and judged by the data that it is estimated from. Judge it by another record "
+        "(idesign explore OTHER --validate model.yaml), or let the inputs step up and down again, several "
+        "times",
+    )
+
+
 def _reasons(found: Found) -> tuple[str, ...]:
     """Why nothing that was found deserves trust."""
+    which = "" if found.split == "none" else " that it has not seen"
     single = found.model.outputs == 1
     unseen = int(np.sum(found.validation.counted))
     told = []
@@ -178,7 +200,7 @@ def _reasons(found: Found) -> tuple[str, ...]:
         if fit < max(_LEAST_FIT, chance):
             told.append(
                 f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in {unseen} "
-                f"samples that it has not seen, and of noise alone it may explain {chance:.1f} %: the inputs "
+                f"samples{which}, and of noise alone it may explain {chance:.1f} %: the inputs "
                 "hardly act on it, or the record is too short or too noisy to tell how"
             )
     return tuple(told)
@@ -211,10 +233,13 @@ def _refuted(found: Found) -> tuple[str, ...]:
     failed = {test.name for test in found.estimate.failed}
     if not all(failed & kind for kind in _KINDS):
         return ()
-    single = found.model.outputs == 1
+    single, unseen = (
+        found.model.outputs == 1,
+        "" if found.split == "none" else " in data that it has not seen",
+    )
     return tuple(
         f"past inputs explain residuals, residuals explain each other, and the simulation explains {fit:.1f} "
-        f"% of {'y' if single else f'y{i + 1}'} in data that it has not seen: the plant acts otherwise than "
+        f"% of {'y' if single else f'y{i + 1}'}{unseen}: the plant acts otherwise than "
         "any structure that was tried. It may be nonlinear, vary with time, or have inputs that the log "
         "lacks: record about one operating point, or log what else acts on it"
         for i, fit in enumerate(found.validation.simulation)

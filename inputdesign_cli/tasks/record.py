@@ -242,6 +242,23 @@ def _power_share(
     return max(used, default=0.0)
 
 
+def ratio_before(design: Design, step: float) -> float:
+    """The worst ratio of what is known before any excitation, at the plant where it is worst.
+
+    Args:
+        step: the sample time, in the unit of the experiment's frequencies.
+    """
+    ratios = []
+    for scenario in design.problem.scenarios:
+        silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)
+        score = _largest(scenario.requirements, lambda r, M: r.least(M))
+        try:
+            ratios.append(score(silent.information(np.zeros((1, scenario.experiment.inputs)))))
+        except np.linalg.LinAlgError:
+            return np.inf
+    return max(ratios)
+
+
 def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
     """Samples of records as long as the experiment, in whole periods; None where none are computed."""
     whole = replace(request, samples=None)

@@ -18,7 +18,15 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.signal import Record
-from inputdesign_cli.tasks.record import Made, RecordRequest, design_cost, designed_spectrum, make_record
+from inputdesign_cli.tasks.record import (
+    Made,
+    RecordRequest,
+    design_cost,
+    designed_spectrum,
+    least_period,
+    make_record,
+    ratio_before,
+)
 from inputdesign_cli.tasks.result.too_short import refuse_too_short
 from inputdesign_cli.tasks.result.too_tight import too_tight
 from inputdesign_cli.tasks.shortest_record import ShortestRecord, Way, longest_search
@@ -52,6 +60,9 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
     """
+    if _sought(request, question):
+        # A spectrum may take fewer samples than any record has.
+        samples = max(samples, least_period(design.problem.experiment.inputs) * request.settings.block)
     record = make_record(request, design, samples)
     plain = Made(record, request, design)
     if record is None:
@@ -71,6 +82,11 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
         tried[_words(of)] += 1
         misses += [other.record] if other.record is not None else []
     return _longer(plain, misses, question, tried, remedy)
+
+
+def _sought(request: RecordRequest, question: Question) -> bool:
+    """Whether the length of the record is looked for."""
+    return question.goal == "samples" and request.samples is None
 
 
 def _others(
@@ -132,12 +148,13 @@ def _longer(
         InfeasibleError: `limits-too-tight`.
     """
     request = plain.request
-    sought = question.goal == "samples" and request.samples is None
+    sought = _sought(request, question)
     allowed = request.most_samples if sought else 0
     search = ShortestRecord(
         _ways(plain, question, sought),
         request.settings.block,
         longest_search(len(misses[0].samples), allowed, request.longest),
+        ratio_before(plain.design, request.step),
     )
     found = search.search(misses)
     longer = None if found is None else found.record
@@ -153,6 +170,7 @@ def _longer(
         remedy=remedy,
         needed=search.needed,
         searched=search.longest,
+        longest_tried=search.tried,
     )
 
 

@@ -15,7 +15,7 @@ from inputdesign_cli.tasks.record import Made
 # Lengths that are looked into: times the one that was asked for, or that many samples.
 _LONGEST, _AT_LEAST = 64, 20_000
 _LEAP = 8.0
-_GROWTH = 1.03
+_GROWTH, _MOST_GROWTHS = 1.03, 100.0
 _FAR = 1.5
 _FINE = 0.01
 _LENGTHS = 24
@@ -34,9 +34,17 @@ class Way(Protocol):
         """The first record of a length that is found to meet the accuracy, else the best of some, if any."""
 
 
-def reach(record: Record) -> float:
-    """The length that a record needs, were its information in proportion to its length."""
-    return len(record.samples) * (record.worst_ratio**2 if np.isfinite(record.worst_ratio) else 1.0)
+def reach(record: Record, before: float = np.inf) -> float:
+    """The length that a record needs, were its information in proportion to its length.
+
+    Args:
+        before: the worst ratio of what is known without it.
+    """
+    if not np.isfinite(record.worst_ratio):
+        return float(len(record.samples))
+    known = before**-2.0
+    gain = record.worst_ratio**-2.0 - known
+    return len(record.samples) * (1.0 - known) / gain if gain > 0.0 else np.inf
 
 
 def longest_search(asked: int, most: int | None, longest: int) -> int:
@@ -57,11 +65,13 @@ class ShortestRecord:
         ways: what is tried at a length, until a record meets the accuracy.
         block: lengths are multiples of this.
         longest: samples of the longest that is looked for.
+        before: the worst ratio of what is known without any record.
     """
 
     ways: Sequence[Way]
     block: int
     longest: int
+    before: float = np.inf
     needed: float = 0.0  # samples that would do, by the records that missed
     _missed: dict[int, Record] = field(default_factory=dict)  # by way, its latest
     _tried: set[tuple[int, int]] = field(default_factory=set)  # ways and lengths
@@ -78,17 +88,19 @@ class ShortestRecord:
             OutOfTimeError: before one is found.
         """
         low, found, lengths = len(misses[0].samples), None, 0
-        self.needed = min(map(reach, misses))
+        self.needed = min(map(self._reach, misses))
         try:
             while found is None and lengths < _LENGTHS:
-                high = self._rounded(min(max(self.needed, _GROWTH * low), _LEAP * low, self.longest))
+                # Where what is needed was told too low again and again, it is no guide.
+                growth = min(_GROWTH ** min(2.0**lengths, _MOST_GROWTHS), _LEAP)
+                high = self._rounded(min(max(self.needed, growth * low), _LEAP * low, self.longest))
                 if high <= low:
                     return None
                 lengths += 1
                 found = self._met(high)
                 if found is None:
                     before, low = self.needed if lengths > 1 else np.inf, high
-                    self.needed = min((reach(record) for record in self._missed.values()), default=high)
+                    self.needed = min(map(self._reach, self._missed.values()), default=high)
                     # Records shorter than what the plant remembers promise far less than longer ones keep.
                     if self.needed > max(_BEYOND * self.longest, _FALLS * before):
                         return None
@@ -123,7 +135,7 @@ class ShortestRecord:
             if (number, samples) in self._tried or (
                 missed is not None
                 and samples < _NEARBY * len(missed.samples)
-                and samples * hopeless < reach(missed)
+                and samples * hopeless < self._reach(missed)
             ):
                 continue
             self._tried.add((number, samples))
@@ -138,7 +150,15 @@ class ShortestRecord:
     def _promise(self, number: int) -> float:
         """Where its latest record that missed would do; those that have not missed come first."""
         missed = self._missed.get(number)
-        return 0.0 if missed is None else reach(missed)
+        return 0.0 if missed is None else self._reach(missed)
+
+    def _reach(self, record: Record) -> float:
+        return reach(record, self.before)
+
+    @property
+    def tried(self) -> int:
+        """Samples of the longest record that was tried."""
+        return max((samples for _, samples in self._tried), default=0)
 
     def _rounded(self, length: float) -> int:
         return int(np.ceil(length / self.block)) * self.block

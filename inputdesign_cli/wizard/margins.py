@@ -22,23 +22,34 @@ def margins_kept(spec: Spec, result: Result, *, enough: bool) -> list[str]:
     if kept is None or not loop:
         return []
     robust, wished = result.get("robust", {}), f"{_decibels(kept.peak):.3g} dB"
-    lost, said = some_are_lost(robust), list[str]()
+    lost, barely, said = some_are_lost(robust), _barely(robust), list[str]()
     if enough:
         sure = 100.0 * (kept.confidence or DEFAULT_CONFIDENCE)
-        where = "At the other plants the" if lost else "The"
+        where = "At the other plants that were tried the" if lost or barely else "The"
         said.append(
             f"{where} peak of |S| of the loop stays below {wished} for every plant within the error of the "
             f"model (r_u, to first order, {sure:.3g} % confidence): a gain margin of "
             f"{loop['gain_margin']:.3g} and a phase margin of {loop['phase_margin']:.3g} degrees are kept."
         )
-    floor = robust.get("floor", {"raised": [], "lost": [], "share": 0.0})
-    if barely := len(floor["raised"]) - len(floor["lost"]):
+    if barely:
         said.append(
-            f"At {barely} of the plants that were tried the controller has less than {floor['share']:g} of "
-            "the room that it has at the plant as you stated it: whether the margin is kept there this "
-            "experiment may leave open."
+            f"At {barely} of the plants that were tried the controller has hardly any room left. There the "
+            "error is held against a share of the room at the plant as you stated it, and whether the margin "
+            "is kept this experiment may leave open."
         )
     return ([_lost(robust, wished)] if lost else []) + said
+
+
+def has_room_everywhere(robust: Mapping[str, Json]) -> bool:
+    """Whether the controller has the margin with some room at every plant that was tried."""
+    return not some_are_lost(robust) and not _barely(robust)
+
+
+def _barely(robust: Mapping[str, Json]) -> int:
+    """Plants that were tried at which r_adm is the floor, though it is positive."""
+    floor, fresh = robust.get("floor", {"raised": [], "lost": []}), robust.get("fresh", {})
+    others = int(fresh.get("raised", 0)) - int(fresh.get("lost", 0))
+    return len(floor["raised"]) - len(floor["lost"]) + others
 
 
 def some_are_lost(robust: Mapping[str, Json]) -> bool:

@@ -77,7 +77,7 @@ class Phrase:
     _left: str = field(init=False, default="")
 
     def __post_init__(self) -> None:
-        comma = re.search(r"\d,\d+", self.text)
+        comma = re.search(r"\d+,\d+", self.text)
         if comma is not None:
             raise bad_answer(
                 self.key, f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
@@ -131,6 +131,19 @@ class Phrase:
         """The frequency behind the words in rad/s, which is its unit where it has none."""
         found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNIT_OF_FREQUENCY}")
         return None if found is None else float(found[1]) * _FREQUENCIES[(found[2] or "rad/s").lower()]
+
+    def band(self) -> tuple[float | None, float | None]:
+        """From where to where, in rad/s; a unit behind one of the two is that of the other, too."""
+        frequency = NUMBER + _UNIT_OF_FREQUENCY
+        found = self.take(rf"\bfrom\b{_OF}{frequency}\s*(?:\bup to\b|\bto\b|-)\s*{frequency}")
+        if found is None:
+            return self.frequency_after("from"), self.frequency_after("up to|to")
+        units = (found[2] or found[4] or "rad/s", found[4] or found[2] or "rad/s")
+        low, high = (
+            float(number) * _FREQUENCIES[unit.lower()]
+            for number, unit in zip(found.group(1, 3), units, strict=True)
+        )
+        return low, high
 
     def share(self, words: str = "within") -> float | None:
         """The per cent of "within 30 %" as a fraction."""

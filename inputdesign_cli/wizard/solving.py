@@ -11,7 +11,7 @@ from inputdesign_cli.runs.results import Result
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.composing import LEAST
-from inputdesign_cli.wizard.margins import margins_kept, some_are_lost
+from inputdesign_cli.wizard.margins import has_room_everywhere, margins_kept
 from inputdesign_cli.wizard.phrases import short
 from inputdesign_cli.wizard.spectra import Solve
 
@@ -71,8 +71,10 @@ def _for_which(result: Result, ratio: float) -> str:
     if ratio > 1.0:
         return "not enough"
     robust = result.get("robust", {})
-    if some_are_lost(robust):
-        return "enough wherever this controller has the margin at all, which it does not at every plant"
+    if not has_room_everywhere(robust):
+        return (
+            "enough wherever this controller has the margin with room to spare, as it does not at every plant"
+        )
     fresh = robust.get("fresh") or {"missed": 0, "largest": 0.0}
     if not fresh["missed"] or fresh["largest"] * ratio <= 1.0:
         return "enough"

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.specification import Spec
@@ -22,8 +20,6 @@ _ORDERS, _LINES = (20, 40), (60, 120, 240)
 _ENOUGH = 1.02  # of what every spectrum reaches
 _TOLD = 1e-3  # smaller gaps are told as this
 _BEYOND = 2.0  # a bound that many times better leaves limits out, and tells nothing
-_NO_BETTER = 1.005
-_IDLE = 2  # so many in a row that are no better end the search
 
 Solve = Callable[[Spec], Result]
 
@@ -37,11 +33,6 @@ class _Tried:
     value: float
     bound: float | None
     rivals: bool
-
-    @property
-    def family(self) -> str:
-        """What it has in common with those that differ in their size only."""
-        return self.words.partition(",")[0]
 
     @property
     def near(self) -> bool:
@@ -69,24 +60,16 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     if not draft.chooses:
         return draft
     tried: list[_Tried] = []
-    idle = 0
     for words, what in _spectra(draft.spec()):
         with in_their_words(draft.said):
             one = _solved(draft, words, what, solve)
-        idle = 0 if _improves(one, tried) else idle + 1
         tried.append(one)
-        if (one.near and not one.rivals) or idle == _IDLE:
+        if one.near and not one.rivals:
             break
     clear = [one for one in tried if not one.rivals] or tried
     least = min(one.value for one in clear)
     best = next(one for one in clear if one.value <= _ENOUGH * least)
     return draft.with_spectrum(best.words, best.told)
-
-
-def _improves(one: _Tried, tried: list[_Tried]) -> bool:
-    """Whether it is better than all before it, or than the last of its family, which may yet overtake."""
-    alike = [other.value for other in tried if other.family == one.family][-1:]
-    return one.value * _NO_BETTER < max([min((t.value for t in tried), default=np.inf), *alike])
 
 
 def _spectra(spec: Spec) -> list[tuple[str, str]]:

@@ -54,8 +54,9 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
             f"  standard_deviation: {{{listed}}}",
         ]
     if said.take(r"\b(?:bode(?: plot| diagram)?|frequency response)\b"):
-        low = needed(said.frequency_after("from"), "wish", "from which frequency (rad/s)")
-        high = needed(said.frequency_after("up to|to"), "wish", "to which frequency (rad/s)")
+        begins, ends = said.band()
+        low = needed(begins, "wish", "from which frequency (rad/s)")
+        high = needed(ends, "wish", "to which frequency (rad/s)")
         said.finish()
         if low >= high:
             raise bad_answer("wish", f"{low:g} is not below {high:g}")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import InaccurateError, SpecError
 
 SAMPLES, VARIANCE, NODES = 500, 0.1, 1 << 14
 
@@ -203,3 +203,20 @@ def test_a_gain_that_costs_as_little_as_you_like():
 def test_lines_on_the_pole_are_refused():
     spectrum = "spectrum={type: multisine, frequencies: [0, 0.5, 1.0]}"
     assert refused(Plant(1).text("D", "limits: {input_power: 1}"), spectrum) == "needs-limits"
+
+
+def test_where_digits_end_on_the_way_to_what_is_only_approached_a_remedy_is_told():
+    """Power ever nearer to frequency zero is free of charge; a band that leaves it out has an optimum."""
+    text = """
+plant: {A: [1, -1], B: [0, 0.5, 0.2]}
+noise: {variance: 0.1}
+experiment: {samples: 500, controller: {numerator: [0.5], denominator: [1]}}
+cost: {input_power: 1}
+accuracy: {model_error: {absolute: 0.1, alpha: 2, band: [0.03142, 3.141]}}
+spectrum: {type: free}
+"""
+    with pytest.raises(InaccurateError) as caught:
+        solve(parse_spec(text))
+    assert "add cost.output_power or cost.excitation_power" in caught.value.diagnostics[0].hint
+    found = solve(parse_spec(text + "limits: {band: [0.0314, 3.14159]}\n")).result
+    assert found["status"] == "optimal"

@@ -1,5 +1,6 @@
 """Answers are read to their last word, in the units that they name."""
 
+import json
 import re
 from pathlib import Path
 
@@ -122,3 +123,14 @@ def test_noise_at_rest_has_its_own_sample_time(tmp_path, every, head):
     found = -float(entry("D", spec).strip("[]").split(",")[1])
     assert found == pytest.approx(0.9, abs=0.03)
     assert float(entry("variance", spec)) == pytest.approx(0.04 * (1 - 0.81), rel=0.3)
+
+
+@pytest.mark.parametrize("said", ["from 0.001 to 0.005 Hz", "from 0.001 Hz up to 0.005", "from 1 - 5 mHz"])
+def test_a_unit_is_that_of_both_ends_of_a_band(said):
+    low, high = json.loads(entry("band", written("wish", f"Bode plot within 5 % {said}")).split("]")[0] + "]")
+    assert (low, high) == pytest.approx((0.002 * np.pi, 0.01 * np.pi), rel=1e-5)
+
+
+def test_a_number_with_a_comma_is_told_whole():
+    with pytest.raises(SpecError, match="12,5 is a number with a comma"):
+        written("plant", "gain 2, time constant 180 s, each within 12,5 %")

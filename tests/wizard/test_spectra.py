@@ -31,8 +31,22 @@ def chosen(values, bound=1.0, rivals=()):
         ((1.2, 1.015), 1.0, (), [20, 40], "{type: fir, order: 40}", "by more than 1.5 %"),
         ((1.5, 1.3, 1.05, 1.01), 1.0, (), [20, 40, 60, 120], "{type: multisine, lines: 120}", "1 %"),
         # No more unknowns help, and the bound leaves limits out.
-        ((1.0, 1.0, 1.0), 0.05, (), [20, 40, 60], "{type: fir, order: 20}", "no better, as far as was tried"),
-        ((1.0, 1.0, 1.0), None, (), [20, 40, 60], "{type: fir, order: 20}", "no better, as far as was tried"),
+        (
+            (1.0,) * 5,
+            0.05,
+            (),
+            [20, 40, 60, 120, 240],
+            "{type: fir, order: 20}",
+            "no better, as far as was tried",
+        ),
+        (
+            (1.0,) * 5,
+            None,
+            (),
+            [20, 40, 60, 120, 240],
+            "{type: fir, order: 20}",
+            "no better, as far as was tried",
+        ),
         # Sinusoids begin badly, go on improving, and overtake.
         ((0.5, 0.4, 4.8, 1.7, 0.3), 0.299, (), [20, 40, 60, 120, 240], "{type: multisine, lines: 240}", "by"),
         # The first leaves another dead time open.
@@ -48,7 +62,7 @@ def test_the_simplest_spectrum_that_is_near_to_every_other(values, bound, rivals
 
 
 def test_gaps_are_told_without_exponents():
-    draft, _ = chosen((1.9, 1.9, 1.9))
+    draft, _ = chosen((1.9,) * 5)
     assert "by more than 90 %" in draft.text
     assert "e+" not in draft.text
 

@@ -11,7 +11,7 @@ from inputdesign_cli.design.convex.candidate import least_scale
 from inputdesign_cli.design.convex.limits import implied_power
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.design.convex.white import least_white_power
+from inputdesign_cli.design.convex.white import least_white_power, suffices
 from inputdesign_cli.information import Experiment, jointly_whitened
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import LinesBasis, flat_basis
@@ -33,6 +33,8 @@ def white_power(question: Question) -> float:
         replace(question, basis=flat_basis(question.experiment)),
         np.full(question.experiment.inputs, 1.0 / question.experiment.inputs),
     )
+    if question.goal == "samples" and suffices(unit, unit.fixed_information):
+        return 0.0
     return 1.0 / least_scale(unit, np.ones(1))
 
 

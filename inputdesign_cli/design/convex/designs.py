@@ -85,10 +85,10 @@ def solve_design(
     if question.others and _begins_flat(question.basis):
         flat = replace(flat, finer=problem)
     white = _white(question, flat, power)
-    white_level = float(white.z[0] / white.s)
     anywhere = _anywhere(question, whitened, powers)
     if power == 0.0 and not problem.has_floors:
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
+    white_level = float(white.z[0] / white.s)
     limited = problem.limits or problem.densities or problem.side
     within = not limited or excess(flat, white) <= KEEPS
     check_excites(problem, start)

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.compute.time_limit import seconds_left
@@ -39,10 +40,8 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
     for _ in range(_POLISH):
         trial = _Trial.of(experiment, factories, np.log(power))
         problem = trial.problem
-        if np.linalg.matrix_rank(problem.baseline_information) == experiment.size:
-            without = worst([v for _, v in problem.demands.violations(problem.baselines)])
-            if without.ratio <= 1.0:
-                return 0.0
+        if suffices(problem, problem.baselines):
+            return 0.0
         # The ratio falls as the root of the power where the excitation alone tells what is asked.
         at_once = trial.at + 2.0 * trial.excess(trial.at)
         if abs(at_once - trial.at) <= _SUITED and abs(trial.excess(at_once)) <= _EXACT:
@@ -61,6 +60,13 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
             return found
         power = found
     return power
+
+
+def suffices(problem: Problem, informations: NDArray[np.float64]) -> bool:
+    """Whether informations (S, k, k) of the scenarios meet every requirement."""
+    if any(np.linalg.matrix_rank(M) < len(M) for M in informations):
+        return False
+    return worst([v for _, v in problem.demands.violations(informations)]).ratio <= 1.0
 
 
 @dataclass(frozen=True)

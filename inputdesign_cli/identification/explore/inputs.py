@@ -22,16 +22,21 @@ def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) ->
     longest = max((u for u, _ in parts), key=len)
     x = longest - longest.mean(axis=0)
     n = max(min(most, len(x) // (3 * x.shape[1])), 1)
-    columns = np.stack([x[n - lag : len(x) - lag] for lag in range(n)], axis=1).reshape(len(x) - n, -1)
+    # Fewer delays are told by all rows of more, and by rows before these: a step may stand there.
+    told, open_from = 0, n + 1
+    while open_from - told > 1:
+        middle = n if open_from > n else (told + open_from) // 2
+        told, open_from = (middle, open_from) if _independent(x, middle) else (told, middle)
+    return told
+
+
+def _independent(x: Array, delays: int) -> bool:
+    """Whether so many delays of signals x (n, r), and a level, are linearly independent."""
+    columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
     columns = columns - columns.mean(axis=0)
     gram = columns.T @ columns
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    normal = gram / np.outer(scale, scale)
-    r = x.shape[1]
-    for order in range(n, 0, -1):
-        if np.linalg.eigvalsh(normal[: order * r, : order * r])[0] > _FAINT * order:
-            return order
-    return 0
+    return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] > _FAINT * delays)
 
 
 def past(signal: Array, lags: int) -> Array:

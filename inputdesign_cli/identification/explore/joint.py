@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ from inputdesign_cli.identification.explore.search import explore_structure
 from inputdesign_cli.plant import Model, PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
+Split = Literal["the first 60 % and the rest", "blocks in turn", "none"]
+
 _SHARE = 0.6
 _BLOCKS = 10
 # An input that moves less than this share of what it does in the whole record is still in that part.
@@ -51,7 +54,7 @@ class Found:
         estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
             stand in all.
         validation: the fits of the same structures, estimated on one part, to the other.
-        interleaved: whether the parts are blocks that take turns, instead of beginning and end.
+        split: which part estimates and which judges; of none the whole record does both.
         still: inputs (from zero) that never move.
         slopes: (p,), of the lines that were taken away from the outputs, a sample; None: of none.
     """
@@ -64,7 +67,7 @@ class Found:
     used: Parts
     samples: NDArray[np.int64]
     validation: Fits
-    interleaved: bool
+    split: Split
     still: tuple[int, ...]
     slopes: Array | None = None
 
@@ -91,22 +94,15 @@ def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
     """
     still, moved = moving_in(parts)
     moving = [j for j in range(parts[0][0].shape[1]) if j not in still]
-    first, second, interleaved = divided(moved)
-    found, outputs = [], parts[0][1].shape[1]
-    for i in range(outputs):
-        own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
-        chosen = explore_structure(own[0], own[1], feedback=feedback, step=step, physical=not still)
-        if chosen is None:
-            name = signal_name("y", i, outputs)
-            raise bad_spec(
-                "no-structure",
-                f"no model of {name} could be estimated: the record does not tell its parameters",
-                hint=_too_little(
-                    [signal_name("u", j, len(moving) + len(still)) for j in moving], first, second
-                ),
-                key=name,
-            )
-        found.append(chosen)
+    first, second, split = divided(moved)
+    try:
+        found = _structures(first, second, feedback, step, physical=not still)
+    except SpecError:
+        if _move_in(first) & _move_in(second) == _move_in(moved):
+            raise
+        # What moves in one stretch cannot do so in two parts.
+        first, second, split = moved, moved, "none"
+        found = _structures(first, second, feedback, step, physical=not still)
     used = busiest(moved, _MOST_SAMPLES)
     taken, estimate, model = _estimated(found, used, feedback, ramp)
     validation = beside(
@@ -122,9 +118,31 @@ def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
         busiest(parts, _MOST_SAMPLES),
         _busiest_samples(moved),
         validation,
-        interleaved,
+        split,
         still,
     )
+
+
+def _structures(first: Parts, second: Parts, feedback: bool, step: float, *, physical: bool) -> list[Chosen]:
+    """What is found for each output.
+
+    Raises:
+        SpecError: `no-structure`.
+    """
+    found, outputs = [], first[0][1].shape[1]
+    for i in range(outputs):
+        own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
+        chosen = explore_structure(own[0], own[1], feedback=feedback, step=step, physical=physical)
+        if chosen is None:
+            name = signal_name("y", i, outputs)
+            raise bad_spec(
+                "no-structure",
+                f"no model of {name} could be estimated: the record does not tell its parameters",
+                hint=_TOO_SIMPLE,
+                key=name,
+            )
+        found.append(chosen)
+    return found
 
 
 def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]:
@@ -239,7 +257,7 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
         yield tuple(min(own, key=lambda c: c.orders.size) for own in plain)
 
 
-def divided(parts: Parts) -> tuple[Parts, Parts, bool]:
+def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
     """Beginning and end of the records, or blocks in turn where an input rests in one of these."""
     total = sum(len(y) for _, y in parts)
     first: list[tuple[Array, Array]] = []
@@ -252,7 +270,7 @@ def divided(parts: Parts) -> tuple[Parts, Parts, bool]:
             if len(y[piece]):
                 some.append((u[piece], y[piece]))
     if _moves(first, parts) and _moves(second, parts):
-        return first, second, False
+        return first, second, "the first 60 % and the rest"
     length = max(total // _BLOCKS, 1)
     blocks = [
         (u[begin : begin + length], y[begin : begin + length])
@@ -260,23 +278,12 @@ def divided(parts: Parts) -> tuple[Parts, Parts, bool]:
         for begin in range(0, len(y), length)
         if len(y) - begin >= length // 2
     ]
-    return blocks[::2], blocks[1::2], True
+    return blocks[::2], blocks[1::2], "blocks in turn"
 
 
-def _too_little(names: Sequence[str], first: Parts, second: Parts) -> str:
-    """What to do about inputs, by name, of which the parts tell no model."""
-    once = [
-        name
-        for j, name in enumerate(names)
-        if not all(any(np.any(np.diff(u[:, j])) for u, _ in some) for some in (first, second))
-    ]
-    if not once:
-        return _TOO_SIMPLE
-    return (
-        f"{' and '.join(once)} moves in one stretch of the record only, which cannot both estimate a model "
-        "and judge it: let it step up and down again, several times; or identify a structure that you know: "
-        "idesign identify DATA --spec SPEC"
-    )
+def _move_in(some: Parts) -> set[int]:
+    """The inputs that move within a record."""
+    return {j for j in range(some[0][0].shape[1]) if any(np.any(np.diff(u[:, j])) for u, _ in some)}
 
 
 def _moves(some: Parts, whole: Parts) -> bool:

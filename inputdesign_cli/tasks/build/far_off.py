@@ -115,7 +115,7 @@ def _usual_solution(columns: Array, wanted: Array) -> Array:
     for _ in range(_PASSES):
         theirs = columns[kept]
         gram = theirs.T @ theirs + _RIDGE * len(columns) * np.eye(theirs.shape[1])
-        solution: Array = np.linalg.solve(gram, theirs.T @ wanted[kept])
+        solution = np.asarray(np.linalg.solve(gram, theirs.T @ wanted[kept]), dtype=float)
         off = np.abs(wanted - columns @ solution)
         kept = off <= _USUAL * np.median(off)
     return solution

@@ -63,7 +63,7 @@ def exploration_entry(
         "samples": len(log.y),
         "segments": list(log.lengths),
         "steps": list(log.steps),
-        "split": "blocks in turn" if found.interleaved else "the first 60 % and the rest",
+        "split": found.split,
         "loop": [{"input": f"u{j + 1}", "probability": p} for j, p in loops],
         "outputs": [
             {
@@ -116,7 +116,7 @@ def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]
         )
         notes.append(
             f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; chosen of "
-            f"{len(chosen.candidates)} structures, {_beside_the_best(chosen, taken)}"
+            f"{len(chosen.candidates)} structures, {_beside_the_best(found, chosen, taken)}"
         )
     notes += [
         f"{'y' if single else f'y{i + 1}'}: no {' or '.join(chosen.dropped)} model could be estimated: the "
@@ -138,17 +138,18 @@ def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]
     used = sum(len(y) for _, y in found.used)
     if used < len(log.y):
         notes.append(f"the model is estimated from the {used} samples in which the inputs move most")
-    if found.interleaved:
+    if found.split == "blocks in turn":
         notes.append("an input rests in one part of the record: blocks in turn estimate and judge")
     return notes
 
 
-def _beside_the_best(chosen: Chosen, taken: Candidate) -> str:
+def _beside_the_best(found: Found, chosen: Chosen, taken: Candidate) -> str:
     """By how much another structure simulates the part that judges better: other rules count, too."""
+    judge = "the record" if found.split == "none" else "the part that judges"
     better = max(c.validation for c in chosen.candidates) - taken.validation
     if better <= 0.0:
-        return "of which it simulates the part that judges best"
-    return f"of which the best simulates the part that judges by {better:.2g} points better"
+        return f"of which it simulates {judge} best"
+    return f"of which the best simulates {judge} by {better:.2g} points better"
 
 
 def _least_moved(log: Log, found: Found) -> str:
@@ -177,7 +178,7 @@ def structure_curves(found: Found) -> dict[str, Curves]:
         single = len(found.outputs) == 1
         mark = (float(taken.orders.size), taken.validation)
         curves["structures" if single else f"structures_{i + 1}"] = OrderCurves(
-            fits, mark, None if single else i
+            fits, mark, None if single else i, found.split != "none"
         )
     return curves
 

@@ -20,7 +20,7 @@ from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed, costs_of
 from inputdesign_cli.tasks.result.fan import fan_curves
-from inputdesign_cli.tasks.result.floor import floor_at, floor_entry, floor_notes, floor_of
+from inputdesign_cli.tasks.result.floor import Floor, floor_at, floor_entry, floor_notes, floor_of
 from inputdesign_cli.tasks.robust import (
     CONFIDENCE,
     MET,
@@ -167,14 +167,14 @@ def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
 
 def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak | None) -> dict[str, Json]:
     """How many of other plants from the same distribution the design misses, as many as there is time for."""
-    tried, peaks, rejected, largest, lost = list[Kept](), list[float](), 0, 0.0, 0
+    tried, peaks, rejected, largest, floors = list[Kept](), list[float](), 0, 0.0, list[Floor]()
     for batch in afresh:
         try:
             tried += tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
         except OutOfTimeError:
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
-        lost += sum(floor_of(plant).lost for plant in batch.plants)
+        floors += map(floor_of, batch.plants)
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
@@ -192,8 +192,12 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
         "limits": list(binomial_limits(missed, len(tried))),
         "largest": largest,
     }
-    if lost:
-        entry["lost"] = lost
+    for name, count in (
+        ("raised", sum(floor.raised for floor in floors)),
+        ("lost", sum(floor.lost for floor in floors)),
+    ):
+        if count:
+            entry[name] = count
     if peaks:
         entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
     promised = plants.paid == "worst" and done.problem.goal == "cost"

@@ -21,6 +21,7 @@ def too_tight(
     remedy: str = "",
     needed: float,
     searched: int,
+    longest_tried: int,
 ) -> InfeasibleError:
     """The error `limits-too-tight`.
 
@@ -31,7 +32,7 @@ def too_tight(
         tried: spectra by kind of signal, besides.
         remedy: what else would do.
         needed: samples that would do were information in proportion to them.
-        searched: the longest that was looked for.
+        searched: the longest that was looked for, and the longest that was tried.
     """
     names = " and ".join(request.limit_keys)
     size = len(missed.samples)
@@ -51,11 +52,13 @@ def too_tight(
             f"{samples} samples can (power {longer.power:.4g}): set {length} (and signal.samples, if "
             "stated), raise the limits, or loosen the accuracy"
         )
-    elif needed > searched:
+    elif searched < needed < np.inf:
         hint = (
             f"raise the limits: a record of the kinds that were tried would take about {needed:.3g} samples"
         )
     else:
-        hint = f"raise the limits: no record of up to {searched} samples was found either"
+        hint = "raise the limits"
+        if longest_tried > size:
+            hint += f": none of those tried with up to {longest_tried} samples does either"
     hint = "; or ".join(text for text in (hint, remedy) if text)
     return InfeasibleError.because("limits-too-tight", message, hint, request.limit_keys[0])

@@ -218,11 +218,18 @@ def test_a_part_of_a_period_tells_no_more_than_whole_ones(digits):
     assert order_of_excitation([(u, u)]) == 2
 
 
+@pytest.mark.parametrize("at", [12, 60, 150])
+def test_a_step_excites_as_many_delays_as_stand_before_it(at):
+    """And, behind it, as many as there are samples."""
+    u = (np.arange(200) >= at)[:, None].astype(float)
+    assert order_of_excitation([(u, u)]) == min(at, 50)
+
+
 def test_every_input_moves_in_both_parts():
     u = np.zeros((1000, 2))
     u[:500, 0], u[500:, 1] = held(np.random.default_rng(1), 500), held(np.random.default_rng(2), 500)
-    first, second, interleaved = divided([(u, u)])
-    assert interleaved
+    first, second, split = divided([(u, u)])
+    assert split == "blocks in turn"
     for part in (first, second):
         assert np.all(np.concatenate([x for x, _ in part]).std(axis=0) > 0)
 
@@ -261,13 +268,17 @@ def test_a_sinusoid_is_no_answer():
     assert only_answers([(u, u + 0.1 * np.random.default_rng(1).standard_normal(u.shape))]) == []
 
 
-def test_a_record_of_a_single_step_is_told_what_it_lacks():
+def test_a_record_of_a_single_step_estimates_and_judges_at_once():
+    """A lag of ten samples, gain one; the end of the record alone would tell nothing."""
     rng = np.random.default_rng(1)
     u = (np.arange(200) >= 20)[:, None].astype(float)
     y = scipy.signal.lfilter([0, 0.1], [1, -0.9], u, axis=0) + 0.02 * rng.standard_normal((200, 1))
-    with pytest.raises(SpecError, match="no model of y") as caught:
-        explore_records([(u, y)])
-    assert caught.value.diagnostics[0].hint.startswith("u moves in one stretch")
+    found = explore_records([(u, y)])
+    assert found.split == "none"
+    gain = float(abs(found.model.plant_at(np.array([1e-4]))[0, 0, 0]))
+    at_corner = float(abs(found.model.plant_at(np.array([0.1]))[0, 0, 0]))
+    assert gain == pytest.approx(1.0, abs=0.03)
+    assert at_corner == pytest.approx(abs(0.1 / (1 - 0.9 * np.exp(-0.1j))), rel=0.1)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
