@@ -43,7 +43,7 @@ from inputdesign_cli.tasks.build.preparation import (
 from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
-_UNSTATED = " (what it is where none is stated)"
+_UNSTATED = " (as it is where none is stated)"
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,10 @@ def _free_start(estimate: Estimate) -> list[str]:
         if np.max(ratio) > _SEEN_AT_ONCE
         else "the first residuals together are larger than noise would make them"
     )
-    return [f"{records} not begin at rest about zero ({seen}): {along}"]
+    return [
+        f"{records} not begin at rest about zero ({seen}): {along}. Where the plant was at rest before, "
+        "--operating-point with the levels of inputs and outputs then makes the estimate more certain"
+    ]
 
 
 def identification_notes(

@@ -54,14 +54,15 @@ def record_notes(
             "take more samples"
         )
         notes.append(f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; {why}")
-    if record.method != "given" and record.extra_power > _DEAR:
+    asked = request.samples or experiment
+    longer = record.method != "given" and len(record.samples) > asked + request.settings.block
+    if record.method != "given" and record.extra_power > _DEAR and not longer:
         notes.append(
             f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its "
             f"{len(record.samples)} samples are few beside the dead times and time constants of the plant, "
             "and much of what they cause comes after the last one; take more samples"
         )
-    asked = request.samples or experiment
-    if record.method != "given" and len(record.samples) > asked + request.settings.block:
+    if longer:
         nearest = max(of_limits, key=lambda name: of_limits[name], default=None)
         share = f"; the record takes {100 * of_limits[nearest]:.3g} % of limits.{nearest}" if nearest else ""
         notes.append(
