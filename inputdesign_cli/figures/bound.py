@@ -48,6 +48,7 @@ def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
     """
     stated = [panel for panel in curves.panels if panel.r_adm is not None]
     title = "Model error r_u against the admitted error r_adm" if stated else "Model error r_u beside |G|"
+    title += ", at the plant of the spec" if curves.of_several else ""
     below = _plot_ratios if stated else None
     draw_panels(page, curves.panels, _plot, time_unit, magnitude="error of G", title=title, below=below)
 

@@ -40,6 +40,7 @@ def _bound_caption(curves: of.BoundCurves) -> str:
     return (
         f"Above: {error} against the error that is admitted (r_adm). Below: their ratio, which is to stay "
         f"below one{told}."
+        + (" At the plant of the spec; at others it may be higher." if curves.of_several else "")
     )
 
 

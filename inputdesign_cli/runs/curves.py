@@ -71,9 +71,10 @@ class BoundPanel:
 
 @dataclass(frozen=True)
 class BoundCurves(Curves):
-    """Model error against admissible error, entry by entry."""
+    """Model error against admissible error, entry by entry, of one of several plants or of the only one."""
 
     panels: tuple[BoundPanel, ...]
+    of_several: bool = False
 
 
 @dataclass(frozen=True)

@@ -335,6 +335,7 @@ class ConvexTask:
                 record=known if errors else self._known(done, record, own_length=False),
                 stated=bool(errors),
                 active=active,
+                of_several=done.plants is not None,
             )
             loops = nyquist_curves(units, (errors or unstated)[:1], done.information, active)
             tables, curves = tables | loops[0], curves | loops[1]

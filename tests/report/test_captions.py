@@ -1,5 +1,7 @@
 """Captions speak of what there is in a figure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,8 @@ def nyquist(**entries):
         (bound(r_adm=ONES, r_u_equal=0.5 * ONES), "is to stay below one.", "white"),
         (bound(r_adm=ONES), "the error that the model may have", "white"),
         (bound(r_adm=ONES, label="data"), "the error that these data leave", "may have"),
+        (bound(r_adm=ONES), "which is to stay below one.", "plant of the spec"),
+        (replace(bound(r_adm=ONES), of_several=True), "At the plant of the spec; at others", "white"),
         (bound(), "The error that the model may have (r_u), and the gain |G|", "below one"),
         (spectrum(white=1.0), "and white excitation for comparison", ""),
         (spectrum(), "has its power.", "white"),

@@ -31,6 +31,7 @@ def bound_curves(
     label: str = "design",
     equal: Array | None = None,
     white_labels: tuple[str, str] = WHITE,
+    of_several: bool = False,
 ) -> tuple[Table, BoundCurves]:
     """r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement.
 
@@ -41,6 +42,7 @@ def bound_curves(
         active: for each error, the frequencies of the experiment at which it binds; empty for none.
         label: what gave r_u.
         white_labels: what `white` and `equal` are called.
+        of_several: whether the design serves other plants, too, which these curves do not show.
     """
     binding = active or [np.zeros(0)] * len(errors)
     peaks = _peaks(errors, information) if stated else np.zeros(0)
@@ -74,7 +76,7 @@ def bound_curves(
         }
         columns |= {f"{name}{suffix}": values for name, values in listed.items() if values is not None}
         panels.append(panel)
-    return Table(columns), BoundCurves(tuple(panels))
+    return Table(columns), BoundCurves(tuple(panels), of_several)
 
 
 def _peaks(errors: Sequence[OnModelError], information: Array) -> Array:
