@@ -14,7 +14,9 @@ from inputdesign_cli.tasks.record import Made
 
 # Lengths that are looked into: times the one that was asked for, or that many samples.
 _LONGEST, _AT_LEAST = 64, 20_000
-_LEAP = 8.0
+_LEAP, _DOUBLE = 8.0, 2.0
+# So few samples tell nothing of what more of them would do: they may be less than a dead time.
+_FEW = 100
 _GROWTH, _MOST_GROWTHS = 1.03, 100.0
 _FAR = 1.5
 _FINE = 0.01
@@ -41,7 +43,7 @@ def reach(record: Record, before: float = np.inf) -> float:
         before: the worst ratio of what is known without it.
     """
     if not np.isfinite(record.worst_ratio):
-        return float(len(record.samples))
+        return _DOUBLE * len(record.samples)
     known = before**-2.0
     gain = record.worst_ratio**-2.0 - known
     return len(record.samples) * (1.0 - known) / gain if gain > 0.0 else np.inf
@@ -102,7 +104,7 @@ class ShortestRecord:
                     before, low = self.needed if lengths > 1 else np.inf, high
                     self.needed = min(map(self._reach, self._missed.values()), default=high)
                     # Records shorter than what the plant remembers promise far less than longer ones keep.
-                    if self.needed > max(_BEYOND * self.longest, _FALLS * before):
+                    if low >= _FEW and self.needed > max(_BEYOND * self.longest, _FALLS * before):
                         return None
             while found is not None and high - low > max(_FINE * high, self.block) and lengths < _LENGTHS:
                 lengths += 1

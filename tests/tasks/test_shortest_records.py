@@ -227,3 +227,18 @@ def test_what_is_known_may_do_without_an_experiment(text, more):
     found = solve(parse_spec(text + SHORTEST + prior)).result
     assert (found["status"], found["objective"]["value"]) == ("nothing_needed", 0.0)
     assert "signal" not in found
+
+
+def test_records_shorter_than_a_dead_time_do_not_end_the_search():
+    """The spectrum alone would take fewer than the dead time of twelve; wider limits never take longer."""
+    late = LAG.replace("B: [0, 1.0]", "B: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1.0]").replace(
+        "candidates: 2", "type: binary"
+    )
+    lengths = [
+        solve(parse_spec(late.replace("amplitude: 1", f"amplitude: {a}") + SHORTEST)).result["signal"][
+            "samples"
+        ]
+        for a in (1.0, 2.0, 3.0, 5.0, 8.0)
+    ]
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[-1] > 12
