@@ -19,6 +19,7 @@ from inputdesign_cli.wizard.questions import bad_answer, file_of
 
 _QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
 _LEAST_ROWS = 10  # of a step response
+_LONGER = 2.0  # a time constant of so many records is none
 _GAP = 1.5  # sample times from one row to the next: a sample is missing
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
@@ -185,6 +186,14 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
     name, fitted = f"{stem}-model.yaml", parse_spec(model.decode(), design=False).plant
     assert fitted.kind == "continuous"
     values = {one.label: one.value for one in fitted.named_parameters}
+    lasts = float(t[-1] - t[begun])
+    if values["time_constant"] > _LONGER * lasts:
+        raise bad_answer(
+            "plant",
+            f"the output in {path.name} still goes on as an integrator would, {short(lasts)} s after the "
+            "step: no gain and time constant are told; record until it settles, or write a plant that "
+            'integrates as a file such as {"num": [0.05], "den": [1, 0], "delay": 5}',
+        )
     listed = ", ".join(f"{label}: {short(value)}" for label, value in values.items())
     return PlantAnswer(
         (f"plant:  # estimated from {path.name}", f"  continuous: {{{listed}}}", "  sample: zoh"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
 from inputdesign_cli.wizard.phrases import NUMBER, Phrase, needed, short
@@ -149,6 +150,13 @@ def pid(said: Phrase, *, stated: bool) -> str | None:
         if not stated and gain is None and not any(times.values()):
             return None
         raise bad_answer(said.key, "it does not say Kp, as in Kp 1, Ti 60")
+    named = re.search(r"\b(PID?)\b", said.text, re.I)
+    if named is not None:
+        wanted = ("Ti", "Td") if named[1].upper() == "PID" else ("Ti",)
+        for name, time in times.items():
+            if (time is not None) != (name in wanted):
+                lack = "needs" if name in wanted else "has no"
+                raise bad_answer(said.key, f"a {named[1].upper()} controller {lack} {name}")
     parts = [f"Kp: {short(gain)}"]
     for name, time in times.items():
         if time is not None:

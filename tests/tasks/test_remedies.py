@@ -93,6 +93,13 @@ def test_a_lag_more_is_written_as_it_is_said(late):
     assert np.all(np.diff(np.abs(low)) < 0.0)
 
 
+@pytest.mark.parametrize("gain", ["[[2.3, 1.2]]", "[[2.1], [1]]", "[[2.1]]"])
+def test_entries_have_no_single_lag_more(gain):
+    entries = gain.replace("2.3", "205").replace("1.2", "90").replace("2.1", "180")
+    _, found = remedies(f"{{continuous: {{gain: {gain}, time_constant: {entries}}}, sample: zoh}}")
+    assert found["plant"].endswith("with one more lag, in place of gain, time_constant")
+
+
 def test_a_noise_that_drifts_is_not_told_to_drift():
     _, found = remedies(NAMED, "noise.drift=true", "noise.C=[1, -0.8]")
     assert "raise the order of D under noise" in found["drift"]

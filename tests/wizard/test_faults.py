@@ -202,7 +202,7 @@ def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder)
 
 
 def test_an_unstable_loop_is_that_of_the_answer_that_has_a_controller(folder):
-    for answers, key in (({"wish": "own loop with 6 dB, Kp 100"}, "wish"), ({"loop": "PI Kp 100"}, "loop")):
+    for answers, key in (({"wish": "own loop with 6 dB, Kp 100"}, "wish"), ({"loop": "PI Kp 100, Ti 60"}, "loop")):
         with pytest.raises(SpecError) as caught:
             compose({**GOOD, **answers}, "x", folder).validate()
         (told,) = caught.value.diagnostics

@@ -134,3 +134,17 @@ def test_a_unit_is_that_of_both_ends_of_a_band(said):
 def test_a_number_with_a_comma_is_told_whole():
     with pytest.raises(SpecError, match="12,5 is a number with a comma"):
         written("plant", "gain 2, time constant 180 s, each within 12,5 %")
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "told"),
+    [
+        ("loop", "PI Kp 1", "a PI controller needs Ti"),
+        ("loop", "PID Kp 1, Ti 60", "a PID controller needs Td"),
+        ("loop", "PI Kp 1, Ti 60, Td 5", "a PI controller has no Td"),
+        ("wish", "PI loop with 6 dB, Kp 1.5", "a PI controller needs Ti"),
+    ],
+)
+def test_settings_are_those_of_the_controller_that_is_named(key, text, told):
+    with pytest.raises(SpecError, match=told):
+        written(key, text)

@@ -9,6 +9,7 @@ from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
+_QUANTITIES = ("gain", "time_constant", "dead_time")
 _LAG = "one more lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
@@ -57,6 +58,10 @@ def _of_plant(plant: Mapping[str, Json]) -> str:
 def _lag_more(stated: Mapping[str, Json]) -> str:
     """Gain, time constant and dead time by names, and one more lag, to begin the search with."""
     lag = stated["time_constant"]
+    if not all(isinstance(stated.get(name, 0.0), (int, float)) for name in _QUANTITIES):
+        return "write entries by numerator and denominator, with one more lag, in place of " + ", ".join(
+            name for name in _QUANTITIES if name in stated
+        )
     values = {"K": stated["gain"], "T1": lag, "T2": _SHARE * lag, "L": stated.get("dead_time", 0.0)}
     late = ", delay: L" if values["L"] else ""
     listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items() if name != "L" or late)
