@@ -202,9 +202,9 @@ def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder)
 
 
 def test_an_unstable_loop_is_that_of_the_answer_that_has_a_controller(folder):
-    for answers, key in (({"wish": "own loop with 6 dB, Kp 100"}, "wish"), ({"loop": "PI Kp 100, Ti 60"}, "loop")):
+    for key, answer in (("wish", "own loop with 6 dB, Kp 100"), ("loop", "PI Kp 100, Ti 60")):
         with pytest.raises(SpecError) as caught:
-            compose({**GOOD, **answers}, "x", folder).validate()
+            compose({**GOOD, key: answer}, "x", folder).validate()
         (told,) = caught.value.diagnostics
         assert (told.code, told.key) == ("unstable-loop", key)
         assert "smaller Kp" in told.hint
