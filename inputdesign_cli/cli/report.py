@@ -9,7 +9,7 @@ import typer
 
 from inputdesign_cli.cli.options import Quiet, path_option
 from inputdesign_cli.cli.terminal import status
-from inputdesign_cli.errors import OutputError
+from inputdesign_cli.errors import STANDARD_INPUT as DASH, OutputError
 
 
 def report(
@@ -20,7 +20,7 @@ def report(
             "--output",
             "-o",
             metavar="FILE",
-            help="The file to write. The default is report.html in RUN.",
+            help="The file to write, - for standard output. The default is report.html in RUN.",
             parser=path_option,
         ),
     ] = None,
@@ -36,6 +36,9 @@ def report(
         from inputdesign_cli.runs.record import PAGE
         from inputdesign_cli.runs.run_directory import replace_text
 
+        if str(output) == DASH:
+            typer.echo(report_text(directory))
+            return
         file = output or directory / PAGE
         if file.exists() and not is_page(file):
             hint = "choose another name, or move it away: only a page that idesign wrote is replaced"

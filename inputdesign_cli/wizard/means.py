@@ -167,6 +167,15 @@ def _resolution(said: Phrase) -> float | None:
     """The step of a sensor; of one with so many bits, from what it spans."""
     bits = said.take(rf"\bresolution\b\s*(?:of\s*)?(\d+)\s*bits?\s*(?:up to|over|to|range)\s*{NUMBER}{_UNIT}")
     if bits is None:
+        counted = said.take(
+            rf"\bresolution\b\s*(?:of\s*)?{NUMBER}[\s-]*(bits?|digits?|levels?|counts?|steps?)\b"
+        )
+        if counted is not None:
+            raise bad_answer(
+                "noise",
+                f"{counted[1]} {counted[2]} are no size without a range: "
+                '"resolution 12 bits up to 100", or the step itself',
+            )
         return said.after_if_named("resolution", _UNIT)
     return needed(float(bits[2]), "noise", "its range") / 2.0 ** int(bits[1])
 

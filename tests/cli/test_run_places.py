@@ -316,3 +316,14 @@ def test_a_report_replaces_pages_of_its_own_only(analyse, tmp_path, monkeypatch,
     assert report("data.csv") == report("runs/a/spec.yaml") == (2, True)
     assert (tmp_path / "data.csv").read_text() == "u,y\n1,2\n"
     assert (tmp_path / "runs" / "a" / "spec.yaml").read_text() == spec
+
+
+def test_a_report_may_go_to_standard_output(analyse, tmp_path, monkeypatch, capsys):
+    assert analyse(write(tmp_path / "a.yaml", "a")) == (0, "")
+    before = set(tmp_path.rglob("*"))
+    monkeypatch.setattr(sys, "argv", ["idesign", "report", "runs/a", "-o", "-"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
+    assert capsys.readouterr().out.startswith("<!DOCTYPE html>")
+    assert set(tmp_path.rglob("*")) == before

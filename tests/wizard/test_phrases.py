@@ -148,3 +148,9 @@ def test_a_number_with_a_comma_is_told_whole():
 def test_settings_are_those_of_the_controller_that_is_named(key, text, told):
     with pytest.raises(SpecError, match=told):
         written(key, text)
+
+
+@pytest.mark.parametrize("what", ["12 bits", "12-bit", "3 digits", "of 4096 counts"])
+def test_a_resolution_without_a_range_has_no_size(what):
+    with pytest.raises(SpecError, match="no size without a range"):
+        written("noise", f"resolution {what}")
