@@ -34,6 +34,8 @@ _ROUNDS, _SMOOTH = 15, 0.1
 _TO_DEVIATION = 1.4826
 # Of longer records the stretch in which the inputs move most tells jumps.
 _MOST_SAMPLES = 4000
+# A correlation from one sample to the next beyond which what is left of an input is no noise.
+_PATTERN = 0.5
 # Samples to a column, at least, where jumps are left out.
 _PER_COLUMN = 3
 Parts = Sequence[tuple[Array, Array]]
@@ -119,7 +121,7 @@ def _between_jumps(parts: Parts, lags: int, j: int) -> tuple[float, float]:
     target = np.concatenate([u[2 * lags :, j] for u, _ in parts])
     both = np.column_stack([own, more])
     still = _still(own, target)
-    if still is None or np.sum(still) < _PER_COLUMN * both.shape[1]:
+    if still is None or np.sum(still) < _PER_COLUMN * both.shape[1] or _repeats(own, target, still):
         return 1.0, 1.0
     foretold = _foretold(own[still], more[still], target[still])
     still = _still(both, target)
@@ -130,6 +132,18 @@ def _between_jumps(parts: Parts, lags: int, j: int) -> tuple[float, float]:
     moved = target - both @ np.linalg.lstsq(both[still], target[still], rcond=1e-10)[0]
     fresh = y - known @ np.linalg.lstsq(known[still], y[still], rcond=1e-10)[0]
     return foretold, min(1.0, y.shape[1] * min(_at_once(moved, e, still) for e in fresh.T))
+
+
+def _repeats(own: Array, target: Array, still: NDArray[np.bool_]) -> bool:
+    """Whether what the past of an input leaves between its jumps is no noise: its values go together in time.
+
+    Of an input that answers noise its past leaves what is new. Of a periodic one, or of one that is held, it
+    leaves a pattern that comes with every jump, and so does what is left of the outputs that follow.
+    """
+    left = target - own @ np.linalg.lstsq(own[still], target[still], rcond=1e-10)[0]
+    pairs = still[1:] & still[:-1]
+    before, after = left[:-1][pairs], left[1:][pairs]
+    return bool(abs(before @ after) > _PATTERN * np.sqrt((before @ before) * (after @ after)))
 
 
 def _at_once(moved: Array, fresh: Array, still: NDArray[np.bool_]) -> float:

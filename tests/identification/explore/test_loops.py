@@ -100,6 +100,26 @@ def test_an_open_loop_is_not_called_a_loop(kind):
         assert answers_output([driven(rng, kind, samples)]) == []
 
 
+@pytest.mark.parametrize("shape", ["square", "lagged", "slow", "triangle", "sawtooth", "staircase"])
+def test_an_input_that_repeats_is_foretold_by_no_output(shape):
+    """Once the plant has settled, what is left of u and of y comes with every period, and is no noise."""
+    for period in (19.0, 31.4, 48.3, 62.8, 89.8):
+        for seed, size in ((0, 0.05), (1, 0.005)):
+            rng = np.random.default_rng(seed)
+            phase = np.arange(1400) / period + rng.random()
+            square = np.sign(np.sin(2.0 * np.pi * phase))
+            u = {
+                "square": square,
+                "lagged": scipy.signal.lfilter([0.3], [1, -0.7], square),
+                "slow": scipy.signal.lfilter([0.05], [1, -0.95], square),
+                "triangle": np.arcsin(np.sin(2.0 * np.pi * phase)),
+                "sawtooth": phase % 1.0,
+                "staircase": np.round(2.0 * np.sin(2.0 * np.pi * phase)),
+            }[shape]
+            y = scipy.signal.lfilter(*OPEN["second order"][:2], u) + size * rng.standard_normal(1400)
+            assert answers_output([(u[600:, None], y[600:, None])]) == []
+
+
 @pytest.mark.slow
 def test_most_loops_are_seen_and_no_open_loop_is_called_one():
     """At a level of 1e-4; a loop whose noise is hidden by its own input is missed now and then."""
