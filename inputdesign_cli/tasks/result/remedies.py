@@ -9,7 +9,6 @@ from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
-_QUANTITIES = ("gain", "time_constant", "dead_time")
 _LAG = "one more lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
@@ -56,19 +55,23 @@ def _of_plant(plant: Mapping[str, Json]) -> str:
 
 
 def _lag_more(stated: Mapping[str, Json]) -> str:
-    """Gain, time constant and dead time by names, and one more lag, to begin the search with."""
-    lag = stated["time_constant"]
-    if not all(isinstance(stated.get(name, 0.0), (int, float)) for name in _QUANTITIES):
-        return "write entries by numerator and denominator, with one more lag, in place of " + ", ".join(
-            name for name in _QUANTITIES if name in stated
-        )
-    values = {"K": stated["gain"], "T1": lag, "T2": _SHARE * lag, "L": stated.get("dead_time", 0.0)}
-    late = ", delay: L" if values["L"] else ""
-    listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items() if name != "L" or late)
-    keys = "gain, time_constant and dead_time" if late else "gain and time_constant"
+    """What engineers write of a plant by names, and one more lag, to begin the search with."""
+    kept = ", ".join(stated)
+    if not all(isinstance(value, (int, float)) for value in stated.values()):
+        return f"write entries by numerator and denominator, with one more lag, in place of {kept}"
+    if "time_constant" in stated:
+        slow, poles, own = stated["time_constant"], "[T1, 1]", {"T1": stated["time_constant"]}
+    else:
+        slow, poles = 1.0 / stated["natural_frequency"], "[1/w**2, 2*zeta/w, 1]"
+        own = {"zeta": stated["damping"], "w": stated["natural_frequency"]}
+    values = {"K": stated["gain"], **own, "T2": _SHARE * slow}
+    late = ""
+    if stated.get("dead_time"):
+        late, values["L"] = ", delay: L", stated["dead_time"]
+    listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items())
     return (
         f"write plant.parameters: {{{listed}}} and plant.continuous: {{numerator: [K], denominator: "
-        f"[[T1, 1], [T2, 1]]{late}}} in place of {keys}"
+        f"[{poles}, [T2, 1]]{late}}} in place of {kept}"
     )
 
 
