@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
+from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time, seconds_left, what_ended
 from inputdesign_cli.design.convex.cost import Weight
@@ -20,9 +19,7 @@ from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.curves import Curves
-from inputdesign_cli.runs.objectives import white_labels
-from inputdesign_cli.runs.results import Json, Result, Results, Table
+from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit import audit
@@ -33,16 +30,14 @@ from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.grid_method import GridMethod
 from inputdesign_cli.tasks.record import Made, RecordRequest, designed_spectrum, peak_at, redrawn
 from inputdesign_cli.tasks.record_search import fitting_record, samples_of_record
-from inputdesign_cli.tasks.result.bound import bound_curves, equal_white
 from inputdesign_cli.tasks.result.design import Designed, design_result
-from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
+from inputdesign_cli.tasks.result.ellipses import Pairs
+from inputdesign_cli.tasks.result.illustrations import illustrations
 from inputdesign_cli.tasks.result.infeasible import explain
-from inputdesign_cli.tasks.result.nyquist import nyquist_curves
 from inputdesign_cli.tasks.result.reach import Reach
 from inputdesign_cli.tasks.result.record_notes import record_notes, shortfall
 from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
-from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.tasks.result.status import proof_status
 from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_in_time, unfinished_notes
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
@@ -136,7 +131,16 @@ class ConvexTask:
             )
         record = made.record
         known = self._known(done, record)
-        tables, curves = self._illustrations(done, record, result, known)
+        tables, curves = illustrations(
+            self.header.units,
+            done,
+            result,
+            record=record,
+            known=known,
+            as_long=partial(self._known, done, record, own_length=False),
+            unstated=self.unstated,
+            ellipses=self.ellipses,
+        )
         if done.plants is not None:
             peak = None if record is None else peak_at(made.request, done.design, record)
             robust = robust_result(done, done.plants, peak)
@@ -304,49 +308,6 @@ class ConvexTask:
         if self.exact is not None and known is not None:
             entry["confidence"] = covered(self.exact.of_record(done, record, known))
         return entry | made.entry
-
-    def _illustrations(
-        self, done: Designed, record: Record | None, result: Result, known: Array | None
-    ) -> tuple[dict[str, Table], dict[str, Curves]]:
-        """Tables and curves of the spectrum, of r_u and of the proof."""
-        design, units = done.design, self.header.units
-        found, problem = design.result, design.problem
-        level = design.white_power if units.inputs == 1 else None
-        spectrum = spectrum_curves(units, found.basis, found.x, problem.experiment.band, white=level)
-        if record is not None:
-            spectrum = with_periodogram(units, *spectrum, record.samples)
-        tables: dict[str, Table] = {"spectrum": spectrum[0]}
-        curves: dict[str, Curves] = {"spectrum": spectrum[1]}
-        if not found.x.any():
-            return tables, curves
-        white = design.white.informations[0] / (design.white.s if problem.goal == "factor" else 1.0)
-        asked = (*problem.requirements, *problem.side)
-        errors = model_errors(asked)
-        unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
-        active = [found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)]
-        with suppress(np.linalg.LinAlgError):  # a parameter that a T-optimal design does not excite
-            tables["bound"], curves["bound"] = bound_curves(
-                units,
-                errors or unstated,
-                done.information,
-                white=white,
-                equal=equal_white(design, done.experiment.samples, result["baseline"]["white"]["ratio"]),
-                white_labels=white_labels(result),
-                record=known if errors else self._known(done, record, own_length=False),
-                stated=bool(errors),
-                active=active,
-                of_several=done.plants is not None,
-            )
-            loops = nyquist_curves(units, (errors or unstated)[:1], done.information, active)
-            tables, curves = tables | loops[0], curves | loops[1]
-        optimality = optimality_curves(units, design)
-        if optimality is not None:
-            tables["optimality"], curves["optimality"] = optimality
-        shown = white if problem.demands.definite else None
-        ellipses = experiment_ellipses(done.experiment, done.information, shown, self.ellipses)
-        if ellipses is not None:
-            curves["ellipses"] = ellipses
-        return tables, curves
 
     def _known(self, done: Designed, record: Record | None, *, own_length: bool = True) -> Array | None:
         """The information (k, k) of the record, or of one like it as long as the design.
