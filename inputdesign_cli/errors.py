@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
-STANDARD_INPUT = "-"  # in place of the name of a spec
+STANDARD_STREAM = "-"  # in place of the name of a file: standard input, or output
 
 EXIT_DONE = 0
 EXIT_MISSED = 1

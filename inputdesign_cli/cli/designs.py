@@ -28,7 +28,7 @@ from inputdesign_cli.cli.streams import ending_early
 from inputdesign_cli.cli.trade import TradeWords, tell_trade
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 from inputdesign_cli.compute.time_limit import stoppable
-from inputdesign_cli.errors import STANDARD_INPUT
+from inputdesign_cli.errors import STANDARD_STREAM
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -57,7 +57,7 @@ def solve(
     proof of optimality; prints a summary.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
-    if trade and (no_output or keep_partial or str(spec) == STANDARD_INPUT):
+    if trade and (no_output or keep_partial or str(spec) == STANDARD_STREAM):
         message = "--trade needs a spec on disc and a directory to write, and does not go with --keep-partial"
         raise typer.BadParameter(message)
     if fast:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputdesign_cli.errors import STANDARD_INPUT, bad_spec
+from inputdesign_cli.errors import STANDARD_STREAM, bad_spec
 
 if TYPE_CHECKING:
     from inputdesign_cli.specification import Spec
@@ -26,7 +26,7 @@ def read_spec(
     """
     from inputdesign_cli import specification
 
-    if str(file) != STANDARD_INPUT:
+    if str(file) != STANDARD_STREAM:
         return specification.load_spec(file, overrides or (), confine=confine, design=design)
     return specification.parse_spec(
         standard_input(), "<stdin>", overrides or (), confine=confine, design=design
@@ -51,4 +51,4 @@ def standard_input() -> str:
 
 def name_of(file: Path) -> str:
     """What a spec is called in the names of directories."""
-    return "stdin" if str(file) == STANDARD_INPUT else file.stem
+    return "stdin" if str(file) == STANDARD_STREAM else file.stem

@@ -9,7 +9,7 @@ import typer
 
 from inputdesign_cli.cli.options import Quiet, path_option
 from inputdesign_cli.cli.terminal import status
-from inputdesign_cli.errors import STANDARD_INPUT as DASH, OutputError
+from inputdesign_cli.errors import STANDARD_STREAM, OutputError
 
 
 def report(
@@ -36,7 +36,7 @@ def report(
         from inputdesign_cli.runs.record import PAGE
         from inputdesign_cli.runs.run_directory import replace_text
 
-        if str(output) == DASH:
+        if str(output) == STANDARD_STREAM:
             typer.echo(report_text(directory))
             return
         file = output or directory / PAGE

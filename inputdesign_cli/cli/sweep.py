@@ -14,7 +14,7 @@ from inputdesign_cli.cli.options import Confine, FigureFormat, Json, Quiet, Spec
 from inputdesign_cli.cli.reading import name_of, standard_input
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
-from inputdesign_cli.errors import STANDARD_INPUT
+from inputdesign_cli.errors import STANDARD_STREAM
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
@@ -81,7 +81,7 @@ def sweep(
 
     directory = output or Path("runs") / f"{name_of(spec)}-sweep"
     text = None
-    if str(spec) == STANDARD_INPUT:
+    if str(spec) == STANDARD_STREAM:
         spec, text = Path("<stdin>"), standard_input()
     common: dict[str, Any] = {
         "directory": directory,

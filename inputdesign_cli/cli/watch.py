@@ -15,7 +15,7 @@ import typer
 from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Overrides, Overwrite
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain
-from inputdesign_cli.errors import STANDARD_INPUT, IdesignError
+from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
 
 if TYPE_CHECKING:
     from inputdesign_cli.live.board import Board
@@ -53,7 +53,7 @@ def watch(
     from inputdesign_cli.live.painters import painters
     from inputdesign_cli.live.server import serving
 
-    if str(spec) == STANDARD_INPUT:
+    if str(spec) == STANDARD_STREAM:
         raise typer.BadParameter("standard input cannot be followed: name a file", param_hint="SPEC")
     board = Board()
     board.show(message_page(spec.name, "Computing .."))

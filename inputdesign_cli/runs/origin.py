@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from filecmp import cmp
 from pathlib import Path
 
-from inputdesign_cli.errors import STANDARD_INPUT, DataError, OutputError
+from inputdesign_cli.errors import STANDARD_STREAM, DataError, OutputError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.record import RESULT, SIGNAL, SPEC, load_result, owned_files
 from inputdesign_cli.runs.results import Json
@@ -35,7 +35,9 @@ class Origin:
     def seen_from(self, target: Path) -> list[str]:
         """The paths of a spec (`-` if it came from standard input) and of data relative to `target`."""
         return [
-            STANDARD_INPUT if str(file) == STANDARD_INPUT else os.path.relpath(os.path.realpath(file), target)
+            STANDARD_STREAM
+            if str(file) == STANDARD_STREAM
+            else os.path.relpath(os.path.realpath(file), target)
             for file in self.files
         ]
 
@@ -191,7 +193,7 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
     known = theirs if isinstance(theirs, list) else []
     if known[:1] != [SPEC] and origin.asked:  # or else spec.yaml is the user's own text
         same |= digest(origin.asked) == result.get("asked_sha256", result.get("spec_sha256"))
-    same_file = ours[:1] == known[:1] and ours[:1] not in ([], [STANDARD_INPUT])
+    same_file = ours[:1] == known[:1] and ours[:1] not in ([], [STANDARD_STREAM])
     if known[1:] != ours[1:] or not (same or same_file or ours[:1] == [SPEC]):
         of = f" of {', '.join(map(str, known))} (as seen from there)" if known else " of something else"
         message = f"{shown} holds the run{of}, and would lose it"

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from inputdesign_cli.errors import STANDARD_INPUT, OutputError, SpecError
+from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.specification.yaml.writer import to_yaml
@@ -32,7 +32,7 @@ def check_same_sweep(plan: Plan, made_from: Sequence[str], root: Path) -> None:
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return  # nothing that could be told apart, as where a sweep was killed at its very start
     ours = [axis.key for axis in plan.grid.axes]
-    same_file = theirs == list(made_from) != [STANDARD_INPUT]
+    same_file = theirs == list(made_from) != [STANDARD_STREAM]
     if verb != plan.verb:
         what = f"the command {verb}, not {plan.verb}"
     elif set(keys) != set(ours):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import (
-    STANDARD_INPUT,
+    STANDARD_STREAM,
     DataError,
     Diagnostic,
     IdesignError,
@@ -154,7 +154,7 @@ def sweep(
     """
     plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine, text=text)
     with opened(directory) as layout:
-        source = Path(STANDARD_INPUT) if text is not None else spec
+        source = Path(STANDARD_STREAM) if text is not None else spec
         made_from = Origin([source]).seen_from(Path(os.path.realpath(directory)))
         if not overwrite:
             check_same_sweep(plan, made_from, directory)

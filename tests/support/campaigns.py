@@ -5,6 +5,9 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
+from inputdesign_cli import parse_spec
+from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
+
 SPEC = """
 title: in parts
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -42,3 +45,14 @@ def applied(directory: Path, path: Path, scale: float = 1.0, gain: float = GAIN,
     n = len(np.loadtxt(directory / "signal.csv", delimiter=",", skiprows=1, ndmin=2))
     y = answered(scale * u, gain=gain, pole=pole)
     return written(path, times[-n:], scale * u[-n:], y[-n:])
+
+
+def planner(text: str = SPEC, *overrides: str) -> SpecPlanner:
+    """What plans the parts of a spec."""
+    return SpecPlanner(parse_spec(text, overrides=overrides))
+
+
+def record(samples: int = 200, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 1), (n, 1): white noise, and what the true plant answers."""
+    u = np.random.default_rng(seed).standard_normal(samples)
+    return u[:, None], answered(u)[:, None]

@@ -17,27 +17,18 @@ from inputdesign_cli.specification import load_spec, parse_spec
 from inputdesign_cli.tasks import explore, identify, solve
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
+from tests.support.logs import lag_log
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
 
 PLANT = "plant: {B: [0, 1], F: [1, -0.7]}\n"
 
 
-def record(path, *, samples=300, seed=0, noise=0.2, gain=1.0, head="time_min,input,output"):
-    rng = np.random.default_rng(seed)
-    u = 40.0 + np.repeat(rng.choice([-1.0, 1.0], samples // 5 + 1), 5)[:samples]
-    x = scipy.signal.lfilter([0, 0, 0, 0.2], [1, -0.8], u - 40.0)
-    y = 20.0 + gain * x + noise * rng.standard_normal(samples)
-    rows = np.column_stack([0.5 * np.arange(samples), u, y])
-    path.write_text(f"{head}\n" + "\n".join(",".join(f"{x:.8g}" for x in row) for row in rows) + "\n")
-    return path
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """What the command writes, of a log whose columns it finds by itself."""
     folder = tmp_path_factory.mktemp("log")
-    log = record(folder / "log.csv", samples=300)
+    log = lag_log(folder / "log.csv", samples=300)
     done = CliRunner().invoke(app, ["explore", str(log), "-o", str(folder / "run")])
     assert done.exit_code == 0, done.output
     return folder / "run"
@@ -67,7 +58,7 @@ def test_the_spec_that_is_written_solves_at_once(run):
 
 
 def test_the_model_is_judged_on_other_data(run, tmp_path):
-    other = record(tmp_path / "other.csv", seed=1)
+    other = lag_log(tmp_path / "other.csv", seed=1)
     command = ["explore", str(other), "--validate", str(run / "model.yaml"), "--no-output"]
     told = CliRunner().invoke(app, command)
     assert told.exit_code == 0, told.output
@@ -111,7 +102,7 @@ def test_two_heaters_are_told_by_their_first_half(tmp_path):
 
 def test_an_input_without_effect_earns_no_trust(tmp_path):
     """The best of many structures explains 22 % of the noise of these 20 unseen samples."""
-    path = record(tmp_path / "log.csv", gain=0.0, samples=50, seed=1)
+    path = lag_log(tmp_path / "log.csv", gain=0.0, samples=50, seed=1)
     told = CliRunner().invoke(app, ["explore", str(path), "--no-output"])
     assert told.exit_code == 1, told.output
     assert "no trust" in told.stdout
@@ -147,7 +138,7 @@ def test_an_integrator_that_no_stable_model_explains_is_offered(tmp_path):
 
 
 def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):
-    path = record(tmp_path / "log.csv")
+    path = lag_log(tmp_path / "log.csv")
     _, *rows = path.read_text().splitlines()
     parts = [row.split(",") for row in rows]
     path.write_text("time_min,u1,u2,y\n" + "".join(f"{time},3,{u},{y}\n" for time, u, y in parts))
@@ -221,7 +212,7 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
 
 @pytest.mark.slow
 def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
-    path = record(tmp_path / "log.csv", samples=400)
+    path = lag_log(tmp_path / "log.csv", samples=400)
     good = explore(path).results.result["notes"]
     lines = path.read_text().splitlines()
     for row in range(200, 250):
@@ -235,7 +226,7 @@ def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
 
 def test_many_spikes_are_told(tmp_path):
     """Of 400 samples 32, more than outliers are."""
-    path = record(tmp_path / "log.csv", samples=400)
+    path = lag_log(tmp_path / "log.csv", samples=400)
     lines = path.read_text().splitlines()
     rng = np.random.default_rng(0)
     for row in rng.choice(np.arange(5, 395, 6), 32, replace=False):
@@ -245,16 +236,6 @@ def test_many_spikes_are_told(tmp_path):
     path.write_text("\n".join(lines))
     (told,) = [step for step in read_log(path, Preparation()).steps if "spikes" in step]
     assert told.startswith("y has 32 values (8 %) far from their neighbours")
-
-
-def test_times_of_the_record_stay_under_a_verdict(run, tmp_path):
-    path = record(tmp_path / "late.csv")
-    lines = path.read_text().splitlines()
-    head, *rows = (line.split(",") for line in lines)
-    shifted = [",".join([f"{float(time) + 1000.0:g}", *rest]) for time, *rest in rows]
-    path.write_text("\n".join([",".join(head), *shifted]))
-    found = explore(path, model=load_spec(run / "model.yaml", design=False)).results
-    assert found.tables["fit"].columns["time_min"][[0, -1]].tolist() == [1000.0, 1149.5]
 
 
 @pytest.mark.slow
@@ -321,7 +302,7 @@ def test_what_is_said_of_the_choice_is_true(run):
 
 
 def test_the_page_is_among_the_files_that_are_named(tmp_path):
-    log = record(tmp_path / "log.csv")
+    log = lag_log(tmp_path / "log.csv")
     done = CliRunner().invoke(app, ["explore", str(log), "-o", str(tmp_path / "run"), "--no-figures"])
     (named,) = re.findall(r"^files +.*?: (.*(?:\n .*)*)", done.stdout, re.MULTILINE)
     there = {path.name for path in (tmp_path / "run").iterdir()}
@@ -342,37 +323,6 @@ def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
     allowed = parse_spec(text.replace("  # amplitude:", "  amplitude:"))
     half, level = (np.atleast_1d(one) for one in (allowed.limits.amplitude.input, allowed.signal.offset))
     np.testing.assert_allclose([level - half, level + half], [u.min(axis=0), u.max(axis=0)], atol=1e-4)
-
-
-def test_files_that_a_model_is_judged_by_follow_each_other(run, tmp_path):
-    files = [record(tmp_path / f"{seed}.csv", seed=seed, samples=100) for seed in (1, 2)]
-    judged = explore(files, model=load_spec(run / "model.yaml", design=False)).results
-    assert judged.curves["fit"].lengths == (100, 100)
-    np.testing.assert_allclose(judged.curves["fit"].time, 0.5 * np.arange(200.0))
-    np.testing.assert_array_equal(judged.tables["fit"].columns["record"], np.repeat([1.0, 2.0], 100))
-
-
-def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
-    """Its simulation is worse than a level: -100 % where the model is the plant with its sign changed."""
-    log = record(tmp_path / "log.csv", seed=1)
-    model = tmp_path / "opposite.yaml"
-    model.write_text(
-        "sample_time: 0.5\ntime_unit: min\nplant: {B: [0, 0, 0, -0.2], F: [1, -0.8]}\nnoise: {variance: 1}\n"
-    )
-    told = CliRunner().invoke(app, ["explore", str(log), "--validate", str(model), "--no-output"])
-    assert told.exit_code == 1
-    assert "less than 5 % is nothing" in re.sub(r"\s+", " ", told.stdout)
-    judged = explore(log, model=load_spec(model, design=False))
-    assert judged.results.result["validation"]["reasons"] == list(judged.reasons)
-    assert len(judged.reasons) == 1
-
-
-def test_a_model_without_a_sample_time_is_named(tmp_path):
-    model = tmp_path / "timeless.yaml"
-    model.write_text("time_unit: min\nplant: {B: [0, 0, 0, 0.2], F: [1, -0.8]}\nnoise: {variance: 1}\n")
-    with pytest.raises(DataError, match=r"none is stated.*in timeless.yaml") as caught:
-        explore(record(tmp_path / "log.csv", seed=1), model=load_spec(model, design=False))
-    assert "write sample_time: 0.5 in it" in caught.value.diagnostics[0].hint
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import errno
 import os
 from pathlib import Path
 
-from inputdesign_cli.errors import STANDARD_INPUT, Diagnostic, Location, SpecError
+from inputdesign_cli.errors import STANDARD_STREAM, Diagnostic, Location, SpecError
 from inputdesign_cli.regular_file import read_regular
 
 MAX_BYTES = 10 * 1024 * 1024
@@ -81,7 +81,7 @@ def decode(raw: bytes, file: str) -> str:
 
 
 def _nearby(path: Path) -> str:
-    if str(path) == STANDARD_INPUT:
+    if str(path) == STANDARD_STREAM:
         return "this command does not read standard input: write the spec to a file, and name that"
     folder = path.parent
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from inputdesign_cli.errors import STANDARD_INPUT
+from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.tasks.build.files.arrays import read_mat, read_npz
 from inputdesign_cli.tasks.build.files.clocks import with_days
@@ -56,7 +56,7 @@ def _bytes(path: Path, key: str) -> bytes:
     try:
         return read_regular(path, _MOST_BYTES + 1)
     except FileNotFoundError:
-        if str(path) == STANDARD_INPUT:
+        if str(path) == STANDARD_STREAM:
             hint = "write them to a file, whose ending tells its kind, and name that"
             raise unreadable(
                 path, key, "does not exist: data are not read from standard input", hint
