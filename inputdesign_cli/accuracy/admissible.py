@@ -7,7 +7,7 @@ near which r_adm changes fast, `knots` the frequencies at which it may have a ki
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
@@ -206,6 +206,9 @@ class Floored:
     own: AdmissibleError
     nominal: AdmissibleError
     share: float
+    _on_grid: list[tuple[Array, Array, Array]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     @property
     def kept(self) -> Sensitivity | None:
@@ -219,14 +222,26 @@ class Floored:
 
     def lost(self, grid: Array) -> bool:
         """Whether r_adm of the scenario itself vanishes on the grid or between: no model is that good."""
-        own = -self.own.at(grid)
+        own = -self._both(grid)[0]
         return bool(
             np.max(own) >= 0.0 or np.any(local_maxima(lambda w: -self.own.at(w), grid, own)[1] >= 0.0)
         )
 
     def raised(self, grid: Array) -> bool:
         """Whether it is smaller than what stands in for it, somewhere on the grid."""
-        return bool(np.any(self.own.at(grid) < self.share * self.nominal.at(grid)))
+        own, floor = self._both(grid)
+        return bool(np.any(own < floor))
+
+    def _both(self, w: Array) -> tuple[Array, Array]:
+        """r_adm of the scenario, and what stands in for it where it is smaller, (n,) each."""
+        # The grid of a requirement is asked for again and again, a few points between its own once.
+        for grid, own, floor in self._on_grid:
+            if np.array_equal(grid, w):
+                return own, floor
+        found = self.own.at(w), self.share * self.nominal.at(w)
+        if all(w.size >= grid.size for grid, _, _ in self._on_grid):
+            self._on_grid[:] = [(w.copy(), *found)]
+        return found
 
     @cached_property
     def singularities(self) -> ComplexArray:
@@ -240,7 +255,7 @@ class Floored:
 
     def at(self, w: ArrayLike) -> Array:
         """r_adm (n,) at frequencies `w` (n,)."""
-        return np.maximum(self.own.at(w), self.share * self.nominal.at(w))
+        return np.maximum(*self._both(np.asarray(w)))
 
 
 def largest_gain(G: ComplexArray) -> Array:

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.cost import Paid
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.information import jointly_whitened
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.region import Region
 
 CONFIDENCE = 0.999
@@ -133,11 +134,17 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
         problem: of the design, on the basis of its answer.
         samples: of the delivered experiment.
     """
-    informations = delivered(problem, design, samples)
+    return _worst(problem, design, delivered(problem, design, samples))
+
+
+def _worst(
+    problem: Problem, design: Design, informations: NDArray[np.float64], above: float = -np.inf
+) -> list[Kept]:
+    """The same with M_s (S, k, k), a share up to `above` being told as 0."""
     worst = [Kept(0.0)] * len(problem.scenarios)
     for side in (False, True):
-        admitted = _admitted(problem, design, side=side)
-        for index, violation in problem.demands.violations(informations, side=side):
+        admitted = _admitted(design.problem, design, side=side)
+        for index, violation in problem.demands.violations(informations, above=above * admitted, side=side):
             number, share = problem.demands.asked[index].scenario, violation.ratio / admitted
             if share > worst[number].share:
                 worst[number] = Kept(share, violation.frequency)
@@ -165,15 +172,36 @@ def _admitted(problem: Problem, design: Design, *, side: bool) -> float:
     return float(np.sqrt(design.result.objective)) if problem.goal == "factor" and not side else 1.0
 
 
-def tried_on(design: Design, samples: int, batch: Batch, *, above: float = 0.0) -> list[Kept]:
-    """The same for plants that the design was not made for.
+@dataclass(frozen=True)
+class Tried:
+    """A plant that the design was not made for: what it keeps, and what is asked there."""
+
+    kept: Kept
+    asked: tuple[Requirement, ...]
+
+
+def tried_on(design: Design, samples: int, batch: Batch, *, above: float = 0.0) -> list[Tried]:
+    """What plants keep that the design was not made for.
 
     Args:
         above: a share up to this one is told as 0, since no peak as low is searched to the last digit.
     """
-    at = design.problem.on(design.result.basis)
-    power = max(at.power("excitation").at(design.result.x), np.finfo(float).tiny)
-    return [_tried(design, at.basis, power, samples, plant, above) for plant in batch.plants]
+    seconds_left()
+    try:
+        at = _at(design, samples, batch.plants)
+        kept = _worst(at, design, at.informations(design.result.x), above)
+        if at.paid == "worst" and at.goal == "cost":
+            costs = [cost.at(design.result.x) for cost in at.costs]
+            kept = [replace(one, cost=costs[i % len(costs)]) for i, one in enumerate(kept)]
+    except (np.linalg.LinAlgError, IdesignError):
+        if len(batch.plants) > 1:  # one of them is to blame, or more
+            each = (batch.only([place]) for place in range(len(batch.plants)))
+            return [tried for own in each for tried in tried_on(design, samples, own, above=above)]
+        (plant,) = batch.plants  # the experiment does not tell everything of it
+        own = plant.at(plant.experiment)
+        return [Tried(Kept(np.inf), (*own.requirements, *own.side))]
+    asked = ((*scenario.requirements, *scenario.side) for scenario in at.scenarios)
+    return [Tried(*both) for both in zip(kept, asked, strict=True)]
 
 
 def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:
@@ -181,10 +209,8 @@ def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.rand
 
     None where the experiment does not tell them all.
     """
-    at = design.problem.on(design.result.basis)
-    power = max(at.power("excitation").at(design.result.x), np.finfo(float).tiny)
     try:
-        alone = _alone(design, at.basis, power, samples, plant)
+        alone = _at(design, samples, [plant])
         (information,) = alone.informations(design.result.x)
         root = alone.experiment.factor @ np.linalg.cholesky(information)
         scatter = np.linalg.solve(root.T, rng.standard_normal(len(root)))
@@ -193,37 +219,20 @@ def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.rand
     return plant.experiment.model.theta + scatter
 
 
-def _tried(
-    design: Design, basis: Basis, power: float, samples: int, plant: Alternative, above: float
-) -> Kept:
-    seconds_left()
-    try:
-        alone = _alone(design, basis, power, samples, plant)
-        informations = alone.informations(design.result.x)
-        worst = Kept(0.0)
-        for side in (False, True):
-            admitted = _admitted(design.problem, design, side=side)
-            for _, violation in alone.demands.violations(informations, above=above * admitted, side=side):
-                if violation.ratio / admitted > worst.share:
-                    worst = Kept(violation.ratio / admitted, violation.frequency)
-        if design.problem.paid == "worst" and design.problem.goal == "cost":
-            return replace(worst, cost=alone.cost_at(design.result.x))
-        return worst
-    except (np.linalg.LinAlgError, IdesignError):  # a plant of which the experiment does not tell everything
-        return Kept(np.inf)
-
-
-def _alone(design: Design, basis: Basis, power: float, samples: int, plant: Alternative) -> Problem:
-    """What is asked at one plant only, in coordinates of its own."""
-    of_length = replace(plant.experiment, samples=samples)
-    own = replace(plant, experiment=of_length).at(of_length.whitened(power))
+def _at(design: Design, samples: int, plants: Sequence[Alternative]) -> Problem:
+    """What is asked at plants that the design was not made for, each in coordinates of its own."""
+    on = design.problem.on(design.result.basis)
+    power = max(on.power("excitation").at(design.result.x), np.finfo(float).tiny)
+    of_length = [replace(plant.experiment, samples=samples) for plant in plants]
+    whitened = jointly_whitened(of_length, power)
+    first, *others = (plant.at(own) for plant, own in zip(plants, whitened, strict=True))
     return replace(
         design.problem,
-        experiment=own.experiment,
-        requirements=own.requirements,
-        side=own.side,
-        others=(),
+        experiment=first.experiment,
+        requirements=first.requirements,
+        side=first.side,
+        others=tuple(others),
         limits=(),
-        basis=basis,
+        basis=on.basis,
         finer=None,
     )

@@ -56,7 +56,8 @@ class _Ascent:
         if plant is None:
             return 0.0
         self.tried += 1
-        (kept,) = tried_on(self.design, self.samples, Batch(theta[None], (plant,), 1))
+        (tried,) = tried_on(self.design, self.samples, Batch(theta[None], (plant,), 1))
+        kept = tried.kept
         if not self.best or kept.share > self.best[0][2].share:
             self.best[:] = [(theta, plant, kept)]
         return kept.share

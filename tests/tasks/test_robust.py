@@ -114,7 +114,9 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     task = build_convex(parse_spec(LOOP, overrides=[prior]))
     done, _ = task.designed()
     tried = [
-        one for batch in task.plants.afresh() for one in tried_on(done.design, done.experiment.samples, batch)
+        one.kept
+        for batch in task.plants.afresh()
+        for one in tried_on(done.design, done.experiment.samples, batch)
     ]
     less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
     dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
@@ -172,7 +174,9 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     assert cost == pytest.approx(12.444049, rel=1e-5)
     own = Alternative(oracle.experiment, oracle.requirements)
     estimated = replace(own, requirements=nominal.question.requirements)
-    by_own, by_estimate = tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
+    by_own, by_estimate = (
+        one.kept for one in tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
+    )
     assert by_own.share == pytest.approx(1.02, abs=0.02)
     assert by_estimate.share == pytest.approx(1.86, abs=0.02)
     assert by_estimate.frequency == pytest.approx(0.390, abs=2e-3)
@@ -258,7 +262,7 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
     done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     batches = list(done.plants.afresh())
     shares = [
-        kept.share for batch in batches for kept in tried_on(done.design, done.experiment.samples, batch)
+        one.kept.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch)
     ]
     whole = robust_result(done, done.plants)
     assert whole.entry["fresh"]["draws"] == len(shares) == 120

@@ -27,7 +27,7 @@ class Floor:
     Args:
         raised: whether the floor counts at some frequency.
         lost: whether nothing keeps what is asked there, for its own r_adm vanishes.
-        peak: of |S| with that plant; None where no loop is asked about.
+        peak: of |S| with that plant where all is lost; None where no loop is asked about.
         share: that of r_adm of the plant of the spec which is the floor.
     """
 
@@ -44,7 +44,7 @@ def floor_at(requirements: Iterable[Requirement]) -> Floor:
     lost = any(floor.lost(grid) for floor, grid in floors)
     raised = lost or any(floor.raised(grid) for floor, grid in floors)
     share = max((floor.share for floor, _ in floors), default=0.0)
-    return Floor(raised, lost, max(_peaks(errors), default=None), share)
+    return Floor(raised, lost, max(_peaks(errors), default=None) if lost else None, share)
 
 
 def _peaks(errors: Sequence[OnModelError]) -> Iterator[float]:

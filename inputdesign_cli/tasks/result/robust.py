@@ -170,11 +170,12 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
     tried, peaks, rejected, largest, floors = list[Kept](), list[float](), 0, 0.0, list[Floor]()
     for batch in afresh:
         try:
-            tried += tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
+            at_each = tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
         except OutOfTimeError:
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
-        floors += map(floor_of, batch.plants)
+        tried += (one.kept for one in at_each)
+        floors += (floor_at(one.asked) for one in at_each)
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
@@ -224,7 +225,7 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> dict[s
                 shares.append(np.inf)
             else:
                 shares += [
-                    one.share for one in tried_on(done.design, samples, Batch(theta[None], (told,), 1))
+                    one.kept.share for one in tried_on(done.design, samples, Batch(theta[None], (told,), 1))
                 ]
     except IdesignError:  # no time is left, or what is asked cannot be asked of such a plant
         return {}
