@@ -114,22 +114,27 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
 def time_columns(sheet: Sheet) -> list[str]:
     """Names, in small letters, of columns that hold times by their names; the number of one without a name.
 
-    If there is none, those that are called as clocks are and rise; at last that of dates or times of day.
+    If there is none, those that are called as clocks are and rise, or hold dates or times of day; at last
+    those whose dates cannot be read: to do without them would be to guess.
     """
     header = sheet.header
+    called = [
+        (header[i] if i < len(header) and header[i] else str(i + 1), column)
+        for i, column in enumerate(sheet.columns)
+    ]
     found = [
         name
-        for name, column in zip(header, sheet.columns, strict=False)
+        for name, column in called
         if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly_rises(column.numbers))
     ]
     if found:
         return found
     clocks = [
-        (name or str(i + 1), column)
-        for i, (name, column) in enumerate(zip(header, sheet.columns, strict=False))
+        (name, column)
+        for name, column in called
         if (_advances(column.numbers) if column.dated else _mostly_rises(column.numbers))
         and (column.dated or _CLOCK.fullmatch(name))
-    ]
+    ] or [(name, column) for name, column in called if column.undated]
     # Dates and times of day that were joined say the same.
     once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
     return once if len(once) == 1 else [name for name in once if name.startswith("dat")]

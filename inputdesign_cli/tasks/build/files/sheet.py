@@ -20,8 +20,8 @@ class Column:
     """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
 
     Dates and times are `dated`: seconds since the first; of times of a day without a date, `clock` is what
-    the first counts from midnight. What is `wrong` with a fault, and how to mend it, goes into messages;
-    `told` is what was done to make times of a column.
+    the first counts from midnight. Of dates that cannot be read all or some are `undated`. What is `wrong`
+    with a fault, and how to mend it, goes into messages; `told` is what was done to make times of a column.
     """
 
     numbers: Array
@@ -33,6 +33,7 @@ class Column:
         "row a line; dates as 2024-03-12 10:15:00"
     )
     clock: float | None = None
+    undated: bool = False
     told: str = ""
 
 

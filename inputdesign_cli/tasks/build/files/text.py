@@ -142,14 +142,15 @@ def _of_dates(cells: list[str], otherwise: Column) -> Column:
         seconds[there] = moments.seconds
         return Column(seconds, dated=True, clock=moments.clock)
     if moments is not None:
-        fault = (there[0], written[0])
-        return Column(otherwise.numbers, fault, wrong="may have the day or the month first", hint=AS_DATES)
+        fault, wrong = (there[0], written[0]), "may have the day or the month first"
+        return Column(otherwise.numbers, fault, wrong=wrong, hint=AS_DATES, undated=True)
     if is_number(written[0]) or not seems_moment(written[0]):
         return otherwise
     # All cells up to one are dates of one kind, and with it they are not.
     at = bisect_left(range(len(written)), 1, key=lambda i: moments_of(written[: i + 1]) is None)
     wrong = "is no date or time as those above are" if at else "is no date or time that can be read"
-    return Column(otherwise.numbers, (there[at], written[at]), wrong=wrong, hint=AS_DATES)
+    fault = (there[at], written[at])
+    return Column(otherwise.numbers, fault, wrong=wrong, hint=AS_DATES, undated=at > 0)
 
 
 def _of_numbers(rows: Rows, columns: Sequence[Column]) -> bool:
