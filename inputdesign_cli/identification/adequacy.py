@@ -34,6 +34,8 @@ _TRENDS, _WAVES = 3, 4
 # Of each residual at most one direction in so many is tried.
 _SAMPLES_A_DIRECTION = 8
 _DEPENDENT = 1e-6
+# At its limit is what cannot move so many standard deviations.
+_ASIDE = 0.01
 # A relative variance of the noise so small changes probabilities of 0.001 by a few per cent of themselves.
 _WELL_KNOWN = 1e-3
 
@@ -104,10 +106,10 @@ class White:
     known: Echoes
 
     @classmethod
-    def of(cls, point: Point, echoes: Echoes | None = None) -> White:
-        """That of a point of the search."""
+    def of(cls, records: Records, point: Point, echoes: Echoes | None = None) -> White:
+        """That of a point of the search; a parameter that stands at its limit explains nothing."""
         near, none = point.near, np.zeros(point.theta.size)
-        errors, psi = near.all_errors, near.all_psi
+        errors, psi = near.all_errors, np.where(_held(records, point)[:, None, None], 0.0, near.all_psi)
         root = np.linalg.inv(np.linalg.cholesky(errors.T @ errors / len(near.errors)))
         explained = np.column_stack([near.directions, (psi @ root.T).reshape(len(psi), -1).T])
         found = cls(
@@ -201,7 +203,7 @@ def score_tests(
         recent: the lag up to which the structure looks at the inputs.
         feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
     """
-    white = White.of(point, echoes)
+    white = White.of(records, point, echoes)
     tests = []
     for signals in _tried(records, point, recent, int(feedback)):
         columns = white.columns(_of_outputs(signals.columns))
@@ -244,6 +246,24 @@ def failed(
     """
     groups = ((directed, DIRECTED_LEVEL / looks), (tests, LEVEL / looks))
     return tuple(test for group, level in groups for test in group if test.probability * len(group) < level)
+
+
+def _held(records: Records, point: Point) -> NDArray[np.bool_]:
+    """(k,): dead times that the samples would have shorter than they may be.
+
+    There the score is not zero, and what it says of a model that is wrong would go off with what such a
+    parameter explains.
+    """
+    held = np.zeros(point.theta.size, dtype=bool)
+    variance = point.cost / point.errors.size
+    for j in records.dead_times:
+        step = np.zeros(held.size)
+        step[j] = (
+            _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300)) * np.sign(point.slope[j])
+        )
+        moved = records.stabilised(point.theta + step)[j] - point.theta[j]
+        held[j] = abs(moved) < 0.5 * abs(step[j])
+    return held
 
 
 def _tried(records: Records, point: Point, recent: int, first: int) -> list[_Signals]:

@@ -10,7 +10,7 @@ import scipy.stats
 
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, White, failed
-from inputdesign_cli.plant import Intersample, PolynomialModel, SampledModel
+from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx, two_by_two
 from tests.support.records import shifted, simulated
@@ -167,3 +167,21 @@ def test_right_models_are_seldom_undecided_and_wrong_ones_seldom_met():
     wrong = [run["study"](fault, range(25)) for fault in run["FAULTS"]]
     assert sum(counts["met though beyond"] for counts in wrong) <= 1 + 3
     assert sum(counts["beyond"] for counts in wrong) >= 20
+
+
+def test_a_dead_time_at_zero_hides_nothing():
+    """The samples would have it negative, and the tests are those of the plant without a dead time.
+
+    Of a lag behind a hold a dead time makes q^-1 to q^-1 + b q^-2 with b > 0; here b is negative.
+    """
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal((400, 1))
+    y = scipy.signal.lfilter([0, 1, -0.4], [1, -0.7], u, axis=0) + 0.3 * rng.standard_normal((400, 1))
+    rows = ((np.ones(1),),), ((np.array([0.5, 1.0]),),), np.eye(1)
+    plain, late = ContinuousModel(*rows), ContinuousModel(*rows, delay=((np.array([0.3]),),))
+    known = identify(SampledModel(plain, 1.0), u, y, start=plain.theta)
+    found = identify(SampledModel(late, 1.0), u, y, start=late.theta)
+    assert found.theta[late.names.index("delay")] < 1e-6
+    for name, test in by_name(known).items():
+        assert by_name(found)[name].statistic == pytest.approx(test.statistic, rel=1e-3)
+    assert by_name(found)["recent_inputs"].probability < 1e-12
