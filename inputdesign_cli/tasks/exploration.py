@@ -11,16 +11,7 @@ import numpy as np
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import frequency_response, silent_in
-from inputdesign_cli.identification.explore import (
-    Fits,
-    Found,
-    answers_output,
-    by_chance,
-    explore_records,
-    fits,
-    only_answers,
-    order_of_excitation,
-)
+from inputdesign_cli.identification.explore import Fits, Found, answers_output, explore_records, fits
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.units import Header, Units
@@ -38,24 +29,10 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_entry,
     without_drift,
 )
-from inputdesign_cli.tasks.result.integrating import like_integrators
+from inputdesign_cli.tasks.result.no_trust import DRIVE, LEAST_FIT, distrusted, undriven_inputs
 from inputdesign_cli.tasks.result.refutations import refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
-from inputdesign_cli.tasks.result.unidentified import unidentified
-from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
-
-# A simulation that explains less than this of data it has not seen is no model.
-_LEAST_FIT = 5.0
-# One that is refuted besides needs more.
-_HALF = 50.0
-_DRIVE = "move the reference of the loop, or add dither to the input, and record again"
-_UNSTEADY = (
-    "a mode of the plant loses less than a hundredth in the whole record: it cannot be told from an "
-    "integrator, or from drift. Record in a loop or until the output settles, or remove the drift: --detrend "
-    "linear"
-)
-_KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
 @dataclass(frozen=True)
@@ -76,31 +53,16 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     started = time.perf_counter()
     log = read_logs(paths, preparation)
     loops = answers_output(log.parts)
-    undriven = _undriven(log)
+    undriven = undriven_inputs(log)
     with blaming_columns(paths[0]):
         try:
             found = explore_records(log.parts, feedback=bool(loops), step=log.step, ramp=log.lined)
         except SpecError as error:
             if not undriven:
                 raise
-            raise bad_spec("no-structure", undriven[0], hint=_DRIVE, key="u") from error
+            raise bad_spec("no-structure", undriven[0], hint=DRIVE, key="u") from error
     log = without_drift(log, found)
-    loose = (f"{told}: {_DRIVE}" for told in undriven)
-    rising = like_integrators(found, log.step, log.time_unit)
-    moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
-    order = order_of_excitation(moving)
-    unseen = unidentified(found, order, log.step, log.time_unit)
-    unsteady = () if found.steady or rising or unseen else (_UNSTEADY,)
-    reasons = (
-        *_unjudged(found),
-        *_reasons(found),
-        *_idle(found),
-        *_refuted(found),
-        *rising,
-        *unseen,
-        *unsteady,
-        *loose,
-    )
+    reasons = distrusted(log, found, undriven, loop=bool(loops))
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
@@ -122,7 +84,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     results = identification_results(task, identified, started)
     result = {
         **results.result,
-        "title": f"What {' and '.join(path.name for path in paths)} tells",
+        "title": f"What {' and '.join(path.name for path in paths)} {'tells' if len(paths) == 1 else 'tell'}",
         "exploration": exploration_entry(log, found, loops, reasons),
         "validation": validation_entry(found.validation),
     }
@@ -177,87 +139,6 @@ def _asked(task: Identification, identified: Identified) -> Identified:
     return replace(identified, question=question)
 
 
-def _unjudged(found: Found) -> tuple[str, ...]:
-    """That no data are left to judge by."""
-    if found.split != "none":
-        return ()
-    return (
-        "the inputs move in one stretch of the record only, which cannot both estimate a model and judge it: "
-        "the model was chosen and judged by the data that it is estimated from. Judge it by another record "
-        "(idesign explore OTHER --validate model.yaml), or let the inputs step up and down again, several "
-        "times",
-    )
-
-
-def _reasons(found: Found) -> tuple[str, ...]:
-    """Why nothing that was found deserves trust."""
-    which = "" if found.split == "none" else " that it has not seen"
-    single = found.model.outputs == 1
-    unseen = int(np.sum(found.validation.counted))
-    told = []
-    for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
-        chance = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
-        if fit < max(_LEAST_FIT, chance):
-            told.append(
-                f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in {unseen} "
-                f"samples{which}, and of noise alone it may explain {chance:.1f} %: the inputs "
-                "hardly act on it, or the record is too short or too noisy to tell how"
-            )
-    return tuple(told)
-
-
-def _idle(found: Found) -> tuple[str, ...]:
-    """Outputs of which the whole record tells no effect of the inputs, though a part of it did."""
-    nothing = driven_by_nothing(found.model, found.estimate)
-    single = found.model.outputs == 1
-    told = []
-    for i, fit in enumerate(found.estimate.fit):
-        worse = fit is not None and fit <= 0.0
-        if worse or i in nothing:
-            why = f"the simulation explains {fit:.1f} %" if worse else "its standard deviations reach zero"
-            output = "y" if single else f"y{i + 1}"
-            told.append(
-                f"in the whole record no effect of the inputs on {output} can be told from none ({why}): "
-                "what agreed in a part of it may be chance, as two slow signals often do; move the inputs "
-                "more, or for longer"
-            )
-    return tuple(told)
-
-
-def _refuted(found: Found) -> tuple[str, ...]:
-    """Outputs of which a model explains less than half, where every kind of test refutes it as well.
-
-    Tests alone do not take trust away: with samples enough they refute every model of a real plant, also one
-    that explains almost everything. Nor does a poor fit alone: the noise may be strong.
-    """
-    failed = {test.name for test in found.estimate.failed}
-    if not all(failed & kind for kind in _KINDS):
-        return ()
-    single, unseen = (
-        found.model.outputs == 1,
-        "" if found.split == "none" else " in data that it has not seen",
-    )
-    return tuple(
-        f"past inputs explain residuals, residuals explain each other, and the simulation explains {fit:.1f} "
-        f"% of {'y' if single else f'y{i + 1}'}{unseen}: the plant acts otherwise than "
-        "any structure that was tried. It may be nonlinear, vary with time, or have inputs that the log "
-        "lacks: record about one operating point, or log what else acts on it"
-        for i, fit in enumerate(found.validation.simulation)
-        if fit < _HALF
-    )
-
-
-def _undriven(log: Log) -> tuple[str, ...]:
-    """Inputs that only answer the outputs."""
-    single = log.u.shape[1] == 1
-    return tuple(
-        f"{'u' if single else f'u{j + 1}'} follows from the outputs and its own past: data from a loop "
-        "without excitation, from which a plant is not identifiable (the inverse of the controller explains "
-        "them as well)"
-        for j in only_answers(log.parts)
-    )
-
-
 def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
     """How a given model does on other data.
 
@@ -298,10 +179,10 @@ def _too_little(found: Fits) -> tuple[str, ...]:
     single = len(found.simulation) == 1
     told = []
     for i, fit in enumerate(found.simulation):
-        if fit < _LEAST_FIT:
+        if fit < LEAST_FIT:
             output = "y" if single else f"y{i + 1}"
             what = (
-                f"the simulation explains {fit:.1f} % of {output}, and less than {_LEAST_FIT:g} % is "
+                f"the simulation explains {fit:.1f} % of {output}, and less than {LEAST_FIT:g} % is "
                 "nothing: a level alone explains as much"
                 if np.isfinite(fit)
                 else f"the model has no simulation of {output}: its plant is unstable"

@@ -18,3 +18,5 @@ from inputdesign_cli.identification.explore.inputs import (
 from inputdesign_cli.identification.explore.joint import Found as Found
 from inputdesign_cli.identification.explore.loops import answers_output as answers_output
 from inputdesign_cli.identification.explore.search import explore_structure as explore_structure
+from inputdesign_cli.identification.explore.switched import early_answers as early_answers
+from inputdesign_cli.identification.explore.unstable import unstable_pole as unstable_pole

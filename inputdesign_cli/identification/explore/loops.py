@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import left_over, past
+from inputdesign_cli.identification.explore.switched import switched_by
 from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
 _CERTAIN = 1e-4
-# Three tests share the level.
-_TESTS = 3
+# Four tests share the level.
+_TESTS = 4
 # A correlation of white signals beyond this, times the root of their number, is none by chance.
 _TOGETHER = 4.0
 # A jump is beyond so many robust standard deviations; an input of which its past leaves less than this share
@@ -47,7 +48,8 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     That hints of a loop. Each input is regressed on its own past and the other inputs', then on past
     innovations of the outputs as well ([ljung-1999], Section 13.4), with its jumps and without them. Not
     outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
-    would help to predict one that is held. A third test is that of an answer at once, see `_at_once`.
+    would help to predict one that is held. A third test is that of an answer at once, see `_at_once`, a
+    fourth that of a relay, see `switched_by`.
 
     Args:
         parts: records u (n, r), y (n, p).
@@ -72,7 +74,11 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     brief = [(u, y) for u, y in busiest(centred, _MOST_SAMPLES) if len(y) > 3 * lags]
     found = []
     for j, target in enumerate(targets.T):
-        probability = min(_foretold(own, more, target), *_between_jumps(brief, lags, j))
+        probability = min(
+            _foretold(own, more, target),
+            *_between_jumps(brief, lags, j),
+            switched_by(brief, j) if brief else 1.0,
+        )
         if _TESTS * probability < _CERTAIN:
             found.append((j, _TESTS * probability))
     return found

@@ -36,6 +36,7 @@ from inputdesign_cli.identification.explore.fits import (
     output_error_form,
     simulation_fit,
 )
+from inputdesign_cli.identification.explore.late import late_answers
 from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import processes
@@ -54,6 +55,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 _MOST_SAMPLES = 4000
 _MOST_DELAY = 150
+# Where an answer comes later, delays are looked for until then and a share of it more.
+_BEYOND = 5
 _HIGHEST, _HIGHEST_ARX = 5, 8
 # Plants up to this order are always tried.
 _ALWAYS = 3
@@ -166,7 +169,9 @@ def explore_structure(
     # In a loop an input answers the noise; what is left of it must be white to tell the plant.
     clean = whitened(first) if feedback else first
     least = _least_delays(first, clean, most) if feedback else (0,) * r
-    delays = least
+    later = late_answers(first, most)
+    most = max(most, *(lag + lag // _BEYOND for lag in later))
+    delays = tuple(map(max, least, later))
     quick = dict[int, SharedDenominator]()
     for n in range(1, highest + 1):
         quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)

@@ -4,20 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Found
+from inputdesign_cli.identification.explore import Found, order_of_excitation
+from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.plant.polynomial import Array
 
+# The static gain is as good as none below this share of the largest one; what falls to this share of its peak
+# has a resonance.
+_NO_GAIN, _FALLS = 0.05, 0.6
+_FREQUENCIES = 100
 
-def unidentified(found: Found, order: int, step: float, unit: str) -> tuple[str, ...]:
+
+def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[str, ...]:
     """A sentence for every reason why the parameters of the model are not those of the plant alone.
 
     Args:
-        order: of persistent excitation of the inputs that move.
+        moving: records of the inputs that move.
         step, unit: the sample time.
     """
     needed = max(candidate.orders.unknowns for candidate in found.taken)
-    told = []
-    if order < needed:
+    order, told = order_of_excitation(moving), []
+    alone = min(order_of_excitation([(u[:, [j]], y) for u, y in moving]) for j in range(len(found.moving)))
+    if order < needed <= alone:
+        told.append(
+            "the inputs move together: each of them moves enough by itself, and some combination of them and "
+            f"their pasts hardly does (persistently exciting of order {order} together, and the model needs "
+            f"{needed}), so that their effects cannot be told apart; move them one by one, or independently"
+        )
+    elif order < needed:
         told.append(
             f"the input is persistently exciting of order {order} only, and the model needs {needed}: it "
             f"tells {order} numbers of the plant, and other models explain this record as well; apply an "
@@ -32,6 +45,25 @@ def unidentified(found: Found, order: int, step: float, unit: str) -> tuple[str,
                 "records is a line in each; see whether the input moves enough, or sample otherwise"
             )
     return tuple(told)
+
+
+def like_inverses(found: Found) -> tuple[str, ...]:
+    """A sentence where a plant of one input and output is like the inverse of a controller that integrates.
+
+    It answers at once, has no static gain, and |G| hardly falls with frequency: so does -1/C, which is what
+    data of a loop tell whose reference rests ([ljung-1999], Section 13.4).
+    """
+    if found.model.inputs > 1 or found.model.outputs > 1 or found.taken[0].orders.delays != (0,):
+        return ()
+    G = np.abs(found.model.plant_at(np.linspace(1e-6, np.pi, _FREQUENCIES))[:, 0, 0])
+    highest = np.maximum.accumulate(G)
+    if G[0] > _NO_GAIN * highest[-1] or np.any(_FALLS * highest > G):
+        return ()
+    return (
+        "y answers u in the same sample and not at all at rest, as the inverse of a controller with integral "
+        "action does (-1/C): if u was made from y, as in a loop whose reference rests, this is no model of "
+        "the plant",
+    )
 
 
 def _by_output(found: Found) -> list[Array]:

@@ -1,0 +1,56 @@
+"""Answers that come later than delays are looked for: by the correlation of what is new in u and in y."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.explore.inputs import past
+from inputdesign_cli.plant.polynomial import Array
+
+_ORDER = 20
+# The probability of a correlation as large by chance, at all lags together.
+_CERTAIN = 1e-6
+
+
+def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
+    """Of each input the lag beyond `most` at which the output answers it; zero where it does so before.
+
+    What their own past does not tell of input and output goes together at the dead time, and for a few
+    samples more. Lags to two thirds of the longest record are looked at.
+
+    Args:
+        parts: records u (n, r), y (n, 1).
+    """
+    order = max(min(_ORDER, max(len(y) for _, y in parts) // 10), 1)
+    long = [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > 4 * order]
+    if not long:
+        return (0,) * parts[0][0].shape[1]
+    u, y = (_new([part[i] for part in long], order) for i in (0, 1))
+    lags = 2 * max(len(x) for x in y) // 3
+    certain = scipy.special.ndtri(1.0 - 0.5 * _CERTAIN / (lags * u[0].shape[1]))
+    found = []
+    for j in range(u[0].shape[1]):
+        together = np.zeros(lags)
+        for own, answer in zip(u, y, strict=True):
+            every = scipy.signal.correlate(answer[:, 0], own[:, j], method="fft")[len(own) - 1 :][:lags]
+            together[: len(every)] += every
+        pairs = np.array([sum(max(len(x) - lag, 0) for x in y) for lag in range(lags)])
+        sizes = [np.sqrt(np.mean(np.concatenate(x)[:, i] ** 2)) for x, i in ((u, j), (y, 0))]
+        z = np.abs(together) / np.maximum(np.sqrt(pairs) * sizes[0] * sizes[1], 1e-300)
+        best = int(np.argmax(z))
+        found.append(best if best > most and z[best] > certain else 0)
+    return tuple(found)
+
+
+def _new(signals: list[Array], order: int) -> list[Array]:
+    """What the past of each channel does not tell of it: (n - order, channels) of every part."""
+    found = [signal[order:].copy() for signal in signals]
+    for i in range(signals[0].shape[1]):
+        rows = [past(signal[:, i : i + 1], order) for signal in signals]
+        target = np.concatenate([signal[order:, i] for signal in signals])
+        solution = np.linalg.lstsq(np.concatenate(rows), target, rcond=1e-10)[0]
+        for own, columns in zip(found, rows, strict=True):
+            own[:, i] -= columns @ solution
+    return found

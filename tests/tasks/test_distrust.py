@@ -1,0 +1,66 @@
+"""Logs from which no model deserves trust, with the reason and what to do."""
+
+import re
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.tasks import explore, identify
+
+
+def stored(path, u, y, names="u,y"):
+    np.savetxt(path, np.column_stack([u, y]), delimiter=",", header=names, comments="", fmt="%.9g")
+    return path
+
+
+def test_the_inverse_of_a_controller_is_no_plant(tmp_path):
+    """PI control without a reference: u = -C y + dither, and y moves by its own noise."""
+    rng = np.random.default_rng(1)
+    u, y, v, total = np.zeros(500), np.zeros(500), 0.0, 0.0
+    x = 0.0
+    for t in range(500):
+        x = 0.8 * x + 0.2 * u[t - 1] if t else 0.0
+        v = 0.9 * v + 0.3 * rng.standard_normal()
+        y[t] = x + v
+        total += 0.1 * y[t]
+        u[t] = -0.5 * y[t] - total + 0.05 * rng.standard_normal()
+    (told,) = [reason for reason in explore(stored(tmp_path / "log.csv", u, y)).reasons if "-1/C" in reason]
+    assert told.endswith("move the reference of the loop, or add dither to the input, and record again")
+
+
+def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
+    rng = np.random.default_rng(4)
+    r, y, u, x = np.repeat(rng.choice([-1.0, 1.0], 25), 20), np.zeros(500), np.zeros(500), 0.0
+    for t in range(500):
+        x = 1.1 * x + 0.2 * u[t - 1] if t else 0.0
+        y[t] = x + 0.05 * rng.standard_normal()
+        u[t] = 2.0 * (r[t] - y[t])
+    log = stored(tmp_path / "log.csv", u, y)
+    (told,) = explore(log).reasons
+    assert told.startswith("the plant is unstable: it has a pole at 1.")
+    plant, noise = re.search(r"plant: (\{.*?\}), noise: (\{.*?\}),", told).groups()
+    loop = "experiment: {controller: {numerator: [2], denominator: [1]}}"
+    found = identify(parse_spec(f"plant: {plant}\nnoise: {noise}\n{loop}\n", design=False), log).result
+    theta, deviation = (found["identification"][key] for key in ("theta", "standard_deviation"))
+    assert theta["a1"] == pytest.approx(-1.1, abs=4.0 * deviation["a1"])
+    assert theta["b1"] == pytest.approx(0.2, abs=4.0 * deviation["b1"])
+
+
+def test_inputs_that_move_together_are_told_apart_by_nothing(tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 5)
+    y = scipy.signal.lfilter([0, 0.3], [1, -0.7], 3.0 * u) + 0.1 * rng.standard_normal(300)
+    found = explore(stored(tmp_path / "log.csv", np.column_stack([u, 2.0 * u]), y, "u1,u2,y"))
+    assert any("the inputs move together" in reason for reason in found.reasons)
+    assert not any("exciting of order 0 only" in reason for reason in found.reasons)
+
+
+def test_a_dead_time_of_a_third_of_the_record_is_found(tmp_path):
+    """Longer than delays are looked for where nothing says that one is there."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.choice([-1.0, 1.0], 125), 4)
+    y = scipy.signal.lfilter(np.append(np.zeros(150), 0.2), [1, -0.8], u) + 0.05 * rng.standard_normal(500)
+    (output,) = explore(stored(tmp_path / "log.csv", u, y)).results.result["exploration"]["outputs"]
+    assert abs(output["delay"][0] - 150) <= 1
