@@ -13,6 +13,7 @@ from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
+    AtLeastTwo,
     Band,
     Count,
     Denominator,
@@ -239,7 +240,7 @@ class FrequencyResponse(Section):
     transient: Annotated[Index, SIZES["signal.samples"]] = Field(
         default=1, description="Periods that are left to the transient and not counted (default 1)."
     )
-    detection: Annotated[Count, Field(ge=2), SIZES["accuracy.frequency_response.lines"]] | None = Field(
+    detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = Field(
         default=None,
         description="Odd harmonics only are excited, and in a band one at random of each group of so many is "
         "left out: what appears at the others tells nonlinearity.",

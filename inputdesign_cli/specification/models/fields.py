@@ -85,6 +85,7 @@ Level = Annotated[Cap, SIGNAL]
 Fraction = Annotated[Number, Field(ge=1e-9, lt=1), FRACTION]  # a smaller probability is no requirement
 Tolerance = Annotated[Number, Field(gt=0, lt=1e-2), FRACTION]
 Count = Annotated[int, Strict(), Field(ge=1, le=2**53), _WHOLE]
+AtLeastTwo = Annotated[int, Strict(), Field(ge=2, le=2**53), _WHOLE]
 Index = Annotated[int, Strict(), Field(ge=0, le=2**53), _WHOLE]
 RegisterLength = Annotated[int, Strict(), Field(ge=2, le=32), _WHOLE]
 Flag = Annotated[bool, Strict()]

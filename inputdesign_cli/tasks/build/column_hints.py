@@ -2,33 +2,139 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from inputdesign_cli.tasks.build.files import Sheet
-from inputdesign_cli.tasks.build.tables import named_columns, time_columns
+from inputdesign_cli.tasks.build.files.frames import EXCEL
+from inputdesign_cli.tasks.build.files.naming import named_columns, time_columns
+from inputdesign_cli.tasks.build.files.tags import roles_of
 
 _UNNAMED = "NAME"
 # What separates entries of the option, or quotes it.
 _SEPARATORS = frozenset(',="')
+_CHANNEL = re.compile(r"[uy]\d+|time", re.ASCII)
 
 
-def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) -> str:
-    """`--columns "time=1,u1=2,y1=3"`: what is named already, the times, and the next columns for `wanted`.
+def columns_hint(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) -> str:
+    """How to say which columns count, and what to do first where too few of them hold numbers."""
+    taken = _taken(sheet, named)
+    free = _free(sheet, taken)
+    told = "name them, or give their numbers, such as "
+    if len(free) < len(wanted) and sheet.shown and sheet.names:
+        long = _spread(sheet, free)
+        if long:
+            return f"{long}; then name the columns: {columns_option(sheet, named, wanted, [])}"
+        switches = [i for i, column in enumerate(sheet.columns) if len(column.words) == 2 and i not in taken]
+        if switches:
+            on, off = sheet.columns[switches[0]].words
+            told = f"write 0 and 1 for {on} and {off} in column {called(sheet, switches[0])}, then "
+            told += "name the columns: "
+            return told + columns_option(sheet, named, wanted, sorted({*free, *switches}))
+    return told + columns_option(sheet, named, wanted)
+
+
+def columns_option(
+    sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str], free: Sequence[int] | None = None
+) -> str:
+    """`--columns "time=1,u1=2,y1=3"`: what is named already, the times, and columns of numbers for `wanted`.
+
+    Those that are called as inputs or outputs are come first. Of channels that share a column one keeps it.
 
     Args:
-        named: columns by channel.
+        named: columns by channel; others than u, y and time only say what is taken.
         wanted: channels without a column.
+        free: where columns for them are; None: those of numbers that are not taken.
     """
-    taken = {at for column in named.values() for at in named_columns(sheet, column.strip().lower())}
-    times = [] if "time" in named else _times(sheet, taken)[:1]
-    left = [i for i in range(len(sheet.columns)) if i not in taken and i not in times]
-    found = {**({"time": called(sheet, times[0])} if times else {}), **named}
-    for number, channel in enumerate(wanted):
-        found[channel] = called(sheet, left[number]) if number < len(left) and sheet.shown else _UNNAMED
+    again = _sharing(sheet, named)
+    kept = {channel: column for channel, column in named.items() if channel not in again}
+    taken = _taken(sheet, kept)
+    times = [] if "time" in kept else _times(sheet, taken)[:1]
+    free = _free(sheet, taken) if free is None else free
+    missing = [channel for channel in (*again, *wanted) if channel != "time"]
+    chosen = _chosen(sheet, sorted(missing), free) if sheet.shown else {}
+    found = {
+        **({"time": called(sheet, times[0])} if times else {}),
+        **{c: _plain(sheet, column) for c, column in kept.items() if _CHANNEL.fullmatch(c)},
+        **dict.fromkeys(missing, _UNNAMED),
+        **{channel: called(sheet, at) for channel, at in chosen.items()},
+    }
     in_order = sorted(found, key=lambda channel: (channel != "time", channel))
     return f'--columns "{",".join(f"{channel}={found[channel]}" for channel in in_order)}"'
+
+
+def _plain(sheet: Sheet, column: str) -> str:
+    """A column as the user calls it, or by its number where an option cannot hold its name."""
+    at = named_columns(sheet, column.strip().lower()) if _SEPARATORS & set(column) else []
+    return called(sheet, at[0]) if at else column
+
+
+def _chosen(sheet: Sheet, channels: Sequence[str], free: Sequence[int]) -> dict[str, int]:
+    """A column for each channel while there are some: those that are called so, else the next other ones."""
+    roles = dict(enumerate(roles_of(sheet.names or [""] * len(sheet.columns))))
+    left, found = list(free), {}
+    for strict in (True, False):
+        for channel in channels:
+            letter = channel[0]
+            fit = left if not strict else [i for i in left if roles[i] == letter]
+            if channel in found or not fit:
+                continue
+            found[channel] = min(
+                fit, key=lambda i: ("", *"uyr").index(roles[i] if roles[i] != letter else "")
+            )
+            left.remove(found[channel])
+    return found
+
+
+def _sharing(sheet: Sheet, named: Mapping[str, str]) -> list[str]:
+    """Channels whose column another one has too, which keeps it as its name suits better, or stands first."""
+    roles = roles_of(sheet.names or [""] * len(sheet.columns))
+    timed = _times(sheet, ())
+    places = {channel: named_columns(sheet, column.strip().lower()) for channel, column in named.items()}
+
+    def rank(channel: str) -> tuple[bool, bool]:
+        suits = [roles[at] == channel[0] or (channel == "time" and at in timed) for at in places[channel]]
+        return bool(_CHANNEL.fullmatch(channel)), not all(suits)
+
+    taken: set[int] = set()
+    again = []
+    for channel in sorted(named, key=rank):
+        if len(places[channel]) == 1 and taken & set(places[channel]):
+            again.append(channel)
+        taken |= set(places[channel])
+    return again
+
+
+def _taken(sheet: Sheet, named: Mapping[str, str]) -> set[int]:
+    return {at for column in named.values() for at in named_columns(sheet, column.strip().lower())}
+
+
+def _free(sheet: Sheet, taken: Collection[int]) -> list[int]:
+    """Where columns of numbers are that are not taken, and hold no times."""
+    times = _times(sheet, taken)[:1]
+    return [
+        i
+        for i, column in enumerate(sheet.columns)
+        if i not in taken and i not in times and column.fault is None and not np.isnan(column.numbers).all()
+    ]
+
+
+def _spread(sheet: Sheet, free: Sequence[int]) -> str:
+    """What to do with a table that has the name of a signal in each row, beside its time and its value."""
+    times = _times(sheet, ())
+    tags = [i for i, column in enumerate(sheet.columns) if 2 <= len(column.words) <= len(column.numbers) // 2]
+    if not (times and tags and free) or _rises(sheet.columns[times[0]].numbers):
+        return ""
+    index, tag, value = (sheet.names[i].strip() for i in (times[0], tags[0], free[0]))
+    read = "read_excel" if sheet.path.suffix.lower() in EXCEL else "read_csv"
+    how = ', sep=None, engine="python"' if read == "read_csv" else ""
+    return (
+        f"each row holds the value of one signal, which column {tag} names: spread the table into a column "
+        f'for each, as pandas does: {read}("{sheet.path.name}"{how}).pivot(index="{index}", columns="{tag}", '
+        f'values="{value}").to_csv("wide.csv")'
+    )
 
 
 def rising(sheet: Sheet) -> list[int]:

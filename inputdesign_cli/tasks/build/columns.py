@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.files import Sheet
+from inputdesign_cli.tasks.build.files.naming import named_columns, time_columns
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import named_columns, time_columns
 
 TIME_UNITS = tuple(SECONDS)
 _UNITS = {
@@ -30,6 +30,7 @@ _SPELLINGS = {
     **dict.fromkeys(("percent", "pct"), "%"),
     **_UNITS,
 }
+NO_TIMES = "none"
 _CHANNEL = re.compile(r"([uy])(\d+)(?![a-z0-9]).*")
 _WITH_UNIT = re.compile(r"(.*\S)\s*[(\[]([^)\]]*)[)\]]")
 
@@ -57,11 +58,13 @@ def channel_columns(letter: str, count: int, sheet: Sheet, preparation: Preparat
 
 
 def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
-    """`time` -> the name of its column, if there is one.
+    """`time` -> the name of its column, if there is one; `none` of the user says that there is none.
 
     Raises:
         DataError: there are several.
     """
+    if without_times(sheet, preparation.columns):
+        return {}
     if "time" in preparation.columns:
         return {"time": preparation.columns["time"]}
     claimed = {column.strip().lower() for column in preparation.columns.values()}
@@ -73,6 +76,12 @@ def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
         hint = f"say which one counts: --columns time={which if sheet.shown else 'NAME'}"
         raise DataError(sheet.error("data-missing-column", message, hint))
     return {"time": timed[0]} if timed else {}
+
+
+def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
+    """Whether the user says that no column holds the times: `time=none`, unless one is called so."""
+    said = columns.get("time", "").strip().lower()
+    return said == NO_TIMES and NO_TIMES not in sheet.header
 
 
 def time_unit_of(name: str) -> str | None:
@@ -140,8 +149,9 @@ def with_names(sheet: Sheet, units: Units, preparation: Preparation) -> Preparat
 def with_headers(sheet: Sheet, preparation: Preparation) -> Preparation:
     """Columns that the user names by number, or by how they begin, by their whole names, which tell units."""
     whole = {}
+    unread = without_times(sheet, preparation.columns)
     for channel, column in preparation.columns.items():
-        at = named_columns(sheet, column.strip().lower())
+        at = [] if unread and channel == "time" else named_columns(sheet, column.strip().lower())
         name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names and sheet.shown else ""
         whole[channel] = name if sheet.header.count(name.lower()) == 1 else column
     return replace(preparation, columns=whole)

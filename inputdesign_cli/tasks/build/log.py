@@ -11,8 +11,8 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.column_hints import columns_option
-from inputdesign_cli.tasks.build.columns import counted_unit, time_unit_in, with_headers
+from inputdesign_cli.tasks.build.column_hints import columns_hint
+from inputdesign_cli.tasks.build.columns import counted_unit, time_unit_in, with_headers, without_times
 from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
@@ -86,8 +86,14 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         _check_apart(sheet, signals, step)
     else:
         step = 1.0
-        told.append("the file has no times and no --sample-time was given: the sample time is taken for 1")
-        told += may_be_times(sheet, [column.strip().lower() for column in given.columns.values()])
+        unread = without_times(sheet, given.columns)
+        none = "no times are read" if unread else "the file has no times"
+        told.append(f"{none} and no --sample-time was given: the sample time is taken for 1")
+        told += (
+            []
+            if unread
+            else may_be_times(sheet, [column.strip().lower() for column in given.columns.values()])
+        )
     if not np.isfinite(step):
         message = f"{path.name} has one time only, which tells no sample time"
         hint = "give it: --sample-time 0.5; or say which column holds the time (--columns)"
@@ -97,7 +103,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         np.concatenate([part.u for part in segments]),
         np.concatenate([part.y for part in segments]),
         tuple(len(part.y) for part in segments),
-        dict(given.columns),
+        {channel: column for channel, column in given.columns.items() if channel != "time" or signals.name},
         step,
         unit,
         (*told, *notes),
@@ -162,7 +168,7 @@ def _count(sheet: Sheet, letter: str, columns: Mapping[str, str]) -> int:
         message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
     missing = [channel for channel in _first_of(columns) if channel not in columns]
     kept = {channel: name for channel, name in columns.items() if channel in ("time", *_first_of(columns))}
-    hint = f"name them, or give their numbers, such as {columns_option(sheet, kept, missing)}"
+    hint = columns_hint(sheet, kept, missing)
     raise DataError(sheet.error("data-missing-column", message, hint))
 
 

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.column_hints import called, rising
-from inputdesign_cli.tasks.build.columns import channel_columns, time_column
+from inputdesign_cli.tasks.build.column_hints import called, columns_option, rising
+from inputdesign_cli.tasks.build.columns import (
+    NO_TIMES,
+    channel_columns,
+    time_column,
+    time_unit_of,
+    without_times,
+)
 from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.sheet import elsewhere
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import column_named, columns_of
+
+# So many stamps, apart from the first and the last, nearly all of as many rows, are too coarse, not doubled.
+_FEWEST_STAMPS, _MOSTLY = 3, 0.9
 
 
 @dataclass(frozen=True)
@@ -55,7 +64,8 @@ def signals_of(
         **{name: name for name in references},
         **time_column(sheet, preparation),
     }
-    found = columns_of(sheet, wanted)
+    untimed = {"time": NO_TIMES} if without_times(sheet, preparation.columns) else {}
+    found = columns_of(sheet, wanted, untimed)
     for role, numbers in found.items():
         if np.isnan(numbers).all():
             message = f"the column {wanted[role]} holds no number"
@@ -82,7 +92,7 @@ def signals_of(
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
     times = column_named(sheet, name) if name else None
     if name:
-        _check_rising(kept, time[rows])
+        _check_rising(kept, time[rows], wanted, dated=times is not None and times.dated)
     told = (times.told if times else "", elsewhere(sheet.path, sheet.others).lstrip("; "))
     return Signals(
         kept,
@@ -110,8 +120,23 @@ def _nothing_left(sheet: Sheet, preparation: Preparation, time: Array) -> DataEr
     return DataError.because("data-unreadable", message, hint, sheet.key, Location(str(sheet.path), 1, 1, ""))
 
 
-def _check_rising(sheet: Sheet, time: Array) -> None:
+def _apart_of_stamps(time: Array) -> float:
+    """How far rows are apart where each time (n,) stands about equally often and none falls; else zero."""
+    stamps, counts = np.unique(time, return_counts=True)
+    inner = counts[1:-1]
+    if np.any(np.diff(time) < 0.0) or inner.size < _FEWEST_STAMPS:
+        return 0.0
+    usual = float(np.median(inner))
+    alike = np.mean(np.abs(inner - usual) <= 1.0) > _MOSTLY and counts.max() <= 2.0 * usual
+    return float(np.median(np.diff(stamps)) / inner.mean()) if usual > 1.0 and alike else 0.0
+
+
+def _check_rising(sheet: Sheet, time: Array, columns: Mapping[str, str], *, dated: bool) -> None:
     """Every time (n,) is later than the one before.
+
+    Args:
+        columns: by channel.
+        dated: whether the times stand as dates.
 
     Raises:
         DataError: `data-not-uniform`.
@@ -127,6 +152,15 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
         hint = (
             "sort the rows, keep one of those with the same time, or write times with enough digits to differ"
         )
+        apart = _apart_of_stamps(time[there])
+        if apart:
+            unit = "s" if dated else time_unit_of(columns["time"])
+            option = columns_option(sheet, {**columns, "time": NO_TIMES}, [])
+            hint = (
+                "its times are too coarse, several rows each: write them with enough digits to differ; or, "
+                f"if the rows are evenly spaced and none is missing, do without: {option} "
+                f"--sample-time {apart:.6g}{f' --time-unit {unit}' if unit else ''}"
+            )
         others = [called(sheet, at) for at in rising(sheet)]
         if others:
             hint += f"; or is the time in column {others[0]}, which rises? Then --columns time={others[0]}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
@@ -11,26 +10,17 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.column_hints import columns_option
 from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.files.dates import AS_DATES
 from inputdesign_cli.tasks.build.files.layout import BLANK, LEFT_OUT
+from inputdesign_cli.tasks.build.files.naming import named_columns, time_columns
 from inputdesign_cli.tasks.build.files.sheet import Column
 from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 
-_TIME = re.compile(
-    r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
-)
-# What clocks are called too, where nothing is called as times are; other things may be, so its numbers rise.
-_CLOCK = re.compile(
-    r"(uhrzeit|zeitpunkt|messzeit|datum|date|clock|hora|fecha|marca[ _]de[ _]tiempo)(?![^\W_]).*"
-)
-# The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
-_SHORT = re.compile(
-    r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
-)
 _MOSTLY, _EVENLY = 0.9, 0.01
 _LARGEST = 1e40  # as of other numbers in a spec
 
@@ -76,8 +66,13 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
     return found
 
 
-def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
+def columns_of(
+    sheet: Sheet, wanted: Mapping[str, str], said: Mapping[str, str] | None = None
+) -> dict[str, Array]:
     """The wanted columns, see `read_columns`; NaN where a cell is empty.
+
+    Args:
+        said: what the user says besides, by role, for hints.
 
     Raises:
         DataError: `data-missing-column` or `data-not-a-number`.
@@ -99,7 +94,9 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
             message = f"{' and '.join(same)} are the same column of {sheet.path.name}"
             if sheet.shown and sheet.names:
                 message += f": {sheet.names[at].strip()}"
-            hint = "name another one for one of them: --columns " + ",".join(f"{o}={wanted[o]}" for o in same)
+            hint = (
+                f"name another one for one of them: {columns_option(sheet, {**wanted, **(said or {})}, [])}"
+            )
             raise DataError(sheet.error("data-missing-column", message, hint))
     for role, (at,) in found.items():
         fault = sheet.columns[at].fault
@@ -109,46 +106,6 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
             message = f"{shown} in column {wanted[role]} {sheet.columns[at].wrong}"
             raise DataError(sheet.error("data-not-a-number", message, sheet.columns[at].hint, row))
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
-
-
-def time_columns(sheet: Sheet) -> list[str]:
-    """Names, in small letters, of columns that hold times by their names; the number of one without a name.
-
-    If there is none, those that are called as clocks are and rise, or hold dates or times of day; at last
-    those whose dates cannot be read: to do without them would be to guess.
-    """
-    header = sheet.header
-    called = [
-        (header[i] if i < len(header) and header[i] else str(i + 1), column)
-        for i, column in enumerate(sheet.columns)
-    ]
-    found = [
-        name
-        for name, column in called
-        if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly_rises(column.numbers))
-    ]
-    if found:
-        return found
-    clocks = [
-        (name, column)
-        for name, column in called
-        if (_advances(column.numbers) if column.dated else _mostly_rises(column.numbers))
-        and (column.dated or _CLOCK.fullmatch(name))
-    ] or [(name, column) for name, column in called if column.undated]
-    # Dates and times of day that were joined say the same.
-    once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
-    return once if len(once) == 1 else [name for name in once if name.startswith("dat")]
-
-
-def _advances(x: Array) -> bool:
-    """Whether hardly any value is that of the row before; in which order the rows stand is told later."""
-    steps = np.diff(x[~np.isnan(x)])
-    return bool(np.mean(steps != 0.0) > _MOSTLY) if steps.size else False
-
-
-def _mostly_rises(x: Array) -> bool:
-    steps = np.diff(x[~np.isnan(x)])
-    return bool(np.mean(steps > 0.0) > _MOSTLY) if steps.size else False
 
 
 def may_be_times(sheet: Sheet, taken: Collection[str]) -> list[str]:
@@ -180,23 +137,6 @@ def read_header(path: Path, *, key: str) -> list[str]:
         DataError: `data-unreadable`.
     """
     return read_sheet(path, key=key).header
-
-
-def named_columns(sheet: Sheet, start: str) -> list[int]:
-    """Where columns of this name are, else those that begin with it (u1 is not u10), or that of a number."""
-    header = sheet.header
-    exact = [i for i, name in enumerate(header) if name == start]
-    if exact:
-        return exact
-    begun = [
-        i
-        for i, name in enumerate(header)
-        if name.startswith(start) and not (start[-1:].isdigit() and name[len(start)].isdigit())
-    ]
-    if begun or not start.isdecimal():
-        return begun
-    number = int(start)
-    return [number - 1] if 1 <= number <= len(sheet.columns) else []
 
 
 def _unclear(sheet: Sheet, what: str, wanted: Mapping[str, str]) -> Diagnostic:

@@ -19,6 +19,8 @@ from inputdesign_cli.tasks.build.files.sheet import Sheet, of_arrays, unreadable
 _MOST_BYTES = 2**30
 _SHOWN = 5
 _OBJECT = "an object"
+# What scipy.sparse.save_npz writes, whatever the kind of the matrix.
+_OF_SPARSE = {"format", "shape", "data"}
 _CONVERT = (
     "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  "
     "then: save('data.mat', '-struct', 's', '-v7')"
@@ -42,6 +44,9 @@ def read_npz(path: Path, key: str, raw: bytes) -> Sheet:
     except Exception:  # whatever a broken archive leads the reader to
         hint = "write it with numpy.savez(file, u=.., y=..)"
         raise unreadable(path, key, "is no .npz file of numbers", hint) from None
+    if arrays.keys() >= _OF_SPARSE:
+        hint = "write it with numpy.savez(file, u=A.toarray()), where A is the matrix"
+        raise unreadable(path, key, "holds a sparse matrix of SciPy, which has no name", hint)
     return _sheet(path, key, isolated.divided(arrays))
 
 

@@ -6,6 +6,7 @@ import io
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.isolated import divided
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, elsewhere, of_arrays, unreadable
-from inputdesign_cli.tasks.build.files.text import column_of, read_text
+from inputdesign_cli.tasks.build.files.text import FORMULA, column_of, read_text
 
 PARQUET = (".parquet", ".pq")
 EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
 
+# A sheet with fewer rows of values may have formulas in all others.
+_FEW_ROWS = 3
 # What would end a cell, a row or a quote.
 _MARKS = re.compile(r'[\t\r\n\v\f\x1c-\x1e\x85\u2028\u2029"]')
 
@@ -60,12 +63,42 @@ def read_workbook(path: Path, key: str, raw: bytes, named: str = "") -> Sheet:
     first = next(iter(frames))
     others = () if named else tuple(name for name in frames if name != first)
     rows = frames[named or first].astype(object).to_numpy()
-    text = "\n".join("\t".join(map(_written, row)) for row in rows)
+    text = "\n".join("\t".join(map(_written, row)) for row in _with_formulas(rows, raw, named or first))
     try:
         return replace(read_text(path, key, text, separated_by="\t"), others=others)
     except DataError as error:
         told = elsewhere(path, others)
         raise DataError([replace(d, hint=f"{d.hint}{told}") for d in error.diagnostics]) from None
+
+
+def _with_formulas(rows: NDArray[np.object_], raw: bytes, name: str) -> NDArray[np.object_]:
+    """Cells whose formulas have no values in the file, as those formulas; rows of nothing else are added.
+
+    They are looked for where a column is empty in more than half of its rows; other kinds of workbooks stay.
+    """
+    empty = np.array([[_written(cell) == "" for cell in row] for row in rows], dtype=bool).reshape(rows.shape)
+    if len(rows) >= _FEW_ROWS and not np.any(2 * empty.sum(axis=0) > len(rows)):
+        return rows
+    try:
+        book = import_module("openpyxl").load_workbook(io.BytesIO(raw), read_only=True)
+        cells = list(book[name].iter_rows(values_only=True))
+    except Exception:  # other kinds, or whatever a broken file leads the reader to
+        return rows
+    formulas = {(i, j): _formula(cell) for i, row in enumerate(cells) for j, cell in enumerate(row)}
+    held = {at: text for at, text in formulas.items() if text}
+    shape = np.max([rows.shape, *(np.add(at, 1) for at in held)], axis=0)
+    filled = np.full(shape, None, dtype=object)
+    filled[: rows.shape[0], : rows.shape[1]] = rows
+    for at, text in held.items():
+        if _written(filled[at]) == "":
+            filled[at] = text
+    return filled
+
+
+def _formula(cell: object) -> str:
+    """The formula in a cell, which may be one for several cells; nothing where there is none."""
+    text = getattr(cell, "text", cell)
+    return text if isinstance(text, str) and text.startswith(FORMULA) else ""
 
 
 def _series(pandas: Any, file: io.BytesIO) -> dict[str, NDArray]:

@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 
 BROKEN, NEWER = "broken", "version 7.3"
 NOTHING, _TEXT = "nothing", "text"
+# Of a sparse matrix so many entries, zeros included, are written out.
+_MOST_DENSE = 10_000_000
+_SPARSE = "a sparse matrix too large to be written out (in MATLAB: full(u) of the columns that are needed)"
 # The fields of a saved iddata, and how its columns are called here.
 _IDDATA = {"inputdata": "u", "outputdata": "y", "samplinginstants": "time"}
 _COMMAND = f"from {__name__} import answer; answer()"
@@ -107,6 +110,11 @@ def divided(values: Mapping[str, Any]) -> Arrays:
     left_out: dict[str, str] = {}
     texts: dict[str, str] = {}
     for name, value in values.items():
+        if hasattr(value, "toarray"):
+            if value.shape[0] * value.shape[1] > _MOST_DENSE:
+                left_out[name] = _SPARSE
+                continue
+            value = value.toarray()
         array = np.asarray(value) if not isinstance(value, list) else _of_cells(value)
         if array.dtype.names:
             fields = divided({f"{own}": array[own] for own in array.dtype.names})

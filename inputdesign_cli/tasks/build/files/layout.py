@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.specification.yaml.scalars import plain_number
+from inputdesign_cli.tasks.build.files.cells import is_known, is_missing, is_number, is_unit, measured
 from inputdesign_cli.tasks.build.files.dates import is_moment
 
 Rows = list[tuple[int, list[str]]]
@@ -28,7 +27,6 @@ COMMENTS = ("#", "%", "//")
 _ERRORS = re.compile(
     r"#(?:N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)", re.IGNORECASE
 )
-_MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+", re.ASCII)
 # Numbers with marks between thousands, or in the digits of any script.
 _MARKED = re.compile(r"[-+\u2212]?\d[\d.,'\u2019_\s]*")
@@ -36,61 +34,10 @@ _MARKED = re.compile(r"[-+\u2212]?\d[\d.,'\u2019_\s]*")
 _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
 # Numbers with one mark between all thousands, and another before decimals, if there are any.
 _GROUPED = re.compile(r"([+-]?\d{1,3}([.,'\u2019 \u00a0\u202f])\d{3}(?:\2\d{3})*)((?!\2)[.,]\d+)?", re.ASCII)
+_THOUSAND = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _LOOKED_AT = 200
 # What may separate fields; None stands for blanks. Of equally good ones the first.
 _SEPARATORS = ("\t", ";", "|", None, ",")
-_UNITS = frozenset(
-    [
-        "s",
-        "sec",
-        "ms",
-        "us",
-        "min",
-        "h",
-        "d",
-        "v",
-        "mv",
-        "kv",
-        "a",
-        "ma",
-        "w",
-        "kw",
-        "hz",
-        "khz",
-        "k",
-        "c",
-        "f",
-        "degc",
-        "degf",
-        "degk",
-        "celsius",
-        "kelvin",
-        "percent",
-        "pct",
-        "pa",
-        "kpa",
-        "mpa",
-        "bar",
-        "mbar",
-        "psi",
-        "m",
-        "mm",
-        "cm",
-        "um",
-        "n",
-        "nm",
-        "kg",
-        "g",
-        "rpm",
-        "rad",
-        "deg",
-        "l",
-        "ml",
-        "sample",
-        "samples",
-    ]
-)
-_SYMBOLS = re.compile(r"[%°/²³^℃℉]")
 
 
 class OpenQuoteError(ValueError):
@@ -116,12 +63,27 @@ def separator_of(lines: Sequence[str]) -> str | None:
     sample = used[:_LOOKED_AT] + used[_LOOKED_AT:][-_LOOKED_AT:]
 
     def rank(mark: str | None) -> tuple[int, int]:
-        rows = [line.split(mark) for line in sample]
-        numbers = sum(is_plain(cell, comma=mark != ",") for row in rows if len(row) > 1 for cell in row)
+        rows = [_fields(line, mark) for line in sample]
+        numbers = sum(_tells(cell) for row in rows if len(row) > 1 for cell in row)
         return numbers, max(Counter(map(len, rows)).values(), default=0)
 
     best = max(_SEPARATORS, key=rank)
     return best if rank(best)[0] else next((m for m in "\t;" if used and m in used[0].strip()), ",")
+
+
+def _fields(line: str, mark: str | None) -> list[str]:
+    """The fields of a line, the marks in quotes left alone."""
+    if mark is None or '"' not in line:
+        return line.split(mark)
+    try:
+        return next(csv.reader([line], delimiter=mark))
+    except csv.Error:  # a field beyond all bounds
+        return line.split(mark)
+
+
+def _tells(cell: str) -> bool:
+    """Whether a cell is a number, with its unit or without, or a date."""
+    return is_plain(cell) or measured(cell) is not None
 
 
 def rows_of(text: str, separator: str | None) -> tuple[Rows, Passed]:
@@ -153,10 +115,10 @@ def _comment(row: Sequence[str], separator: str | None) -> str:
     if _ERRORS.fullmatch(first):
         return COMMENTED
     bare = [first.lstrip("#%/").strip(), *row[1:]]
-    if separator is not None and any(is_plain(cell, comma=separator != ",") for cell in bare[1:]):
+    if separator is not None and any(is_plain(cell) for cell in bare[1:]):
         return COMMENTED
     cells = re.split(r"[;,\t ]+", bare[0]) if len(bare) == 1 else [cell for cell in bare if cell.strip()]
-    return COMMENTED if len(cells) > 1 and all(is_plain(cell, comma=True) for cell in cells) else COMMENT
+    return COMMENTED if len(cells) > 1 and all(is_plain(cell) for cell in cells) else COMMENT
 
 
 def within(body: Rows, passed: Passed, separator: str | None) -> tuple[Rows, Passed]:
@@ -164,8 +126,7 @@ def within(body: Rows, passed: Passed, separator: str | None) -> tuple[Rows, Pas
 
     Blank lines between most rows are `SPACING`, which means nothing.
     """
-    comma = separator != ","
-    ends = [i for i, (_, row) in enumerate(body) if _of_numbers(row, comma)]
+    ends = [i for i, (_, row) in enumerate(body) if _of_numbers(row)]
     if not ends:
         return body, ()
     first, last = body[ends[0]][0], body[ends[-1]][0]
@@ -209,29 +170,28 @@ def _closed(lines: Sequence[str], separator: str) -> bool:
 
 def table_begins(rows: Rows, separator: str | None) -> int:
     """The row where the table begins, its names if it has any: loggers write other lines above it."""
-    comma = separator != ","
     sample = rows[:_LOOKED_AT] + rows[_LOOKED_AT:][-_LOOKED_AT:]
-    widths = Counter(len(row) for _, row in sample if _of_numbers(row, comma))
+    widths = Counter(len(row) for _, row in sample if _of_numbers(row))
     if not widths:
         return 0
     width = widths.most_common(1)[0][0]
     # Sheets fill every row up to the width of the table, with nothing.
     full = next((i for i, (_, row) in enumerate(sample) if len(row) == width and all(map(str.strip, row))), 0)
-    if 0 < full < _LOOKED_AT and _of_words(rows[full][1], width, comma):
+    if 0 < full < _LOOKED_AT and _of_words(rows[full][1], width):
         return full
-    first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and _of_numbers(row, comma))
+    first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and _of_numbers(row))
     if first < 2:
         return 0
-    names = [row for _, row in rows[first - 2 : first] if _of_words(row, width, comma)]
-    if not names or not _of_words(rows[first - 1][1], width, comma):
+    names = [row for _, row in rows[first - 2 : first] if _of_words(row, width)]
+    if not names or not _of_words(rows[first - 1][1], width):
         return first if any(len(row) != width for _, row in rows[:first]) else 0
-    both = len(names) == 2 and (first == 2 or all(map(_is_unit, names[1])))
+    both = len(names) == 2 and (first == 2 or all(map(is_unit, names[1])))
     return first - 2 if both else first - 1
 
 
-def _of_numbers(row: Sequence[str], comma: bool) -> bool:
+def _of_numbers(row: Sequence[str]) -> bool:
     filled = [cell for cell in row if cell.strip()]
-    plain = sum(is_plain(cell, comma=comma) for cell in filled)
+    plain = sum(map(_tells, filled))
     if not plain:  # not to be passed over: the reader of its columns says what is wrong with them
         return bool(filled) and all(map(_is_marked, filled))
     return len(filled) <= 2 * plain
@@ -241,22 +201,21 @@ def _is_marked(cell: str) -> bool:
     return _MARKED.fullmatch(cell.strip()) is not None
 
 
-def _of_words(row: Sequence[str], width: int, comma: bool) -> bool:
-    return len(row) == width and not any(is_plain(cell, comma=comma) for cell in row)
-
-
-def _is_unit(cell: str) -> bool:
-    bare = cell.strip().strip("()[]").lower()
-    return bare in _MISSING or bare in _UNITS or _SYMBOLS.search(bare) is not None
+def _of_words(row: Sequence[str], width: int) -> bool:
+    return len(row) == width and not any(is_plain(cell) for cell in row)
 
 
 def decimal_commas(rows: Rows, separator: str | None) -> bool:
-    """Whether numbers are written 1,5: some cell is, and none has a decimal point."""
-    if separator == ",":
+    """Whether numbers are written 1,5: some cell is, and none has a decimal point.
+
+    Between commas they stand in quotes, where 1,234 may be a thousand: then some cannot be.
+    """
+    looked_at = rows[1:] if separator == "," else rows[1 : _LOOKED_AT + 1]
+    cells = [cell.strip("% ") for _, row in looked_at for cell in row]
+    commas = [cell for cell in cells if is_comma(cell)]
+    if separator == "," and all(map(_THOUSAND.fullmatch, commas)):
         return False
-    cells = [cell.strip() for _, row in rows[1 : _LOOKED_AT + 1] for cell in row]
-    numbers = [cell for cell in cells if _COMMA.fullmatch(cell)]
-    return any("," in cell for cell in numbers) and not any(is_number(c) and "." in c for c in cells)
+    return bool(commas) and not any("." in cell and is_number(cell) for cell in cells)
 
 
 def headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
@@ -297,8 +256,8 @@ def between_thousands(cells: Sequence[str]) -> int | None:
 
 
 def with_point(cell: str) -> str:
-    """A cell that is a number with a decimal comma, with a point; others as they are."""
-    return cell.replace(",", ".") if _COMMA.fullmatch(cell.strip()) else cell
+    """A cell that is a number with a decimal comma (and perhaps in %), with a point; others as they are."""
+    return cell.replace(",", ".") if _COMMA.fullmatch(cell.strip("% ")) else cell
 
 
 def without_thousands(text: str) -> str | None:
@@ -312,25 +271,7 @@ def is_comma(cell: str) -> bool:
     return "," in cell and _COMMA.fullmatch(cell) is not None
 
 
-def is_plain(cell: str, *, comma: bool) -> bool:
-    """Whether a cell is a number, with a decimal comma where that may be, or a date."""
+def is_plain(cell: str) -> bool:
+    """Whether a cell is a number, with a decimal point or comma, or a date."""
     text = cell.strip()
-    return is_number(text) or (comma and _COMMA.fullmatch(text) is not None) or is_moment(text)
-
-
-def is_known(text: str) -> bool:
-    """Whether a cell is a number, or says that there is none."""
-    return is_number(text) or is_missing(text)
-
-
-def is_missing(text: str) -> bool:
-    """Whether a cell says that there is no number."""
-    return text.strip().lower() in _MISSING
-
-
-def is_number(text: str) -> bool:
-    """Whether a text is a finite number."""
-    try:
-        return math.isfinite(plain_number(text))
-    except ValueError:
-        return False
+    return is_number(text) or _COMMA.fullmatch(text) is not None or is_moment(text)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from inputdesign_cli.tasks.build.files.cells import is_number
 from inputdesign_cli.tasks.build.files.isolated import NOTHING, Arrays
-from inputdesign_cli.tasks.build.files.layout import is_number
 
 _SAMPLE_TIMES = ("ts", "sample_time", "dt")
 _UNITS = ("timeunit", "time_unit")

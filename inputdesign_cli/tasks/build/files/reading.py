@@ -10,12 +10,11 @@ from inputdesign_cli.tasks.build.files.arrays import read_mat, read_npz
 from inputdesign_cli.tasks.build.files.clocks import with_days
 from inputdesign_cli.tasks.build.files.decoding import decoded
 from inputdesign_cli.tasks.build.files.frames import EXCEL, PARQUET, read_parquet, read_workbook
+from inputdesign_cli.tasks.build.files.packed import check_unpacked
 from inputdesign_cli.tasks.build.files.sheet import Sheet, unreadable
 from inputdesign_cli.tasks.build.files.text import read_text
 
 _MOST_BYTES = 100 * 2**20
-# How the files of .xlsx and .ods, and of .xls begin.
-_SHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 
 
 def read_sheet(path: Path, *, key: str) -> Sheet:
@@ -38,17 +37,15 @@ def _read(path: Path, key: str) -> Sheet:
     raw = _bytes(path.with_name(file) if named else path, key)
     if len(raw) > _MOST_BYTES:
         raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
-    if kind == ".npz":
+    if kind == ".npz":  # an archive itself
         return read_npz(path, key, raw)
+    check_unpacked(path, key, raw, workbook=kind in EXCEL)
     if kind == ".mat":
         return read_mat(path, key, raw)
     if kind in PARQUET:
         return read_parquet(path, key, raw)
     if kind in EXCEL:
         return read_workbook(path, key, raw, named)
-    if raw.startswith(_SHEETS):
-        hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
-        raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
     return read_text(path, key, decoded(path, key, raw))
 
 

@@ -22,6 +22,7 @@ class Column:
     Dates and times are `dated`: seconds since the first; of times of a day without a date, `clock` is what
     the first counts from midnight. Of dates that cannot be read all or some are `undated`. What is `wrong`
     with a fault, and how to mend it, goes into messages; `told` is what was done to make times of a column.
+    `words` are the different texts of one that holds no number.
     """
 
     numbers: Array
@@ -30,11 +31,13 @@ class Column:
     wrong: str = "is not a finite number"
     hint: str = (
         "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands, one "
-        "row a line; dates as 2024-03-12 10:15:00"
+        "row a line; dates as 2024-03-12 10:15:00; leave a cell empty where there is no value, and write 1 "
+        "and 0 for ON and OFF"
     )
     clock: float | None = None
     undated: bool = False
     told: str = ""
+    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.tasks.build.files.cells import is_missing, is_number, measured, with_exponents
 from inputdesign_cli.tasks.build.files.dates import AS_DATES, moments_of, seems_moment
 from inputdesign_cli.tasks.build.files.layout import (
     COMMENTS,
@@ -23,8 +24,6 @@ from inputdesign_cli.tasks.build.files.layout import (
     decimal_commas,
     headed,
     is_comma,
-    is_missing,
-    is_number,
     rows_of,
     separator_of,
     table_begins,
@@ -33,6 +32,8 @@ from inputdesign_cli.tasks.build.files.layout import (
     without_thousands,
 )
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, unreadable
+
+FORMULA = "="
 
 
 def read_text(path: Path, key: str, text: str, separated_by: str | None = None) -> Sheet:
@@ -44,6 +45,7 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
+    text = with_exponents(text)
     lines = text.splitlines()
     comment, first = _leading_comment(lines)
     separator = separated_by or separator_of(lines[first:])
@@ -66,7 +68,10 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
     width = len(names) or max(len(row) for _, row in body)
-    columns = tuple(column_of([row[i] if i < len(row) else "" for _, row in body]) for i in range(width))
+    points = separator != "," or any("." in cell and is_number(cell) for _, row in body for cell in row)
+    columns = tuple(
+        column_of([row[i] if i < len(row) else "" for _, row in body], points=points) for i in range(width)
+    )
     mark = separator or " "
     sheet = Sheet(
         path,
@@ -103,8 +108,13 @@ def _leading_comment(lines: Sequence[str]) -> tuple[str, int]:
     return comment, len(lines)
 
 
-def column_of(cells: list[str]) -> Column:
-    """The numbers, or the dates and times, that cells say."""
+def column_of(cells: list[str], *, points: bool = True) -> Column:
+    """The numbers, or the dates and times, that cells say.
+
+    Args:
+        points: whether some cell of the table has a decimal point.
+    """
+    cells = _without_percent(cells)
     try:
         text = "".join(cells)
         if "_" in text or not text.isascii():  # what float takes, and is_number does not
@@ -117,9 +127,21 @@ def column_of(cells: list[str]) -> Column:
     fault = next(((int(i), cells[i].strip()) for i in unclear if not is_missing(cells[i])), None)
     if fault is not None and is_comma(fault[1]):
         wrong = "has a comma, and other cells have decimal points"
+        if not points:
+            wrong = "has a comma, which may be a decimal mark or stand between thousands"
         hint = (
-            f"if it is a decimal mark, write {fault[1].replace(',', '.')}; between thousands nothing stands"
+            f"if it is a decimal mark, write {fault[1].replace(',', '.')}, else {fault[1].replace(',', '')}: "
+            "between thousands nothing stands"
         )
+        return Column(numbers, fault, wrong=wrong, hint=hint)
+    if fault is not None and fault[1].startswith(FORMULA):
+        wrong = "is a formula, of which the file holds no value"
+        hint = "open the file in a spreadsheet program and save it: that writes the values"
+        return Column(numbers, fault, wrong=wrong, hint=hint)
+    both = measured(fault[1]) if fault is not None else None
+    if both is not None:
+        wrong = "has a unit beside its number"
+        hint = f"write {both[0]} alone, and the unit into the header, as in 'name ({both[1]})'"
         return Column(numbers, fault, wrong=wrong, hint=hint)
     plain = without_thousands(fault[1]) if fault is not None else None
     if plain is not None:
@@ -129,7 +151,19 @@ def column_of(cells: list[str]) -> Column:
     if thousand is not None:
         wrong = "may have a mark between thousands, or three decimals: other cells have none"
         return Column(numbers, (thousand, cells[thousand].strip()), wrong=wrong)
-    return Column(numbers, fault) if fault is None else _of_dates(cells, Column(numbers, fault))
+    if fault is None:
+        return Column(numbers)
+    written = {cell.strip() for cell in cells if not is_missing(cell)} if np.isnan(numbers).all() else set()
+    return _of_dates(cells, Column(numbers, fault, words=tuple(sorted(written))))
+
+
+def _without_percent(cells: list[str]) -> list[str]:
+    """The numbers of a column in per cent, where every one has the sign; else the cells as they are."""
+    if not any("%" in cell for cell in cells):
+        return cells
+    found = [("", "%") if is_missing(cell) else measured(cell) for cell in cells]
+    plain = [both[0] for both in found if both is not None and both[1] == "%"]
+    return plain if len(plain) == len(cells) else cells
 
 
 def _of_dates(cells: list[str], otherwise: Column) -> Column:
@@ -157,4 +191,5 @@ def _of_numbers(rows: Rows, columns: Sequence[Column]) -> bool:
     """Whether half of what the rows hold are numbers or dates: then messages may show it."""
     cells = [cell for _, row in rows for cell in row if cell.strip()]
     dates = len(rows) * sum(column.dated for column in columns)
-    return 2 * (sum(map(is_number, cells)) + dates) >= max(len(cells), 1)
+    numbers = sum(is_number(cell) or measured(cell) is not None for cell in cells)
+    return 2 * (numbers + dates) >= max(len(cells), 1)

@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 import scipy.io
+import scipy.sparse
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import isolated, read_sheet
@@ -134,3 +135,49 @@ def test_a_cell_of_a_workbook_that_is_no_number_is_told_with_its_row(tmp_path):
     with pytest.raises(DataError, match="'broken' in column y is not a finite number") as caught:
         columns_of(sheet, {"y": "y"})
     assert caught.value.diagnostics[0].location.line == 4
+
+
+def test_a_sparse_column_is_what_it_says(tmp_path):
+    path = tmp_path / "log.mat"
+    u = np.array([0.0, 3.0, 0.0, -1.5])
+    for kept in (u[:, None], np.column_stack([u, 2 * u])):
+        scipy.io.savemat(path, {"u": scipy.sparse.csc_matrix(kept), "y": Y})
+        name = "u" if kept.shape[1] == 1 else "u1"
+        np.testing.assert_array_equal(read_columns(path, {"u": name}, key="")["u"], u)
+
+
+def test_a_sparse_matrix_that_is_too_large_is_told_as_such(tmp_path):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"u": scipy.sparse.csc_matrix(([1.0], ([0], [0])), shape=(10**6, 100)), "y": Y})
+    with pytest.raises(DataError, match=r"u in log\.mat holds a sparse matrix too large") as caught:
+        read_columns(path, {"u": "u"}, key="")
+    assert "full(u)" in caught.value.diagnostics[0].message
+
+
+def test_a_sparse_matrix_of_scipy_has_no_name(tmp_path):
+    path = tmp_path / "log.npz"
+    scipy.sparse.save_npz(path, scipy.sparse.csc_matrix(U[:, None]))
+    with pytest.raises(DataError, match="holds a sparse matrix") as caught:
+        read_sheet(path, key="")
+    assert "u=A.toarray()" in caught.value.diagnostics[0].hint
+
+
+@pytest.mark.parametrize("columns", [("y",), ("u", "y"), ("time", "u", "y")])
+def test_formulas_without_values_are_told_as_such(columns, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    book = openpyxl.Workbook()
+    book.active.append(["time", "u", "y"])
+    for k, row in enumerate(ROWS):
+        book.active.append(
+            [
+                f"=A{k + 9}*2" if name in columns else x
+                for name, x in zip(("time", "u", "y"), row, strict=True)
+            ]
+        )
+    book.save(path)
+    with pytest.raises(DataError, match="is a formula, of which the file holds no value") as caught:
+        columns_of(read_sheet(path, key=""), {"y": "y"})
+    (told,) = caught.value.diagnostics
+    assert told.location.line == 2
+    assert "open the file in a spreadsheet program and save it" in told.hint
