@@ -54,6 +54,10 @@ class ResponseLines:
             return replace(self, G=G)
         return replace(self, G=G, admitted=np.where(np.isinf(self.admitted), np.inf, self.share * np.abs(G)))
 
+    def where(self, kept: NDArray[np.bool_]) -> ResponseLines:
+        """Only the lines that are kept (L,)."""
+        return replace(self, G=self.G[kept], noise=self.noise[kept], admitted=self.admitted[kept])
+
     def needed(self, samples: int) -> NDArray[np.float64]:
         """(L, r): the least powers with which deviations over so many samples are those admitted."""
         return np.asarray(np.max(2.0 * self.noise[:, :, None] / self.admitted**2, axis=1) / samples)

@@ -7,6 +7,7 @@ the excitation, so that no line tells it; it is estimated by what a cubic does t
 y = x + c x^3 and E x^2 = s the gain is 1 + 3 c s, and what is left of c x^3 has the mean square 6 c^2 s^3:
 the square of the relative change is 9/6 of the share that is left of the power of x. A third of what is left
 is beyond the highest line (three times the band), so that the share that is seen counts 9/6 times 3/2.
+Signals of low peaks leave less for the same change of the gain: see `cubes`.
 """
 
 from __future__ import annotations

@@ -9,11 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _EXCITED = 1e-6
+# Where less of the inputs differs from period to period, what differs is noise, and lines that are no more
+# than it are not excited; where more differs, they do not repeat as such.
+_REPEAT = 0.1
+_SURE = 0.99
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,38 @@ def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
     size = size[: (periods.period + 1) // 2]
     size[0] = 0.0
     return np.flatnonzero(size > _EXCITED * size.max(initial=0.0))
+
+
+def differing(u: Array, periods: Periods, *, repeats: int = 1) -> float:
+    """The share of the power of inputs (N, r) that differs over periods, and over records in sequence."""
+    lines = np.stack([periods.transforms(one) for one in np.split(u, repeats)])[..., 1:, :]
+    # Over records and periods, which differ by noise alone.
+    other = float(np.sum(np.abs(lines - lines.mean(axis=(0, 2), keepdims=True)) ** 2))
+    return other / max(float(np.sum(np.abs(lines) ** 2)), 1e-300)
+
+
+def excited_lines(
+    u: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
+) -> NDArray[np.bool_]:
+    """(L,): whether inputs (N, r) have more at harmonics than rounding, or noise, leaves of the others.
+
+    Args:
+        repeats: how many records of equal length with the same input follow each other.
+    """
+    U = np.concatenate([periods.transforms(one) for one in np.split(u, repeats)], axis=1)
+    mean = np.moveaxis(U.mean(axis=1), 0, -1)  # (harmonics, r, blocks)
+    size = np.sqrt(np.mean(np.abs(mean[1:]) ** 2, axis=(0, 2)))
+    if np.any(size <= _EXCITED**2 * np.abs(u).max(axis=0)):
+        return np.zeros(harmonics.size, dtype=np.bool_)
+    singular = np.linalg.svd(mean / size[:, None], compute_uv=False)
+    excited = singular[harmonics, -1] > _EXCITED * singular[1:, 0].max()
+    kept, freedom = U.shape[1], periods.blocks * (U.shape[1] - 1)
+    if differing(u, periods, repeats=repeats) <= _REPEAT:
+        power = kept * np.mean(np.abs(mean[harmonics]) ** 2, axis=2)
+        scatter = np.sum(np.abs(U - U.mean(axis=1, keepdims=True)) ** 2, axis=(0, 1))[harmonics] / freedom
+        beyond = float(scipy.special.fdtri(2 * periods.blocks, 2 * freedom, _SURE))
+        excited &= np.all(power > beyond * scatter, axis=1)
+    return np.asarray(excited)
 
 
 def response_at(U: ComplexArray, Y: ComplexArray) -> ComplexArray:

@@ -114,8 +114,9 @@ def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
     """How the lines of a frequency response are measured, and how well."""
     counted = found["periods"] - found["transient"]
     blocks = "" if found["blocks"] == 1 else f" in each of {found['blocks']} blocks"
+    of = f"of {found['asked']} " if found.get("asked", found["lines"]) > found["lines"] else ""
     text = (
-        f"{found['lines']} lines, {counted} of {found['periods']} periods of {found['period']} samples "
+        f"{found['lines']} {of}lines, {counted} of {found['periods']} periods of {found['period']} samples "
         f"count{blocks}; standard deviations at most {found['worst_ratio']:.6g} of those admitted"
     )
     return "response", text, f"worst at {found['worst_frequency']:.4g} rad/{time_unit}"

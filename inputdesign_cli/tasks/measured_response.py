@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
-from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
+from inputdesign_cli.identification.periodic_response import (
+    PeriodicResponse,
+    Periods,
+    differing,
+    excited_lines,
+    periodic_response,
+)
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -24,15 +31,13 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.response import ResponseTask
-from inputdesign_cli.tasks.result.measured_response import Judged, measured_results
+from inputdesign_cli.tasks.result.measured_response import REMEDY, UNLIKE, Judged, measured_results, unexcited
 from inputdesign_cli.tasks.result.responses import response_of_data
-from inputdesign_cli.tasks.result.silent_lines import distorted
+from inputdesign_cli.tasks.result.silent_lines import Distorted, distorted
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
 _SURE = 0.95
-# Inputs of which more than this differs from period to period do not repeat, in a loop with noise either.
-_UNLIKE = 0.5
 
 
 @dataclass(frozen=True)
@@ -77,21 +82,24 @@ def measure(
             )
     else:
         periods, repeats = _periods(task, data, paths[0].name)
-        by_lines = periodic_response(data.u, data.y, periods, task.grid.excited, repeats=repeats)
-        if by_lines is None:
+        excited = excited_lines(data.u, periods, task.grid.excited, repeats=repeats)
+        missing = unexcited(question.header, task.grid.frequencies, excited)
+        by_lines = periodic_response(data.u, data.y, periods, task.grid.excited[excited], repeats=repeats)
+        if by_lines is None or (assess and missing):
             raise DataError.because(
                 "not-exciting",
-                f"the inputs in {paths[0].name} do not excite all lines of the spec, or not apart",
-                hint="apply the signal.csv of the spec, and record u as it was applied",
+                f"{paths[0].name}: {missing or 'the inputs cannot be told apart at the lines of the spec'}",
+                hint=REMEDY,
             )
         found = of_periods(by_lines, periods.period)
-        judged = _judged(task, by_lines, data, periods, repeats)
+        judged = _judged(task, by_lines, data, periods, repeats, excited)
         silent = _silent(task, data, periods, repeats)
         if "odd" in silent:
-            kept = repeats * periods.kept(data.lengths[0])
-            error = response_error(by_lines, periods.period, kept, silent["odd"], task.grid.odd)
-            judged = replace(judged, distorted=distorted(silent, judged.lines.ratios(error)))
-        data = replace(data, notes=(*data.notes, *_seen(data, periods, repeats)))
+            judged = replace(
+                judged, distorted=_distorted(question.model, task, by_lines, data, judged, silent)
+            )
+        lacking = [f"{missing}: {REMEDY}"] if missing else []
+        data = replace(data, notes=(*data.notes, *lacking, *_seen(data, periods, judged.differing)))
     shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
     results = measured_results(
         question.header, found, shown, judged, silent, data, time.perf_counter() - started, assess=assess
@@ -126,7 +134,7 @@ def _periods(task: ResponseTask, data: Data, name: str) -> tuple[Periods, int]:
     return stated, len(data.lengths)
 
 
-def _seen(data: Data, periods: Periods, repeats: int) -> list[str]:
+def _seen(data: Data, periods: Periods, share: float) -> list[str]:
     """What is left out of the records, and whether the inputs repeat at all."""
     told, samples = [], data.lengths[0]
     left = samples - periods.each(samples) * periods.blocks * periods.period
@@ -135,11 +143,7 @@ def _seen(data: Data, periods: Periods, repeats: int) -> list[str]:
             f"the first {left} of {samples} samples are left out: the others are whole periods of "
             f"{periods.period}"
         )
-    lines = np.stack([periods.transforms(one) for one in np.split(data.u, repeats)])[..., 1:, :]
-    # Over records and periods, which differ by noise alone.
-    other = float(np.sum(np.abs(lines - lines.mean(axis=(0, 2), keepdims=True)) ** 2))
-    share = other / max(float(np.sum(np.abs(lines) ** 2)), 1e-300)
-    if share > _UNLIKE:
+    if share > UNLIKE:
         told.append(
             f"{100.0 * share:.3g} % of the power of the inputs differs from period to period of "
             f"{periods.period} samples: they do not repeat as the spec says; was its signal.csv applied, and "
@@ -149,12 +153,20 @@ def _seen(data: Data, periods: Periods, repeats: int) -> list[str]:
 
 
 def _judged(
-    task: ResponseTask, found: PeriodicResponse, data: Data, periods: Periods, repeats: int
+    task: ResponseTask,
+    found: PeriodicResponse,
+    data: Data,
+    periods: Periods,
+    repeats: int,
+    excited: NDArray[np.bool_],
 ) -> Judged:
     """The deviations of the data against r_adm at the measured G, with noise averaged along the lines.
 
     The scatter of a few periods tells the noise of one line badly: what it is over the noise of the spec is
     averaged over neighbouring lines.
+
+    Args:
+        excited: (L,) lines of the task that were found.
     """
     if np.any(found.noise <= 0.0):
         raise DataError.because(
@@ -162,7 +174,7 @@ def _judged(
             "the periods do not differ at all, so that they tell nothing of the noise",
             hint="give records of a real plant, not of one period that was repeated",
         )
-    lines = task.lines.at(found.G)
+    lines = task.lines.where(excited).at(found.G)
     counted = repeats * periods.blocks * periods.kept(data.lengths[0]) * periods.period
     expected = found.deviation * np.sqrt(lines.noise / found.noise)[:, :, None]
     window = min(max(-(-_FREEDOM // found.freedom), 1), len(found.harmonics))
@@ -176,11 +188,21 @@ def _judged(
         for p in (1.0 - rare, rare)
     )
     # Where r_adm is a share of |G|, it is known as well as |G| is.
-    away = -scipy.special.ndtri(0.25 * (1.0 - _SURE) / smooth.size) * smooth * np.sqrt(0.5)
+    far = -float(scipy.special.ndtri(0.25 * (1.0 - _SURE) / smooth.size)) * np.sqrt(0.5)
+    away = far * smooth
     at_least = lines.at(np.maximum(np.abs(found.G) - away, 1e-9 * away))
     at_most = lines.at(np.abs(found.G) + away)
     return Judged(
-        grid=task.grid,
+        grid=replace(task.grid, excited=found.harmonics),
+        asked=excited.size,
+        differing=differing(data.u, periods, repeats=repeats),
+        # Sizes are less by `far` deviations at most, and noise comes out anew, in these data and in those.
+        times=float(
+            np.max(lines.ratios(smooth))
+            * (high + far * (lines.share or 0.0))
+            * (1.0 + scipy.special.ndtri(_SURE) / np.sqrt(freedom))
+        )
+        ** 2,
         periods=periods,
         lines=lines,
         expected=expected,
@@ -209,6 +231,29 @@ def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> d
         if lines is not None:
             found[kind] = lines
     return found
+
+
+def _distorted(
+    model: Model,
+    task: ResponseTask,
+    found: PeriodicResponse,
+    data: Data,
+    judged: Judged,
+    silent: Mapping[str, SilentLines],
+) -> Distorted | None:
+    """What a nonlinearity of odd degree changes of the response, by power at silent lines and by cubes."""
+    odd, periods, repeats = task.grid.odd, judged.periods, len(data.lengths)
+    kept = repeats * periods.kept(data.lengths[0])
+    error = response_error(found, periods.period, kept, silent["odd"], odd)
+    nominal = tuple(model.plant_at(task.grid.at(lines)) for lines in (found.harmonics, odd))
+    shape = _between(task.grid.at(odd), task.grid.frequencies, task.lines.noise)
+    cube = cubes(found, data.u, data.y, periods, odd, (nominal[0], nominal[1]), shape, repeats=repeats)
+    return distorted(
+        silent,
+        judged.lines.ratios(error),
+        cube,
+        lambda outputs: judged.lines.ratios(cube.error * outputs[:, None]),
+    )
 
 
 def _between(w: Array, lines: Array, values: Array) -> Array:

@@ -92,7 +92,9 @@ def verdicts(admitted, number):
         _, _, y = recorded_again(spec, u, seed)
         data = data_of(u, y)
         by_lines = periodic_response(u, y, task.periods, task.grid.excited)
-        found.append(_judged(task, by_lines, data, task.periods, 1).verdict)
+        found.append(
+            _judged(task, by_lines, data, task.periods, 1, np.ones(len(by_lines.G), dtype=bool)).verdict
+        )
     return found
 
 
@@ -261,3 +263,29 @@ def test_a_nonlinearity_that_changes_little_is_told_and_met(write, shipped):
     odd = found.results.result["frequency_response"]["nonlinearity"]["odd"]
     assert 0.3 * changed(question, u, answer) < odd["worst_ratio"] < 0.5
     assert any("is small" in note for note in found.results.result["notes"])
+
+
+OPTIMISED = """
+plant: {F: [1, -0.94], B: [0, 0, 0, 0.12]}
+noise: {D: [1, -0.8], variance: 0.01}
+experiment: {samples: 5010}
+accuracy: {frequency_response: {relative: 0.05, band: [0.02, 2.0], lines: 60, detection: 4}}
+signal: {periods: 5, phases: optimised}
+"""
+
+
+def test_of_optimised_phases_the_change_is_told_as_large_as_it_is(write):
+    spec = parse_spec(OPTIMISED)
+    question, u = build_measurement(spec), np.tile(solve(spec).signal[:1002], (16, 1))
+    answer = through(question, u + 0.001 * u**3)
+    scale = 2.5 / changed(question, u, answer)
+    answer = through(question, u + 0.001 * scale * u**3)
+    assert changed(question, u, answer) == pytest.approx(2.5, rel=0.02)
+    told = []
+    for seed in range(5):
+        found = assess(spec, write(table(u, answer + recorded_noise(question, u, seed))))
+        assert found.verdict == "undecided"
+        odd = found.results.result["frequency_response"]["nonlinearity"]["odd"]
+        assert odd["cubed"] == "u1"
+        told.append(odd["worst_ratio"])
+    assert np.median(told) == pytest.approx(2.5, rel=0.3)

@@ -17,10 +17,14 @@ from inputdesign_cli.runs.curves import Curves, DeviationCurves, DeviationPanel,
 from inputdesign_cli.runs.results import Array, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.result.silent_lines import MATTERS, Distorted, silent_entry, silent_notes
 
 Verdict = Literal["met", "missed", "undecided"]
+REMEDY = "apply the signal.csv of the spec, and record u as it was applied; or is this the record of another?"
+UNLIKE = 0.5
+"""Inputs of which more than this differs from period to period do not repeat, in a loop with noise either."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,9 @@ class Judged:
         ratios: (L,) of the latter over r_adm, the largest entry.
         least, largest: (L,), between which the true ratios lie, with 95 % all of them.
         counted: samples that count.
+        asked: how many lines the spec has, of which these are those that the inputs excite.
+        differing: the share of the power of the inputs that differs from period to period.
+        times: with so many times the periods a verdict would be met, by the same plant and noise.
         distorted: what a nonlinearity does to the response; None where none is seen, or none is watched for.
     """
 
@@ -44,6 +51,9 @@ class Judged:
     least: Array
     largest: Array
     counted: int
+    asked: int
+    differing: float
+    times: float
     distorted: Distorted | None = None
 
     @property
@@ -94,6 +104,7 @@ def measured_results(
         w = judged.grid.frequencies / units.frequency
         entry |= {
             "lines": int(w.size),
+            "asked": judged.asked,
             "period": judged.periods.period,
             "periods": judged.periods.each(data.lengths[0]),
             "records": len(data.lengths),
@@ -110,8 +121,7 @@ def measured_results(
         entry["nonlinearity"] = silent_entry(silent)
         notes += silent_notes(silent)
         if judged is not None and judged.distorted is not None:
-            found_at = {"worst_ratio": judged.distorted.share, "frequency": float(w[judged.distorted.line])}
-            entry["nonlinearity"]["odd"] |= found_at
+            entry["nonlinearity"]["odd"] |= _odd(judged.distorted, w)
             # As the reason of a verdict it stands among the notes anyway.
             if not (assess and judged.verdict == "undecided" and judged.doubted):
                 notes.append(_of_nonlinearity(header, judged.distorted, w))
@@ -152,12 +162,11 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
         "met": verdict == "met",
         "requirements": [{"name": "frequency_response", "worst_ratio": ratio, "frequency": float(w[worst])}],
     }
-    times = high**2
     causes, reasons = list[str](), list[str]()
     if high > 1.0:
-        counted = int(np.ceil(times * judged.counted / judged.grid.period))
-        entry["periods"] = counted
-        enough = f"about {counted} periods that count would do"
+        counted = periods_needed(judged)
+        entry |= {} if counted is None else {"periods": counted}
+        enough = _enough(judged, counted)
         if verdict == "undecided":
             causes.append("chance")
             reasons.append(
@@ -166,7 +175,7 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
                 f"behind that: {enough}"
             )
         else:
-            entry["no_top_up"] = f"repeat the record: {enough}"
+            entry["no_top_up"] = enough if counted is None else f"repeat the record: {enough}"
     if verdict == "undecided":
         if judged.distorted is not None and judged.distorted.matters:
             causes.append("nonlinearity")
@@ -175,14 +184,52 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
     return entry
 
 
+def periods_needed(judged: Judged) -> int | None:
+    """How many periods (of each block) would have to count; None where that is no remedy."""
+    blocks, period = judged.periods.blocks, judged.grid.period
+    samples = judged.times * judged.counted
+    # Of inputs that do not repeat the mean of the periods falls as the noise does.
+    if judged.differing > UNLIKE or samples > most("signal.samples"):
+        return None
+    return int(np.ceil(samples / (blocks * period)))
+
+
+def _enough(judged: Judged, counted: int | None) -> str:
+    """How many periods would do, or what to do where more of them would not."""
+    if counted is not None:
+        blocks = "" if judged.periods.blocks == 1 else f" in each of {judged.periods.blocks} blocks"
+        return f"about {counted} periods that count{blocks} would do"
+    why = "do not repeat" if judged.differing > UNLIKE else "are so weak at some lines"
+    return f"more periods of this signal are no remedy, as the inputs {why}: {REMEDY}"
+
+
+def unexcited(header: Header, frequencies: Array, excited: NDArray[np.bool_]) -> str:
+    """How many lines (L,), in rad/sample, the data do not excite, and the first of them; or nothing."""
+    lacking = frequencies[~excited] / header.units.frequency
+    if not lacking.size:
+        return ""
+    first = f"{lacking[0]:.4g} {header.units.per_time}"
+    return (
+        f"{lacking.size} of {excited.size} lines of the spec, the first at {first}, have no more of the "
+        "inputs than rounding or noise leaves: the response is not measured there"
+    )
+
+
+def _odd(distorted: Distorted, w: Array) -> dict[str, Json]:
+    """What `nonlinearity.odd` of the result says of the response."""
+    cubed = {"cubed": distorted.cubed} if distorted.cubed else {}
+    return {"worst_ratio": distorted.share, "frequency": float(w[distorted.line]), **cubed}
+
+
 def _of_nonlinearity(header: Header, distorted: Distorted, w: Array) -> str:
     """What a nonlinearity of odd degree does to the response, and what to do."""
     share = f"{distorted.share:.2g} of what is admitted, at {w[distorted.line]:.3g} {header.units.per_time}"
     if not distorted.matters:
         return f"what a nonlinearity of odd degree changes of the response is small: about {share}"
+    kind = f"the cube of {distorted.cubed}" if distorted.cubed else "a nonlinearity, or a drift"
     return (
-        "odd lines that are not excited tell of a nonlinearity, or a drift (probability of chance "
-        f"{distorted.probability:.2g}), that changes the response by about {share}; from {MATTERS:g} on that "
-        "is not called met. More periods do not help: measure at a smaller amplitude, and see whether the "
-        "response stays"
+        f"odd lines that are not excited tell of {kind} (probability of chance "
+        f"{distorted.probability:.2g}), that changes the response by about {share}; from {MATTERS:g} on "
+        "that is not called met. More periods do not help: measure at a smaller amplitude, and see whether "
+        "the response stays"
     )

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.identification.cubes import Cubes
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.runs.results import Array, Json
 
 # Silent lines speak where the smallest probability, times how many there are, is below this.
 _SPEAKS = 0.01
 # Less is enough to doubt a response that a nonlinearity would change by much: the odd lines, by themselves.
-_DOUBT = 0.04
+_DOUBT = 0.05
+# By their power, and by how much they are like a cube.
+_WAYS = 2
 MATTERS = 0.5
 """From this share of what is admitted on, a quarter in mean square, a nonlinearity leaves a verdict open."""
 
@@ -25,11 +28,13 @@ class Distorted:
     Attributes:
         line: at which that is.
         probability: that noise alone has as much at the silent lines.
+        cubed: what the silent lines have the cube of, such as u1; empty where their power alone tells.
     """
 
     share: float
     line: int
     probability: float
+    cubed: str
 
     @property
     def matters(self) -> bool:
@@ -37,13 +42,33 @@ class Distorted:
         return self.share >= MATTERS
 
 
-def distorted(silent: Mapping[str, SilentLines], shares: Array) -> Distorted | None:
-    """From the error of G over what is admitted (L,); None where odd lines have what noise has."""
-    line, odd = int(np.argmax(shares)), silent["odd"].probability
-    chance = min(float(odd.min()) * odd.size, 1.0)
-    found = Distorted(float(shares[line]), line, chance)
-    seen = chance < _DOUBT if found.matters else _chance(silent, "odd") < _SPEAKS
-    return found if seen else None
+def distorted(
+    silent: Mapping[str, SilentLines], shares: Array, cube: Cubes, of_cube: Callable[[Array], Array]
+) -> Distorted | None:
+    """From the error of G over what is admitted (L,); None where odd lines have what noise has.
+
+    Args:
+        shares: by the power at silent lines.
+        of_cube: those by the cubes of outputs with a one (p,).
+    """
+    power, like = (_ofany(probability) for probability in (silent["odd"].probability, cube.probability))
+    alike = _WAYS * cube.probability.size * cube.probability < _DOUBT
+    cubed = of_cube(alike.astype(float))
+    both = np.maximum(np.where(power < _DOUBT, shares, 0.0), cubed) if alike.any() else shares
+    line = int(np.argmax(both))
+    told = ""
+    if cubed[line] > 0.0 and cubed[line] >= both[line]:
+        output = int(np.argmin(cube.probability))
+        source = int(cube.source[output])
+        told = f"y{output + 1}" if source < 0 else f"u{source + 1}"
+    found = Distorted(float(both[line]), line, min(power, like), told)
+    small = min(_chance(silent, "odd"), like) < _SPEAKS
+    return found if (min(power, like) < _DOUBT if found.matters else small) else None
+
+
+def _ofany(probability: Array) -> float:
+    """That noise alone has as much at any output, in either way to look."""
+    return min(_WAYS * float(probability.min()) * probability.size, 1.0)
 
 
 def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:
