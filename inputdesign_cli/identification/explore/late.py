@@ -12,6 +12,8 @@ from inputdesign_cli.plant.polynomial import Array
 _ORDER = 20
 # The probability of a correlation as large by chance, at all lags together.
 _CERTAIN = 1e-6
+# Inputs that move together, or again and again in the same way, are also answered late by half of the best.
+_CLEARLY = 2.0
 
 
 def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
@@ -40,7 +42,8 @@ def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
         sizes = [np.sqrt(np.mean(np.concatenate(x)[:, i] ** 2)) for x, i in ((u, j), (y, 0))]
         z = np.abs(together) / np.maximum(np.sqrt(pairs) * sizes[0] * sizes[1], 1e-300)
         best = int(np.argmax(z))
-        found.append(best if best > most and z[best] > certain else 0)
+        nearer = float(np.max(z[: most + 1]))
+        found.append(best if best > most and z[best] > max(certain, _CLEARLY * nearer) else 0)
     return tuple(found)
 
 
