@@ -16,10 +16,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import past
 from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
+# Of longer records the stretch in which the inputs move most is enough.
+_MOST_SAMPLES = 4000
 _CERTAIN = 1e-4
 # A sample before a relay switches the noise has not made it do so: at this level that is seen as well.
 _ALSO = 0.003
@@ -53,7 +56,7 @@ def switched_by(parts: Parts, j: int) -> float:
 def early_answers(parts: Parts) -> list[Early]:
     """Outputs that know of jumps of an input before these are logged, as their plant answers them."""
     inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
-    found = []
+    parts, found = busiest(parts, _MOST_SAMPLES), []
     for j in range(inputs):
         for i in range(outputs):
             answers = _answers(parts, j, i)
