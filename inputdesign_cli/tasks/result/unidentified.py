@@ -23,8 +23,10 @@ def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[s
     """
     needed = max(candidate.orders.unknowns for candidate in found.taken)
     order, told = order_of_excitation(moving), []
-    if order < needed <= min(
-        order_of_excitation([(u[:, [j]], y) for u, y in moving]) for j in range(len(found.moving))
+    if (
+        order
+        < needed
+        <= min(order_of_excitation([(u[:, [j]], y) for u, y in moving]) for j in range(len(found.moving)))
     ):
         told.append(
             "the inputs move together: each of them moves enough by itself, and some combination of them and "
