@@ -61,8 +61,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
             if not undriven:
                 raise
             raise bad_spec("no-structure", undriven[0], hint=DRIVE, key="u") from error
-    log = without_drift(log, found)
     reasons = distrusted(log, found, undriven, loop=bool(loops))
+    log = without_drift(log, found)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))

@@ -83,12 +83,12 @@ def test_a_level_of_the_input_is_no_part_of_the_cube():
     assert both[1] == pytest.approx(both[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_of_noise_alone_the_probability_is_not_small_too_often():
+    """0.1 where the two cubes were independent, less as they are not."""
     y = plant(np.tile(low_peaks(), TIMES))
     found = np.array([measured(y, 100 + seed).probability[0] for seed in range(200)])
-    assert (
-        0.02 < np.mean(found < 0.1) < 0.14
-    )  # 0.1 where the two cubes were independent, less as they are not
+    assert 0.02 < np.mean(found < 0.1) < 0.14
 
 
 def test_which_of_two_inputs_is_cubed_is_told():

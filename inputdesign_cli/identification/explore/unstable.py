@@ -1,4 +1,4 @@
-"""Whether the plant in a loop is unstable: a pole of an ARX model that the samples put outside the circle."""
+"""Whether the plant is unstable, and so in a loop: a pole that the samples put outside the circle."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from inputdesign_cli.plant.polynomial import Array
 _HIGHEST = 5
 # So many standard deviations beyond the circle, and steps of one by which it is told how a pole moves.
 _BEYOND, _STEP = 5.0, 0.01
+# What would grow by less over the whole record may be drift, or several integrators, without a loop.
+_GROWN = 1e4
 _DEPENDENT = 1e-9
 
 
@@ -50,7 +52,8 @@ def unstable_pole(parts: Parts, output: int) -> UnstablePole | None:
     radius = _radius(theta, n)
     slopes = [(_radius(theta + _STEP * direction, n) - radius) / _STEP for direction in spread]
     deviation = float(np.linalg.norm(slopes))
-    if not radius > 1.0 + _BEYOND * deviation:
+    samples = sum(len(y) for _, y in long)
+    if not radius > max(1.0 + _BEYOND * deviation, _GROWN ** (1.0 / samples)):
         return None
     return UnstablePole(radius, deviation)
 

@@ -40,7 +40,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         undriven: see `undriven_inputs`.
         loop: whether inputs answer the outputs.
     """
-    unstable = _unstable(log) if loop else ()
+    unstable = _unstable(log)
     if unstable:  # what stable models say of such a plant is wrong
         return unstable
     moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
@@ -142,7 +142,7 @@ def _early(log: Log) -> tuple[str, ...]:
 
 
 def _unstable(log: Log) -> tuple[str, ...]:
-    """Outputs of a plant in a loop that is unstable."""
+    """Outputs of a plant that is unstable, and goes on only as it is in a loop."""
     outputs = log.y.shape[1]
     poles = [(i, unstable_pole(log.parts, i)) for i in range(outputs)]
     return tuple(
