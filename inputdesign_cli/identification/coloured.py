@@ -14,7 +14,6 @@ from functools import cached_property, partial, reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.extensions import Extension, late_echo
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
@@ -23,6 +22,7 @@ from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.identification.start import Start, density, differences, noise_before
 from inputdesign_cli.identification.starts import noise_polynomials
+from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import Coloured
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array

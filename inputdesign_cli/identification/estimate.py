@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.adequacy import Echoes, ScoreTest, failed, score_tests
+from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
 from inputdesign_cli.identification.one_system import of_one_system
@@ -21,6 +21,7 @@ from inputdesign_cli.identification.repeated import Repetition, repetition
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
 from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
+from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant.polynomial import Array
 
 # Parameters this share apart are the same to rounding.

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.adequacy import Echo, Fault
+from inputdesign_cli.identification.adequacy import Fault
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
 from inputdesign_cli.identification.records import Record, Records, shifted
+from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import DELAY, Listed

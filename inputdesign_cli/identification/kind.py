@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import (
@@ -25,6 +24,7 @@ from inputdesign_cli.identification.record_problem import RecordProblem, evaluat
 from inputdesign_cli.identification.records import Record, Records, centred, longest, split
 from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.variations import variations
+from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant.polynomial import Array
 
 Part = tuple[Array, Array]

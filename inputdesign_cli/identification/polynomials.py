@@ -14,7 +14,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.extensions import Extension, echo_of, larger_polynomials, new_name
@@ -27,6 +26,7 @@ from inputdesign_cli.identification.problem import PredictionErrors, inverses
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 

@@ -15,7 +15,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.adequacy import Echo, Echoes
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
@@ -23,6 +22,7 @@ from inputdesign_cli.identification.record_problem import Point, evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.start import Start
+from inputdesign_cli.identification.white import Echo, Echoes
 from inputdesign_cli.plant import Parametrisation, Reparametrised
 from inputdesign_cli.plant.polynomial import Array
 

@@ -10,7 +10,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Part, Starts
 from inputdesign_cli.identification.of_model import OfModel
@@ -18,6 +17,7 @@ from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.start import Start, differences
 from inputdesign_cli.identification.transfer_record import late_samples
+from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array

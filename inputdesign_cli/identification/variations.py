@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.adequacy import Echo, Fault
+from inputdesign_cli.identification.adequacy import Fault
 from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 

@@ -9,7 +9,8 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import identify
-from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, White, failed
+from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, failed
+from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx, two_by_two

@@ -40,7 +40,7 @@ def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
         u[t] = 2.0 * (r[t] - y[t])
     log = stored(tmp_path / "log.csv", u, y)
     (told,) = explore(log).reasons
-    assert told.startswith("the plant is unstable: it has a pole at 1.")
+    assert told.startswith("the plant of y is unstable: it has a pole at a radius of 1.")
     plant, noise = re.search(r"plant: (\{.*?\}), noise: (\{.*?\}),", told).groups()
     loop = "experiment: {controller: {numerator: [2], denominator: [1]}}"
     found = identify(parse_spec(f"plant: {plant}\nnoise: {noise}\n{loop}\n", design=False), log).result

@@ -305,3 +305,20 @@ signal: {candidates: 1, seed: 1}
     least, most = (worst - (1.645 + side * own) * deviation for side in (1, -1))
     assert worst / most < found["estimates"]["largest"] < worst / least
     assert "estimates" not in solved(text, "uncertainty.fresh=0")["robust"]
+
+
+def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
+    """Also where the experiment tells one of them nothing: a plant without its input."""
+    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 20}}"
+    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    (batch,) = done.plants.afresh()
+    alone = [tried_on(done.design, 500, batch.only([place]))[0].kept for place in range(20)]
+    together = [one.kept for one in tried_on(done.design, 500, batch)]
+    assert [one.share for one in together] == pytest.approx([one.share for one in alone], rel=1e-9)
+    model = batch.plants[3].experiment.model
+    gone = model.at(np.where(np.array(model.names) == "b1", 1e-200, model.theta))
+    plants = list(batch.plants)
+    plants[3] = replace(plants[3], experiment=replace(plants[3].experiment, model=gone))
+    shares = [one.kept.share for one in tried_on(done.design, 500, replace(batch, plants=tuple(plants)))]
+    assert shares[3] == np.inf
+    assert np.delete(shares, 3) == pytest.approx([one.share for one in np.delete(alone, 3)], rel=1e-9)

@@ -45,10 +45,15 @@ def past(signal: Array, lags: int) -> Array:
     return np.stack(shifted, axis=1).reshape(len(signal) - lags, -1)
 
 
+def untold(rows: Sequence[Array], targets: Sequence[Array]) -> list[Array]:
+    """What regressors (n, m) of every part, of the same coefficients, leave of its targets (n,), (n, p)."""
+    solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(targets), rcond=1e-10)[0]
+    return [target - own @ solution for own, target in zip(rows, targets, strict=True)]
+
+
 def left_over(columns: Array, target: Array) -> float:
     """The sum of squares that a regression leaves."""
-    solution = np.linalg.lstsq(columns, target, rcond=1e-10)[0]
-    return float(np.sum((target - columns @ solution) ** 2))
+    return float(np.sum(untold([columns], [target])[0] ** 2))
 
 
 def only_answers(parts: Sequence[tuple[Array, Array]]) -> list[int]:

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.identification.explore.fits import Parts
-from inputdesign_cli.identification.explore.inputs import past
+from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.plant.polynomial import Array
 
 _ORDER = 20
@@ -49,11 +49,8 @@ def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
 
 def _new(signals: list[Array], order: int) -> list[Array]:
     """What the past of each channel does not tell of it: (n - order, channels) of every part."""
-    found = [signal[order:].copy() for signal in signals]
-    for i in range(signals[0].shape[1]):
-        rows = [past(signal[:, i : i + 1], order) for signal in signals]
-        target = np.concatenate([signal[order:, i] for signal in signals])
-        solution = np.linalg.lstsq(np.concatenate(rows), target, rcond=1e-10)[0]
-        for own, columns in zip(found, rows, strict=True):
-            own[:, i] -= columns @ solution
-    return found
+    alone = [
+        untold([past(x[:, i : i + 1], order) for x in signals], [x[order:, i] for x in signals])
+        for i in range(signals[0].shape[1])
+    ]
+    return [np.column_stack(channels) for channels in zip(*alone, strict=True)]

@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
-from inputdesign_cli.identification.explore.inputs import left_over, past
+from inputdesign_cli.identification.explore.inputs import left_over, past, untold
 from inputdesign_cli.identification.explore.switched import switched_by
 from inputdesign_cli.plant.polynomial import Array
 
@@ -75,9 +75,7 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     found = []
     for j, target in enumerate(targets.T):
         probability = min(
-            _foretold(own, more, target),
-            *_between_jumps(brief, lags, j),
-            switched_by(brief, j) if brief else 1.0,
+            _foretold(own, more, target), *_between_jumps(brief, lags, j), switched_by(brief, j)
         )
         if _TESTS * probability < _CERTAIN:
             found.append((j, _TESTS * probability))
@@ -214,11 +212,9 @@ def acts_late(parts: Parts, gains: Array) -> list[bool]:
 def _innovations(parts: Parts, lags: int) -> list[Array]:
     """What past inputs and outputs do not tell of the outputs: (n - lags, p) of every part (n, ..)."""
     rows = [np.column_stack([past(u, lags), past(y, lags)]) for u, y in parts]
-    columns, targets = np.concatenate(rows), np.concatenate([y[lags:] for _, y in parts])
-    solution = np.linalg.lstsq(columns, targets, rcond=1e-10)[0]
-    return [y[lags:] - own @ solution for (_, y), own in zip(parts, rows, strict=True)]
+    return untold(rows, [y[lags:] for _, y in parts])
 
 
 def _without(columns: Array, targets: Array) -> Array:
     """What a regression leaves."""
-    return np.asarray(targets - columns @ np.linalg.lstsq(columns, targets, rcond=1e-10)[0])
+    return untold([columns], [targets])[0]

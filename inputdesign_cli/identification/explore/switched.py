@@ -9,7 +9,7 @@ Where someone else switches the input nothing is left.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
-from inputdesign_cli.identification.explore.inputs import past
+from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
@@ -48,7 +48,9 @@ class Early:
 
 
 def switched_by(parts: Parts, j: int) -> float:
-    """The probability that no output makes input j jump, of records u (n, r), y (n, p)."""
+    """The probability that no output makes input j jump, of records u (n, r), y (n, p); one without any."""
+    if not parts:
+        return 1.0
     outputs = parts[0][1].shape[1]
     return min(1.0, outputs * min(_answers(parts, j, i).against for i in range(outputs)))
 
@@ -73,8 +75,7 @@ class _Answers:
     Attributes:
         at_once: as the noise of a relay does, see `_relayed`.
         along, opposed: (lags,), what is new in it so many samples before, from one on: to the side to which
-        the
-            plant answers a jump, and to the other one.
+            the plant answers a jump, and to the other one.
     """
 
     at_once: float
@@ -182,23 +183,20 @@ def _by_chance(x: Array) -> tuple[float, float]:
     return float(scipy.special.stdtr(x.size - 1, -t)), float(scipy.special.stdtr(x.size - 1, t))
 
 
-def _sign(parts: Iterable[tuple[Array, Array]], lags: int, j: int) -> float:
+def _sign(parts: Parts, lags: int, j: int) -> float:
     """That of the gain from an input, by how it and the output go together in time."""
     return float(
         np.sign(sum(float(u[: len(u) - lag, j] @ y[lag:, 0]) for u, y in parts for lag in range(lags + 1)))
     )
 
 
-def _new(parts: Iterable[tuple[Array, Array]], lags: int, *, present: bool) -> list[Array]:
+def _new(parts: Parts, lags: int, *, present: bool) -> list[Array]:
     """What past inputs and outputs do not tell of an output: (n - lags,) of every part.
 
     Args:
         present: whether the inputs of the sample itself count as past.
     """
     rows = [
-        (np.column_stack([past(y, lags), past(u, lags), *([u[lags:]] if present else [])]), y[lags:, 0])
-        for u, y in parts
+        np.column_stack([past(y, lags), past(u, lags), *([u[lags:]] if present else [])]) for u, y in parts
     ]
-    columns, targets = (np.concatenate(every) for every in zip(*rows, strict=True))
-    solution = np.linalg.lstsq(columns, targets, rcond=1e-10)[0]
-    return [target - own @ solution for own, target in rows]
+    return untold(rows, [y[lags:, 0] for _, y in parts])

@@ -6,18 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import (
-    Found,
-    by_chance,
-    early_answers,
-    only_answers,
-    unstable_pole,
-)
+from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.explore import Found, by_chance, only_answers, unstable_pole
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.integrating import like_integrators
-from inputdesign_cli.tasks.result.refutations import chance
 from inputdesign_cli.tasks.result.unidentified import like_inverses, unidentified
-from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
+from inputdesign_cli.tasks.result.unrelated import driven_by_nothing, late_inputs
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
 
@@ -40,7 +34,8 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         undriven: see `undriven_inputs`.
         loop: whether inputs answer the outputs.
     """
-    unstable = _unstable(log)
+    # Without excitation any pole explains the record.
+    unstable = () if undriven else _unstable(log)
     if unstable:  # what stable models say of such a plant is wrong
         return unstable
     moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
@@ -55,7 +50,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         *unseen,
         *(() if found.steady or rising or unseen else (_UNSTEADY,)),
         *(f"{told}: {DRIVE}" for told in undriven),
-        *(() if loop else (*_early(log), *(f"{told}: {DRIVE}" for told in like_inverses(found)))),
+        *(() if loop else (*late_inputs(log.parts), *(f"{told}: {DRIVE}" for told in like_inverses(found)))),
     )
 
 
@@ -74,15 +69,14 @@ def _unjudged(found: Found) -> tuple[str, ...]:
 def _reasons(found: Found) -> tuple[str, ...]:
     """Why nothing that was found deserves trust."""
     which = "" if found.split == "none" else " that it has not seen"
-    single = found.model.outputs == 1
     unseen = int(np.sum(found.validation.counted))
     told = []
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
-        chance = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
-        if fit < max(LEAST_FIT, chance):
+        luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
+        if fit < max(LEAST_FIT, luck):
             told.append(
-                f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in {unseen} "
-                f"samples{which}, and of noise alone it may explain {chance:.1f} %: the inputs "
+                f"the simulation explains {fit:.1f} % of {signal_name('y', i, found.model.outputs)} in "
+                f"{unseen} samples{which}, and of noise alone it may explain {luck:.1f} %: the inputs "
                 "hardly act on it, or the record is too short or too noisy to tell how"
             )
     return tuple(told)
@@ -91,13 +85,12 @@ def _reasons(found: Found) -> tuple[str, ...]:
 def _idle(found: Found) -> tuple[str, ...]:
     """Outputs of which the whole record tells no effect of the inputs, though a part of it did."""
     nothing = driven_by_nothing(found.model, found.estimate)
-    single = found.model.outputs == 1
     told = []
     for i, fit in enumerate(found.estimate.fit):
         worse = fit is not None and fit <= 0.0
         if worse or i in nothing:
             why = f"the simulation explains {fit:.1f} %" if worse else "its standard deviations reach zero"
-            output = "y" if single else f"y{i + 1}"
+            output = signal_name("y", i, found.model.outputs)
             told.append(
                 f"in the whole record no effect of the inputs on {output} can be told from none ({why}): "
                 "what agreed in a part of it may be chance, as two slow signals often do; move the inputs "
@@ -115,13 +108,10 @@ def _refuted(found: Found) -> tuple[str, ...]:
     failed = {test.name for test in found.estimate.failed}
     if not all(failed & kind for kind in _KINDS):
         return ()
-    single, unseen = (
-        found.model.outputs == 1,
-        "" if found.split == "none" else " in data that it has not seen",
-    )
+    unseen = "" if found.split == "none" else " in data that it has not seen"
     return tuple(
         f"past inputs explain residuals, residuals explain each other, and the simulation explains {fit:.1f} "
-        f"% of {'y' if single else f'y{i + 1}'}{unseen}: the plant acts otherwise than "
+        f"% of {signal_name('y', i, found.model.outputs)}{unseen}: the plant acts otherwise than "
         "any structure that was tried. It may be nonlinear, vary with time, or have inputs that the log "
         "lacks: record about one operating point, or log what else acts on it"
         for i, fit in enumerate(found.validation.simulation)
@@ -129,39 +119,30 @@ def _refuted(found: Found) -> tuple[str, ...]:
     )
 
 
-def _early(log: Log) -> tuple[str, ...]:
-    """Outputs that move before an input does."""
-    single, alone = log.y.shape[1] == 1, log.u.shape[1] == 1
-    return tuple(
-        f"{'y' if single else f'y{one.output + 1}'} answers {'u' if alone else f'u{one.input + 1}'} up to "
-        f"{one.samples} {'sample' if one.samples == 1 else 'samples'} before that moves (probability "
-        f"{chance(one.probability)} by chance): the input was logged late, or the columns are not of one "
-        "clock. See when the plant really gets its input, and write both at the same times"
-        for one in early_answers(log.parts)
-    )
-
-
 def _unstable(log: Log) -> tuple[str, ...]:
     """Outputs of a plant that is unstable, and goes on only as it is in a loop."""
-    outputs = log.y.shape[1]
-    poles = [(i, unstable_pole(log.parts, i)) for i in range(outputs)]
-    return tuple(
-        f"the plant{'' if outputs == 1 else f' of y{i + 1}'} is unstable: it has a pole at {pole.radius:.4g} "
-        f"+- {pole.deviation:.1g}, and only stable ones are looked for here. Identify it with its loop: "
-        f"idesign identify DATA --spec SPEC, in SPEC sample_time: {log.step:.6g}, plant: {{A: [1, "
-        f"-{pole.radius:.4g}], B: [0, 1]}}, noise: {{C: [1, -0.1], variance: 1}}, and the controller "
-        "as it was, experiment: {controller: {numerator: [..], denominator: [..]}}; raise the orders where "
-        "tests fail"
-        for i, pole in poles
-        if pole is not None
-    )
+    outputs, told = log.y.shape[1], []
+    for i in range(outputs):
+        pole = unstable_pole(log.parts, i)
+        if pole is None:
+            continue
+        A = ", ".join(f"{a:.4g}" for a in pole.denominator)
+        B = ", ".join(["0", "1", "1"][: pole.denominator.size])
+        told.append(
+            f"the plant of {signal_name('y', i, outputs)} is unstable: it has a pole at a radius of "
+            f"{pole.radius:.4g} +- {pole.deviation:.1g}, and only stable ones are looked for here. Identify "
+            f"it with its loop: idesign identify DATA --spec SPEC, in SPEC sample_time: {log.step:.6g}, "
+            f"plant: {{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and the controller as "
+            "it was, experiment: {controller: {numerator: [..], denominator: [..]}}; raise the orders where "
+            "tests fail"
+        )
+    return tuple(told)
 
 
 def undriven_inputs(log: Log) -> tuple[str, ...]:
     """Inputs that only answer the outputs."""
-    single = log.u.shape[1] == 1
     return tuple(
-        f"{'u' if single else f'u{j + 1}'} follows from the outputs and its own past: data from a loop "
+        f"{signal_name('u', j, log.u.shape[1])} follows from the outputs and its own past: data from a loop "
         "without excitation, from which a plant is not identifiable (the inverse of the controller explains "
         "them as well)"
         for j in only_answers(log.parts)

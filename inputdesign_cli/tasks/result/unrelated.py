@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.identification.explore import answers_output
+from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.explore import answers_output, early_answers
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.units import Units
@@ -22,17 +25,31 @@ _DEPENDENT, _LEFT = 1e-8, 1e-4
 
 
 def answering(units: Units, estimate: Estimate, data: Data) -> list[str]:
-    """A sentence for every input that prediction errors help to tell, where the spec has no loop."""
+    """A sentence for every input that answers outputs, or comes after their answer; none of a loop."""
     if units.closed_loop:
         return []
     ends = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, ends), np.split(data.y, ends), strict=True))
     errors = np.split(estimate.errors, ends)
-    return [
-        f"prediction errors help to tell {_name(units, j)} (probability {chance(probability)}), and no "
-        "input in open loop answers the noise: it was logged late, columns are swapped, or the data come "
-        "from a loop; mend the columns, or state the loop as experiment.controller"
+    answers = [
+        f"prediction errors help to tell {signal_name('u', j, units.inputs)} (probability "
+        f"{chance(probability)}), and no input in open loop answers the noise: it was logged late, columns "
+        "are swapped, or the data come from a loop; mend the columns, or state the loop as "
+        "experiment.controller"
         for j, probability in answers_output(parts, errors)
+    ]
+    return answers or late_inputs(parts)
+
+
+def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[str]:
+    """A sentence for every input before which an output moves: u (n, r), y (n, p) of an open loop."""
+    inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
+    return [
+        f"{signal_name('y', one.output, outputs)} answers {signal_name('u', one.input, inputs)} up to "
+        f"{one.samples} {'sample' if one.samples == 1 else 'samples'} before that moves (probability "
+        f"{chance(one.probability)} by chance): the input was logged late, or the columns are not of one "
+        "clock. See when the plant really gets its input, and write both at the same times"
+        for one in early_answers(parts)
     ]
 
 
@@ -54,9 +71,9 @@ def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> 
         expected = _chance(estimate, change, _stacked((now - before)[None, :, :, j])[0], wholly=False)
         if expected is not None and expected < _OTHERWISE:
             told.append(
-                f"{_name(units, j)} explains nothing of what was measured: G cannot be told from zero "
-                f"(probability {chance(probability)}), and the plant of the spec can: see whether the "
-                "columns are those of one experiment; if the plant does not answer, correct the spec"
+                f"{signal_name('u', j, units.inputs)} explains nothing of what was measured: G cannot be "
+                f"told from zero (probability {chance(probability)}), and the plant of the spec can: see "
+                "whether the columns are those of one experiment; if the plant does not answer, correct the spec"
             )
     return told
 
@@ -119,7 +136,3 @@ def _chance(estimate: Estimate, change: Array, away: Array, *, wholly: bool) -> 
     if wholly and np.linalg.norm(away - along @ right[kept]) > _LEFT * np.linalg.norm(away):
         return None
     return float(scipy.special.chdtrc(np.count_nonzero(kept), np.sum((along / sizes[kept]) ** 2)))
-
-
-def _name(units: Units, j: int) -> str:
-    return f"u{j + 1}" if units.inputs > 1 else "u"

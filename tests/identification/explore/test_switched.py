@@ -62,18 +62,28 @@ def test_an_input_that_someone_switches_answers_nothing(held):
         assert early_answers(record) == []
 
 
-def test_a_pole_outside_the_circle_is_told_in_a_loop():
-    """y(t) = 1.1 y(t - 1) + 0.2 u(t - 1) under u = 2 (r - y), and a stable plant of the same loop."""
-    for pole in (1.1, 0.9):
-        rng = np.random.default_rng(4)
-        r, y, u, x = switched(rng, 500, 10, 40), np.zeros(500), np.zeros(500), 0.0
-        for t in range(500):
-            x = pole * x + 0.2 * u[t - 1] if t else 0.0
-            y[t] = x + 0.05 * rng.standard_normal()
-            u[t] = 2.0 * (r[t] - y[t])
-        found = unstable_pole([(u[:, None], y[:, None])], 0)
-        if pole < 1.0:
-            assert found is None
-        else:
-            assert found.radius == pytest.approx(pole, abs=3.0 * found.deviation + 2e-3)
-            assert found.deviation < 0.01
+@pytest.mark.parametrize(
+    ("A", "controller"),
+    [
+        ([1, -1.1], [2.0, 0.0]),
+        ([1, 1.1], [-2.0, 0.0]),
+        ([1, -1.6, 1.1], [1.0, -2.0]),
+        ([1, -0.9], [2.0, 0.0]),
+        ([1, -1.4, 0.6], [1.0, 0.0]),
+    ],
+)
+def test_a_pole_outside_the_circle_is_told_where_it_is(A, controller):
+    """A x = 0.2 u(t - 1) under u = r - C y; the last two plants are stable."""
+    rng = np.random.default_rng(4)
+    r, y, u, x = switched(rng, 500, 1, 6), np.zeros(500), np.zeros(500), np.zeros(500)
+    for t in range(2, 500):
+        x[t] = 0.2 * u[t - 1] - sum(a * x[t - lag] for lag, a in enumerate(A[1:], start=1))
+        y[t] = x[t] + 0.05 * rng.standard_normal()
+        u[t] = r[t] - controller[0] * y[t] - controller[1] * y[t - 1]
+    found = unstable_pole([(u[:, None], y[:, None])], 0)
+    radius = np.max(np.abs(np.roots(A)))
+    if radius < 1.0:
+        assert found is None
+    else:
+        assert found.radius == pytest.approx(radius, abs=4.0 * found.deviation + 2e-3)
+        assert found.denominator == pytest.approx(A, abs=0.02)
