@@ -73,7 +73,8 @@ def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> 
             told.append(
                 f"{signal_name('u', j, units.inputs)} explains nothing of what was measured: G cannot be "
                 f"told from zero (probability {chance(probability)}), and the plant of the spec can: see "
-                "whether the columns are those of one experiment; if the plant does not answer, correct the spec"
+                "whether the columns are those of one experiment; if the plant does not answer, correct the "
+                "spec"
             )
     return told
 
