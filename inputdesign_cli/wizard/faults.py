@@ -48,7 +48,13 @@ _TERMS = {"nominal plant": "plant as stated", "the offset": "the operating point
 _PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)+")
 _LINES_THERE = re.compile(r"holds (\d+) .* (\d+) are asked")
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
-_QUIETER = re.compile(r"above max_sensitivity_db: ([\d.]+).*such as ([\d.]+)")
+_QUIETER = re.compile(r"less of a margin than (\w+): ([\d.]+) .*such as \w+: ([\d.]+)")
+# How a margin that is weaker than a first value, such as a second one, is asked for.
+_WEAKER = {
+    "max_sensitivity_db": ("more than {} dB", "{} dB"),
+    "phase_margin": ("less than {} degrees", "{} degrees"),
+    "gain_margin": ("a gain margin below {}", "gain margin {}"),
+}
 
 
 @contextmanager
@@ -82,8 +88,9 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     if one.code == "infinite-information" and asked.key != "loop":
         hint = ""  # a controller holds it already
     if quieter:
-        least, roomy = quieter.groups()
-        hint = f"ask for more than {least} dB (the nearer, the longer the experiment), such as {roomy} dB"
+        weaker, such = _WEAKER[quieter[1]]
+        hint = f"ask for {weaker.format(quieter[2])} (the nearer, the longer the experiment), such as "
+        hint += such.format(quieter[3])
     if one.code == "too-few-lines":
         enough = _LONG_ENOUGH.search(one.hint)
         hint = f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"

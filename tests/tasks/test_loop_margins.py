@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -215,3 +217,18 @@ def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
     (asked,) = found.results.result["assessment"]["requirements"]
     assert asked["loop"]["Ti"] == pytest.approx(200.0, rel=0.1)
     assert asked["loop"]["Kp"] == pytest.approx(200.0 / (2.4 * 57.5), rel=0.1)
+
+
+@pytest.mark.parametrize("margin", ["max_sensitivity_db: 3", "phase_margin: 50", "gain_margin: 4"])
+def test_a_weaker_margin_is_named_as_the_margin_was_stated(margin):
+    """The first value is one at which the nominal plant just keeps it, the second is one to work with."""
+    key, stated = margin.split(": ")[0], "accuracy={loop: {tuning: {simc: {tau_c: 30}}, MARGIN}}"
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(TEXT, overrides=[stated.replace("MARGIN", margin)]))
+    hint = caught.value.diagnostics[0].hint
+    edge, roomy = (float(found) for found in re.findall(rf"{key}: ([\d.]+)", hint))
+    spec = parse_spec(TEXT, overrides=[stated.replace("MARGIN", f"{key}: {roomy}")])
+    assert solve(spec).result["status"] == "optimal"
+    reached = float(re.search(r"reaches ([\d.]+)", caught.value.diagnostics[0].message)[1])
+    assert reached <= LoopMargin(**{key: edge}).peak * (1.0 + 1e-4) <= 1.003 * reached
+    assert LoopMargin(**{key: roomy}).peak == pytest.approx(1.2 * reached, rel=3e-3)

@@ -246,6 +246,18 @@ def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
         compose({**ENGINEER, "wish": f"PI loop with {below:.3g} dB"}, "x", tmp_path).validate()
 
 
+@pytest.mark.parametrize(
+    ("asked", "named"),
+    [("50 degrees", r"such as ([\d.]+ degrees)"), ("gain margin 20", r"such as (gain margin [\d.]+)")],
+)
+def test_a_weaker_margin_is_named_in_the_unit_of_the_wish(asked, named, tmp_path):
+    with pytest.raises(SpecError) as caught:
+        compose({**ENGINEER, "wish": f"PI loop with {asked}"}, "x", tmp_path).validate()
+    such = re.search(named, caught.value.diagnostics[0].hint)
+    assert such is not None
+    compose({**ENGINEER, "wish": f"PI loop with {such[1]}"}, "x", tmp_path).validate()
+
+
 @pytest.mark.parametrize(("loop", "key"), [("open", "loop"), ("PI Kp 1, Ti 9", "plant")])
 def test_a_controller_is_asked_for_only_where_there_is_none(loop, key):
     with pytest.raises(SpecError) as error, in_their_words({"loop": loop}):

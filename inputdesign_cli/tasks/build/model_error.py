@@ -167,14 +167,13 @@ def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> Sp
     if stated is None or not isinstance(admissible, Sensitivity):
         return None
     peak = float(np.max(admissible.nominal(made.grid)))
-    least, roomy = 20.0 * np.log10(peak), 20.0 * np.log10(1.2 * peak)
-    above = np.ceil(100.0 * least) / 100.0
     return spec.complain(
         "admissible-not-positive",
         f"with the nominal plant |S| of the loop reaches {peak:.4g} already, and the margin asks for "
         f"{stated.peak:.4g} at most",
-        hint="tune the controller more slowly (a larger tau_c), or write a margin above "
-        f"max_sensitivity_db: {above:g} (the nearer, the longer the experiment), such as {roomy:.2g}",
+        hint="tune the controller more slowly (a larger tau_c), or ask for less of a margin than "
+        f"{stated.allowing(peak)} (the nearer, the longer the experiment), such as "
+        f"{stated.allowing(1.2 * peak)}",
         key=_LOOP,
     )
 

@@ -18,7 +18,7 @@ _UNITS = frozenset(
 _SYMBOLS = re.compile(r"[%°/²³^℃℉]")
 _MEASURED = re.compile(r"([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*([^\W\d_][^\s,;|]*|[%°℃℉][^\s,;|]*)", re.ASCII)
 # What programs in Fortran write in place of 1.0e+00.
-_FORTRAN = re.compile(r"(?<![\w.])([-+]?(?:\d+\.\d*|\.\d+))[dD]([-+]?\d{1,3})(?![\w.])", re.ASCII)
+_FORTRAN = re.compile(r"(?<![\w.])([-+]?(?:\d+[.,]\d*|[.,]\d+))[dD]([-+]?\d{1,3})(?![\w.])", re.ASCII)
 
 
 def with_exponents(text: str) -> str:

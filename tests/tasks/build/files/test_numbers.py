@@ -150,6 +150,11 @@ def test_exponents_of_fortran_are_exponents(form, separator, tmp_path):
     np.testing.assert_array_equal(found["y"], np.negative(NUMBERS))
 
 
+def test_exponents_of_fortran_behind_decimal_commas(tmp_path):
+    found = written_in(lambda x: f"{x:.6E}".replace("E", "D").replace(".", ","), ";", tmp_path / "log.csv")
+    np.testing.assert_array_equal(found["u"], NUMBERS)
+
+
 @pytest.mark.parametrize("mark", ["%", " %"])
 @pytest.mark.parametrize(("separator", "point"), [(",", "."), (";", "."), (";", ","), ("\t", ",")])
 def test_numbers_in_per_cent_stay_as_they_are_written(separator, point, mark, tmp_path):
