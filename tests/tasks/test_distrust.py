@@ -9,6 +9,7 @@ import scipy.signal
 from inputdesign_cli.identification.explore import explore_structure
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks import explore, identify
+from tests.support.loops import LAWS, loop
 
 
 def stored(path, u, y, names="u,y"):
@@ -16,19 +17,30 @@ def stored(path, u, y, names="u,y"):
     return path
 
 
-def test_the_inverse_of_a_controller_is_no_plant(tmp_path):
-    """PI control without a reference: u = -C y + dither, and y moves by its own noise."""
+@pytest.mark.parametrize("integral", [0.0, 0.1], ids=["P", "PI"])
+def test_the_inverse_of_a_controller_is_no_plant(integral, tmp_path):
+    """Control without a reference: u = -C y + dither, and y moves by its own noise."""
     rng = np.random.default_rng(1)
-    u, y, v, total = np.zeros(500), np.zeros(500), 0.0, 0.0
+    u, y, v, total = np.zeros(400), np.zeros(400), 0.0, 0.0
     x = 0.0
-    for t in range(500):
+    for t in range(400):
         x = 0.8 * x + 0.2 * u[t - 1] if t else 0.0
         v = 0.9 * v + 0.3 * rng.standard_normal()
         y[t] = x + v
-        total += 0.1 * y[t]
+        total += integral * y[t]
         u[t] = -0.5 * y[t] - total + 0.05 * rng.standard_normal()
     (told,) = [reason for reason in explore(stored(tmp_path / "log.csv", u, y)).reasons if "-1/C" in reason]
     assert told.endswith("move the reference of the loop, or add dither to the input, and record again")
+
+
+def test_the_plant_of_a_loop_whose_reference_hardly_moves_is_not_the_inverse_of_its_controller(tmp_path):
+    """What moves the reference are eight steps; they look like spikes to a model of -1/C."""
+    u, y = loop(2, LAWS["PI"], steps=0.3)
+    found = explore(stored(tmp_path / "log.csv", u, y)).results.result
+    assert found["exploration"]["loop"]
+    theta = found["identification"]["theta"]
+    b, a = (sum(value for name, value in theta.items() if name.startswith(letter)) for letter in "ba")
+    assert theta.get("K", b / (1.0 + a)) == pytest.approx(1.0, abs=0.6)
 
 
 def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):

@@ -11,11 +11,14 @@ from inputdesign_cli.identification.explore.fits import (
     fits as fits,
     output_error_form as output_error_form,
 )
-from inputdesign_cli.identification.explore.inputs import (
-    only_answers as only_answers,
-    order_of_excitation as order_of_excitation,
-)
+from inputdesign_cli.identification.explore.inputs import order_of_excitation as order_of_excitation
 from inputdesign_cli.identification.explore.joint import Found as Found
+from inputdesign_cli.identification.explore.laws import (
+    answers_between_moves as answers_between_moves,
+    only_answers as only_answers,
+    set_apart as set_apart,
+    together_at_once as together_at_once,
+)
 from inputdesign_cli.identification.explore.loops import answers_output as answers_output
 from inputdesign_cli.identification.explore.search import explore_structure as explore_structure
 from inputdesign_cli.identification.explore.switched import early_answers as early_answers

@@ -1,4 +1,4 @@
-"""What the inputs are worth, and whether they do nothing but answer the outputs."""
+"""What the inputs are worth, and what their pasts tell."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 from inputdesign_cli.plant.polynomial import Array
 
 _FAINT = 1e-9
-# How far back a controller looks; what rounding of its output may leave of the power of an input.
-_CONTROLLER, _NOTHING = 6, 1e-6
 
 
 def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) -> int:
@@ -54,24 +52,3 @@ def untold(rows: Sequence[Array], targets: Sequence[Array]) -> list[Array]:
 def left_over(columns: Array, target: Array) -> float:
     """The sum of squares that a regression leaves."""
     return float(np.sum(untold([columns], [target])[0] ** 2))
-
-
-def only_answers(parts: Sequence[tuple[Array, Array]]) -> list[int]:
-    """Inputs that outputs up to now and the inputs' own past leave nothing of, and that past alone does.
-
-    They are what a controller makes of the outputs without a reference or dither: a loop without excitation,
-    whose plant the data do not determine ([ljung-1999], Section 13.4).
-    """
-    centred = [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > 4 * _CONTROLLER]
-    if not centred:
-        return []
-    own = np.concatenate([past(u, _CONTROLLER) for u, _ in centred])
-    present = np.concatenate([y[_CONTROLLER:] for _, y in centred])
-    both = np.column_stack([own, present, np.concatenate([past(y, _CONTROLLER) for _, y in centred])])
-    found = []
-    for j in range(centred[0][0].shape[1]):
-        target = np.concatenate([u[_CONTROLLER:, j] for u, _ in centred])
-        power = float(np.sum(target**2))
-        if left_over(both, target) <= _NOTHING * power < left_over(own, target):
-            found.append(j)
-    return found

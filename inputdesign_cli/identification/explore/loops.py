@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
+from inputdesign_cli.identification.explore.laws import TOGETHER, answers_between_moves
 from inputdesign_cli.identification.explore.switched import switched_by
 from inputdesign_cli.plant.polynomial import Array
 
@@ -23,8 +24,6 @@ _LAGS = 20
 _CERTAIN = 1e-4
 # Four tests share the level.
 _TESTS = 4
-# A correlation of white signals beyond this, times the root of their number, is none by chance.
-_TOGETHER = 4.0
 # A jump is beyond so many robust standard deviations; an input of which its past leaves less than this share
 # between its jumps does not move there.
 _JUMP, _HELD = 4.0, 1e-6
@@ -49,7 +48,8 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     innovations of the outputs as well ([ljung-1999], Section 13.4), with its jumps and without them. Not
     outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
     would help to predict one that is held. A third test is that of an answer at once, see `_at_once`, a
-    fourth that of a relay, see `switched_by`.
+    fourth that of a relay, see `switched_by`. An input that follows the outputs exactly between moves of a
+    reference tells nothing new of itself, and is seen by that, see `answers_between_moves`.
 
     Args:
         parts: records u (n, r), y (n, p).
@@ -79,7 +79,8 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
         )
         if _TESTS * probability < _CERTAIN:
             found.append((j, _TESTS * probability))
-    return found
+    seen = {j for j, _ in found}
+    return sorted([*found, *(law for law in answers_between_moves(centred) if law[0] not in seen)])
 
 
 def _lags(parts: Parts, outputs: int) -> int:
@@ -206,7 +207,7 @@ def acts_late(parts: Parts, gains: Array) -> list[bool]:
     new = _without(before, np.concatenate([np.column_stack([u, y])[lags:] for u, y in long]))
     sizes = np.maximum(np.linalg.norm(new, axis=0), 1e-300)
     together = new[:, :r].T @ new[:, r] / (sizes[:r] * sizes[r])
-    return [bool(x <= _TOGETHER / np.sqrt(len(new))) for x in together * np.sign(gains)]
+    return [bool(x <= TOGETHER / np.sqrt(len(new))) for x in together * np.sign(gains)]
 
 
 def _innovations(parts: Parts, lags: int) -> list[Array]:

@@ -130,7 +130,8 @@ def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]
     ]
     notes += [
         f"the noise of the outputs helps to tell {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by "
-        "chance): the data may come from a loop. The direct method is used; the noise model must then be "
+        "chance): the data may come from a loop, or the input was logged late, or the columns are swapped. "
+        "They are taken for those of a loop. The direct method is used; the noise model must then be "
         "right, and without a reference that moves the plant may not be identifiable: add a reference or "
         "dither, and write experiment.controller. An input that answers at once is taken to act with a delay"
         for j, p in loops

@@ -9,8 +9,9 @@ import numpy as np
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.explore import Found, by_chance, only_answers, unstable_pole
 from inputdesign_cli.tasks.build.log import Log
+from inputdesign_cli.tasks.result.at_once import like_inverses
 from inputdesign_cli.tasks.result.integrating import like_integrators
-from inputdesign_cli.tasks.result.unidentified import like_inverses, unidentified
+from inputdesign_cli.tasks.result.unidentified import unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing, late_inputs
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
@@ -40,6 +41,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         return unstable
     moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
     rising = like_integrators(found, log.step, log.time_unit)
+    inverses = () if loop else like_inverses(found, moving)
     unseen = unidentified(found, moving, log.step, log.time_unit)
     return (
         *_unjudged(found),
@@ -50,7 +52,8 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         *unseen,
         *(() if found.steady or rising or unseen else (_UNSTEADY,)),
         *(f"{told}: {DRIVE}" for told in undriven),
-        *(() if loop else (*late_inputs(log.parts), *(f"{told}: {DRIVE}" for told in like_inverses(found)))),
+        *(() if loop else late_inputs(log.parts)),
+        *(f"{told}: {DRIVE}" for told in inverses),
     )
 
 

@@ -8,11 +8,6 @@ from inputdesign_cli.identification.explore import Found, order_of_excitation
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.plant.polynomial import Array
 
-# The static gain is as good as none below this share of the largest one; what falls to this share of its peak
-# has a resonance.
-_NO_GAIN, _FALLS = 0.05, 0.6
-_FREQUENCIES = 100
-
 
 def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[str, ...]:
     """A sentence for every reason why the parameters of the model are not those of the plant alone.
@@ -48,25 +43,6 @@ def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[s
                 "records is a line in each; see whether the input moves enough, or sample otherwise"
             )
     return tuple(told)
-
-
-def like_inverses(found: Found) -> tuple[str, ...]:
-    """A sentence where a plant of one input and output is like the inverse of a controller that integrates.
-
-    It answers at once, has no static gain, and |G| hardly falls with frequency: so does -1/C, which is what
-    data of a loop tell whose reference rests ([ljung-1999], Section 13.4).
-    """
-    if found.model.inputs > 1 or found.model.outputs > 1 or found.taken[0].orders.delays != (0,):
-        return ()
-    G = np.abs(found.model.plant_at(np.linspace(1e-6, np.pi, _FREQUENCIES))[:, 0, 0])
-    highest = np.maximum.accumulate(G)
-    if G[0] > _NO_GAIN * highest[-1] or np.any(_FALLS * highest > G):
-        return ()
-    return (
-        "y answers u in the same sample and not at all at rest, as the inverse of a controller with integral "
-        "action does (-1/C): if u was made from y, as in a loop whose reference rests, this is no model of "
-        "the plant",
-    )
 
 
 def _by_output(found: Found) -> list[Array]:

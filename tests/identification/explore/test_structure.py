@@ -13,7 +13,6 @@ from inputdesign_cli.identification.explore import (
     explore_records,
     explore_structure,
     fits,
-    only_answers,
     order_of_excitation,
 )
 from inputdesign_cli.identification.explore.joint import divided
@@ -250,22 +249,6 @@ def test_too_short_a_record_is_refused():
     rng = np.random.default_rng(12)
     with pytest.raises(SpecError, match="too few"):
         explore_records([(rng.standard_normal((20, 1)), rng.standard_normal((20, 1)))])
-
-
-@pytest.mark.parametrize("dither", [0.0, 0.1])
-def test_an_input_that_only_answers_is_noticed(dither):
-    rng = np.random.default_rng(14)
-    e, d = rng.standard_normal((2, 800))
-    y, u = np.zeros(800), np.zeros(800)
-    for k in range(1, 800):
-        y[k] = 0.9 * y[k - 1] + 0.4 * u[k - 1] + e[k]
-        u[k] = u[k - 1] - 0.5 * y[k] + 0.4 * y[k - 1] + dither * d[k]
-    assert only_answers([(u[:, None], y[:, None])]) == ([] if dither else [0])
-
-
-def test_a_sinusoid_is_no_answer():
-    u = np.sin(0.3 * np.arange(500.0))[:, None]
-    assert only_answers([(u, u + 0.1 * np.random.default_rng(1).standard_normal(u.shape))]) == []
 
 
 def test_a_record_of_a_single_step_estimates_and_judges_at_once():

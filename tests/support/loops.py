@@ -1,0 +1,38 @@
+"""Records of a loop whose controller is a law from textbooks, a sample at a time."""
+
+import numpy as np
+import scipy.signal
+
+SAMPLES = 800
+
+
+def loop(seed, law, *, steps=0.3, reported=0.0):
+    """u, y of a lag three samples late with AR noise; `law` makes what answers an error."""
+    rng = np.random.default_rng(seed)
+    v = scipy.signal.lfilter([1], [1, -0.9], 0.05 * rng.standard_normal(SAMPLES))
+    r = np.repeat(steps * rng.uniform(-1, 1, SAMPLES // 100), 100)
+    u, x, y, answer = np.zeros(SAMPLES), np.zeros(SAMPLES), np.zeros(SAMPLES), law()
+    for k in range(SAMPLES):
+        x[k] = 0.9 * x[k - 1] + 0.1 * u[k - 3] if k >= 3 else 0.0
+        y[k] = x[k] + v[k]
+        u[k] = answer(r[k] - y[k])
+    return u[:, None] + reported * rng.standard_normal((SAMPLES, 1)), y[:, None]
+
+
+def pid(gain, integral=0.0, derivative=0.0):
+    """A controller as it stands in textbooks, a sample at a time."""
+
+    def law():
+        state = {"sum": 0.0, "last": 0.0}
+
+        def answer(error):
+            state["sum"] += integral * error
+            change, state["last"] = error - state["last"], error
+            return gain * error + state["sum"] + derivative * change
+
+        return answer
+
+    return law
+
+
+LAWS = {"P": pid(2.0), "PI": pid(1.0, 0.08), "PID": pid(1.0, 0.08, 1.5)}
