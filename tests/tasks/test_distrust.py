@@ -70,11 +70,14 @@ def test_inputs_that_move_together_are_told_apart_by_nothing(tmp_path):
     assert not any("exciting of order 0 only" in reason for reason in found.reasons)
 
 
-def test_a_dead_time_of_a_third_of_the_record_is_found():
-    """Longer than delays are looked for where nothing says that one is there."""
+@pytest.mark.parametrize(("delay", "held", "samples"), [(150, 4, 500), (120, 20, 600)])
+def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples):
+    """Longer than delays are looked for where nothing says that one is there; also by few jumps."""
     rng = np.random.default_rng(3)
-    u = np.repeat(rng.choice([-1.0, 1.0], 125), 4)
-    y = scipy.signal.lfilter(np.append(np.zeros(150), 0.2), [1, -0.8], u) + 0.05 * rng.standard_normal(500)
-    first, second = ([(u[at, None], y[at, None])] for at in (slice(0, 300), slice(300, None)))
+    u = np.repeat(rng.choice([-1.0, 1.0], samples // held), held)
+    y = scipy.signal.lfilter(np.append(np.zeros(delay), 0.2), [1, -0.8], u)
+    y += 0.05 * rng.standard_normal(samples)
+    at = 3 * samples // 5
+    first, second = ([(u[part, None], y[part, None])] for part in (slice(0, at), slice(at, None)))
     found = explore_structure(first, second, physical=False)
-    assert abs(found.best.orders.delays[0] - 150) <= 1
+    assert abs(found.best.orders.delays[0] - delay) <= 1

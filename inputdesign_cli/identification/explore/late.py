@@ -1,4 +1,4 @@
-"""Answers that come later than delays are looked for: by the correlation of what is new in u and in y."""
+"""Answers that come later than delays are looked for: by what is new in u and in y, or by the output error."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import scipy
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past, untold
+from inputdesign_cli.identification.explore.regression import best_delays, output_error
 from inputdesign_cli.plant.polynomial import Array
 
 _ORDER = 20
@@ -14,6 +15,9 @@ _ORDER = 20
 _CERTAIN = 1e-6
 # Inputs that move together, or again and again in the same way, are also answered late by half of the best.
 _CLEARLY = 2.0
+# What a lag leaves of the output where no later answer is looked for; what a later one must leave of that.
+_ENOUGH, _MUCH = 0.2, 0.5
+_TRIED = 80
 
 
 def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
@@ -44,6 +48,32 @@ def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
         best = int(np.argmax(z))
         nearer = float(np.max(z[: most + 1]))
         found.append(best if best > most and z[best] > max(certain, _CLEARLY * nearer) else 0)
+    return tuple(found)
+
+
+def far_answers(parts: Parts, most: int, furthest: int) -> tuple[int, ...]:
+    """The same by the output error of a lag, which also tells few jumps in noise; zero where it tells none.
+
+    An input that is held jumps in few samples, and noise hides what is new in a slow output there.
+
+    Args:
+        parts: records u (n, r), y (n, 1).
+        furthest: the lag up to which to look.
+    """
+    inputs = parts[0][0].shape[1]
+    near = best_delays(parts, 1, 2, most, (0,) * inputs)
+    varying = np.concatenate([y - y.mean() for _, y in parts])
+    if near.loss <= _ENOUGH * float(np.mean(varying**2)):
+        return (0,) * inputs
+    beyond = range(most + 1, furthest, max((furthest - most) // _TRIED, 1))
+    found = []
+    for j in range(inputs):
+        losses = {
+            lag: output_error(parts, 1, 2, (*near.delays[:j], lag, *near.delays[j + 1 :])).loss
+            for lag in beyond
+        }
+        best = min(losses, key=lambda lag: losses[lag], default=0)
+        found.append(best if best and losses[best] <= _MUCH * near.loss else 0)
     return tuple(found)
 
 

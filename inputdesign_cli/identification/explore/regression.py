@@ -23,6 +23,7 @@ _CHI2 = 3.84  # 95 % for one degree of freedom
 _WIDTH = 6
 # The order of an ARX model that makes noise white.
 _WHITENING = 20
+_LONG = 20
 _COARSE = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150)
 
 
@@ -70,12 +71,17 @@ def output_error(
 
 
 def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[int]) -> Iterator[Array]:
-    """Through 1/F: the delays of all inputs, a level and n impulses at the start."""
+    """Through 1/F: the delays of all inputs, a level, n impulses at the start, and steps where inputs arrive.
+
+    Before a long delay acts what held before the record, which may differ from its first value.
+    """
     for x, delay in zip(filtered([1.0], F, u, axis=0).T, delays, strict=True):
         yield from (_lagged(x, delay + lag) for lag in range(b))
-    yield filtered([1.0], F, np.ones(samples))
+    held = filtered([1.0], F, np.ones(samples))
+    yield held
     impulse = filtered([1.0], F, np.eye(1, samples)[0])
     yield from (_lagged(impulse, lag) for lag in range(n))
+    yield from (_lagged(held, delay) for delay in delays if _LONG < delay < samples)
 
 
 def _loss(

@@ -36,7 +36,7 @@ from inputdesign_cli.identification.explore.fits import (
     output_error_form,
     simulation_fit,
 )
-from inputdesign_cli.identification.explore.late import late_answers
+from inputdesign_cli.identification.explore.late import far_answers, late_answers
 from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import processes
@@ -170,6 +170,11 @@ def explore_structure(
     clean = whitened(first) if feedback else first
     least = _least_delays(first, clean, most) if feedback else (0,) * r
     later = late_answers(first, most)
+    if not (feedback or any(later)):
+        # What judges must be longer than the delay, too.
+        later = far_answers(
+            first, most, min(2 * max(len(y) for _, y in some) // 3 for some in (first, second))
+        )
     most = max(most, *(lag + lag // _BEYOND for lag in later))
     delays = tuple(map(max, least, later))
     quick = dict[int, SharedDenominator]()

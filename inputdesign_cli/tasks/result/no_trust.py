@@ -80,7 +80,8 @@ def _reasons(found: Found) -> tuple[str, ...]:
             told.append(
                 f"the simulation explains {fit:.1f} % of {signal_name('y', i, found.model.outputs)} in "
                 f"{unseen} samples{which}, and of noise alone it may explain {luck:.1f} %: the inputs "
-                "hardly act on it, or the record is too short or too noisy to tell how"
+                f"hardly act on it, or by more than {chosen.most} samples later, or the record is too short "
+                "or too noisy to tell how"
             )
     return tuple(told)
 
@@ -96,8 +97,8 @@ def _idle(found: Found) -> tuple[str, ...]:
             output = signal_name("y", i, found.model.outputs)
             told.append(
                 f"in the whole record no effect of the inputs on {output} can be told from none ({why}): "
-                "what agreed in a part of it may be chance, as two slow signals often do; move the inputs "
-                "more, or for longer"
+                "what agreed in a part of it may be chance, as two slow signals often do, or the inputs act "
+                f"by more than {found.outputs[i].most} samples later; move the inputs more, or for longer"
             )
     return tuple(told)
 
