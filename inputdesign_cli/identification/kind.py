@@ -51,6 +51,10 @@ class Kind(Protocol):
         """Number of outputs p."""
 
     @property
+    def continuous(self) -> bool:
+        """Whether frequencies of the model are in rad per time unit."""
+
+    @property
     def recent(self) -> int:
         """The lag up to which the structure looks at the inputs."""
 
@@ -148,6 +152,7 @@ def identify_records(
     known_rest = False if ramp else rest
     best = from_rest_or_free(records_of(parts), records_of(centred(parts)), known_rest, searched, start)
     simulated, stable = kind.simulated(best, y, lengths)
+    moved = None if kind.continuous or not all(stable) else simulated
     return concluded(
         kind.names,
         best,
@@ -160,7 +165,14 @@ def identify_records(
         recent=kind.recent,
         alternatives=(
             *kind.extensions(best.point.theta, feedback=feedback),
-            *variations(kind.record, best.point.theta, best.records.u, best.records.lengths),
+            *variations(
+                kind.record,
+                best.point.theta,
+                best.records.u,
+                best.records.lengths,
+                moved,
+                best.records.lateness(best.point.theta),
+            ),
         ),
         experiments=experiments or (len(y),),
         feedback=feedback,

@@ -33,6 +33,11 @@ class OfModel:
         return self.model.outputs
 
     @property
+    def continuous(self) -> bool:
+        """Whether frequencies of the model are in rad per time unit."""
+        return self.model.continuous
+
+    @property
     def recent(self) -> int:
         """No lag but that of the present: all others act through poles."""
         return 0

@@ -40,6 +40,11 @@ class TransferKind(OfModel):
     held: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
     @property
+    def continuous(self) -> bool:
+        """Whether frequencies of the model are in rad per time unit: not behind a hold."""
+        return not self.between.hold
+
+    @property
     def explaining(self) -> NDArray[np.bool_]:
         """(k,): all."""
         return np.ones(len(self.names), dtype=bool)

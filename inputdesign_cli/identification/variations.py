@@ -1,10 +1,14 @@
-"""What a plant that is linear and stays the same does without: an input whose gain changes.
+"""What a plant that is linear and stays the same does without: an input whose gain changes, or its speed.
 
 In place of G u stands G (u + x f), with a signal f that is made of the same input: the input itself after a
 part of the record, a power of it, its sign, the direction of its last move. Prediction errors are linear in
 u, so that those of f alone are the gradient with respect to x, whatever the structure. Where x is not zero
 there is no single G: small changes of u see another one in each state of the plant, such as early and late,
 or near the middle of the range and far from it.
+
+Of a plant that heats faster than it cools f is made of its output: T (1 + x s) dy/dt + y = K u, where s is
+the direction in which y moves, is to first order T dy/dt + y = K u - x T |dy/dt|. What is added acts without
+the dead time.
 """
 
 from __future__ import annotations
@@ -37,6 +41,8 @@ class Variation:
         channel: of the input.
         signal: f (N,), of the samples of all records one after the other, in the unit of the input.
         gains: df/du, one for each state of the plant.
+        moves: of f that depends on how much the output changes from sample to sample, what a change adds to f
+            in each state; zero of others. It acts `early` by so many samples.
         record: makes the record of samples u (N, r), y (N, p) that the structure is to explain.
         theta: (k,), the estimate.
     """
@@ -47,6 +53,8 @@ class Variation:
     channel: int
     signal: Array
     gains: tuple[float, ...]
+    moves: tuple[float, ...]
+    early: int
     record: Callable[[Array, Array], Record]
     theta: Array
 
@@ -67,9 +75,14 @@ class Variation:
     def slopes(self, model: Model, w: ArrayLike) -> NDArray[np.complex128]:
         """(states, n, p, r): the derivative of G with respect to x in each state."""
         G = model.plant_at(w)
-        own = np.zeros_like(G)
+        own, moving = np.zeros_like(G), np.zeros_like(G)
         own[..., self.channel] = G[..., self.channel]
-        return np.asarray(np.multiply.outer(np.array(self.gains), own))
+        turned = np.exp(1j * np.asarray(w, dtype=float))
+        change = (1.0 - 1.0 / turned) * turned**self.early
+        moving[..., self.channel] = change[:, None] * G[..., self.channel] ** 2
+        return np.asarray(
+            np.multiply.outer(np.array(self.gains), own) + np.multiply.outer(np.array(self.moves), moving)
+        )
 
     def echo(self, lengths: Sequence[int]) -> Echo | None:
         """None: f is made of inputs."""
@@ -81,9 +94,14 @@ class Variation:
 
 
 def variations(
-    record: Callable[[Array, Array], Record], theta: Array, u: Array, lengths: Sequence[int]
+    record: Callable[[Array, Array], Record],
+    theta: Array,
+    u: Array,
+    lengths: Sequence[int],
+    simulated: Array | None,
+    late: int,
 ) -> tuple[Variation, ...]:
-    """What is tried of each input.
+    """What is tried of each input, and of the speed of a plant with one input and output.
 
     Of an input with two values powers and sign are the input itself about a level: they say nothing.
 
@@ -92,16 +110,57 @@ def variations(
         theta: (k,), the estimate.
         u: (N, r), of all records one after the other.
         lengths: of the records.
+        simulated: (N, p), what the inputs cause; None where that cannot be simulated, or frequencies are not
+            in rad/sample.
+        late: samples by which the plant answers later than a lag behind a hold does.
     """
     found = []
     for channel, samples in enumerate(u.T):
         name, size = "u" if u.shape[1] == 1 else f"u{channel + 1}", float(np.std(samples))
         x = (samples - np.mean(samples)) / max(size, 1e-300)
         found += [
-            Variation(of, phrase, fault, channel, size * f, gains, record, theta)
+            Variation(of, phrase, fault, channel, size * f, gains, (0.0,) * len(gains), 0, record, theta)
             for of, phrase, fault, f, gains in (*_changes(name, x), *_curves(name, x, lengths))
         ]
+        if simulated is not None and u.shape[1] == simulated.shape[1] == 1:
+            found += _one_way(x, size, simulated[:, 0], late, lengths, record, theta)
     return tuple(found)
+
+
+def _one_way(
+    x: Array,
+    size: float,
+    simulated: Array,
+    late: int,
+    lengths: Sequence[int],
+    record: Callable[[Array, Array], Record],
+    theta: Array,
+) -> Iterator[Variation]:
+    """A plant of input samples size x (N,) that is slower where its output (N,) rises than where it falls."""
+    early = late + 1
+    changes = np.concatenate(
+        [
+            np.append(np.diff(own, prepend=own[:1]), np.zeros(early))[early:]
+            for own in np.split(simulated, np.cumsum(lengths)[:-1])
+        ]
+    )
+    scale = float(np.std(changes))
+    if not (np.all(np.isfinite(changes)) and scale > 0.0):
+        return
+    bent, slope = _bent(np.abs(changes) / scale, x, lengths)
+    if np.linalg.norm(bent) > _STRAIGHT * np.sqrt(len(x)):
+        yield Variation(
+            "direction of y",
+            "a plant that is slower where y rises than where it falls, or the other way round",
+            "nonlinear",
+            0,
+            size * bent,
+            (-slope, -slope),
+            (-size / scale, size / scale),
+            early,
+            record,
+            theta,
+        )
 
 
 def _changes(name: str, x: Array) -> Iterator[_Tried]:

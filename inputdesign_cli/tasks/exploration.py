@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
-from inputdesign_cli.identification import frequency_response, silent_in
+from inputdesign_cli.identification import cross_correlations, frequency_response, silent_in
+from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.explore import Fits, Found, answers_output, explore_records, fits
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json, Results
@@ -29,10 +30,13 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_entry,
     without_drift,
 )
-from inputdesign_cli.tasks.result.no_trust import DRIVE, LEAST_FIT, distrusted, undriven_inputs
-from inputdesign_cli.tasks.result.refutations import refutations
+from inputdesign_cli.tasks.result.no_trust import DRIVE, HALF, LEAST_FIT, distrusted, undriven_inputs
+from inputdesign_cli.tasks.result.refutations import chance, refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
+
+# Past inputs explain what a judged model leaves: by chance alone, so seldom.
+_SURELY = 1e-6
 
 
 @dataclass(frozen=True)
@@ -158,7 +162,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)
     table, curves = validation_curves(header.units, data, found)
-    reasons = _too_little(found)
+    reasons = _too_little(found) or _explained_by_inputs(found, data)
     result: dict[str, Json] = {
         "format": 1,
         "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
@@ -189,5 +193,24 @@ def _too_little(found: Fits) -> tuple[str, ...]:
             )
             told.append(
                 f"{what}; see whether the model is of this plant, and gain, delay, units and columns agree"
+            )
+    return tuple(told)
+
+
+def _explained_by_inputs(found: Fits, data: Data) -> tuple[str, ...]:
+    """Outputs of which a model that is judged explains less than half, where past inputs explain the rest.
+
+    A poor fit alone is no fault of the model: the noise may be strong.
+    """
+    poor = [i for i, fit in enumerate(found.simulation) if fit < HALF]
+    told = []
+    for i in poor:
+        test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
+        if not test.probability >= _SURELY:
+            output = signal_name("y", i, len(found.simulation))
+            told.append(
+                f"the simulation explains {found.simulation[i]:.1f} % of {output} only, and past inputs "
+                f"explain what it leaves (probability {chance(test.probability)}): the model is not of the "
+                "plant of these data, or this acts otherwise here"
             )
     return tuple(told)

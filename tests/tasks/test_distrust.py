@@ -70,6 +70,35 @@ def test_inputs_that_move_together_are_told_apart_by_nothing(tmp_path):
     assert not any("exciting of order 0 only" in reason for reason in found.reasons)
 
 
+def lags(u, plants, rng, noise=0.05):
+    """What first-order plants, a gain, a time constant and a whole delay for each input, make of u (n, r)."""
+    y = noise * rng.standard_normal(len(u))
+    for x, (gain, constant, delay) in zip(u.T, plants, strict=True):
+        pole = np.exp(-1.0 / constant)
+        y += scipy.signal.lfilter(np.append(np.zeros(delay + 1), gain * (1.0 - pole)), [1, -pole], x)
+    return y
+
+
+def test_inputs_between_which_what_they_do_may_be_exchanged_earn_no_trust(tmp_path):
+    """The second input is half of the first but for little: another minimum is about as likely."""
+    rng = np.random.default_rng(8)
+    one = np.repeat(rng.choice([-1.0, 1.0], 40), 8)
+    u = np.column_stack([one, 0.5 * one + 0.003 * rng.standard_normal(320)])
+    y = lags(u, [(1.0, 8.0, 3), (2.0, 15.0, 1)], rng)
+    found = explore(stored(tmp_path / "log.csv", u, y, "u1,u2,y"))
+    assert any("two sets of parameters" in reason for reason in found.reasons)
+
+
+def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 50), 8), np.repeat(rng.uniform(-1, 1, 40), 10)])
+    y = lags(u, [(1.0, 8.0, 3), (0.0, 8.0, 1)], rng)
+    found = explore(stored(tmp_path / "log.csv", u, y, "u1,u2,y"))
+    said = [*found.results.result["notes"], *found.reasons]
+    assert any(told.startswith("no effect of u2 on the outputs") for told in said)
+    assert not any(told.startswith("no effect of u1") for told in said)
+
+
 @pytest.mark.parametrize(("delay", "held", "samples"), [(150, 4, 500), (120, 20, 600)])
 def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples):
     """Longer than delays are looked for where nothing says that one is there; also by few jumps."""

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy.signal
 from typer.testing import CliRunner
 
 from inputdesign_cli.cli import app
@@ -55,6 +56,23 @@ def test_a_model_of_the_wrong_sign_is_told_and_exits_with_one(tmp_path):
     judged = explore(log, model=load_spec(model, design=False))
     assert judged.results.result["validation"]["reasons"] == list(judged.reasons)
     assert len(judged.reasons) == 1
+
+
+@pytest.mark.parametrize(("noise", "explained"), [(0.1, 100.0), (1.5, 50.0)])
+def test_a_poor_fit_is_held_against_a_model_where_inputs_explain_the_rest(noise, explained, tmp_path):
+    """A lag in place of a resonance; and the plant itself in noise that hides most of it."""
+    rng = np.random.default_rng(5)
+    u, B, F = np.repeat(rng.choice([-1.0, 1.0], 60), 10), [0, 0, 0, 0.09], [1, -1.85, 0.94]
+    y = scipy.signal.lfilter(B, F, u) + noise * rng.standard_normal(600)
+    table, log = np.column_stack([0.5 * np.arange(600), u, y]), tmp_path / "log.csv"
+    np.savetxt(log, table, delimiter=",", header="t_min,u,y", comments="")
+    plant = MODEL.replace("[0, 0, 0, 0.2]", str(B)).replace("[1, -0.8]", str(F))
+    lag, right = (
+        explore(log, model=load_spec(stored(tmp_path, text), design=False)) for text in (MODEL, plant)
+    )
+    assert right.reasons == ()
+    assert right.results.result["validation"]["simulation_fit_percent"] < explained
+    assert ["past inputs explain" in reason for reason in lag.reasons] == [True]
 
 
 def test_a_model_without_a_sample_time_is_named(tmp_path):

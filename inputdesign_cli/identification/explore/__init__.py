@@ -20,6 +20,7 @@ from inputdesign_cli.identification.explore.laws import (
     together_at_once as together_at_once,
 )
 from inputdesign_cli.identification.explore.loops import answers_output as answers_output
+from inputdesign_cli.identification.explore.one_line import one_line as one_line
 from inputdesign_cli.identification.explore.search import explore_structure as explore_structure
 from inputdesign_cli.identification.explore.switched import early_answers as early_answers
 from inputdesign_cli.identification.explore.unstable import unstable_pole as unstable_pole

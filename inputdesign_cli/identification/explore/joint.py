@@ -192,8 +192,7 @@ def _estimated(
                 # Where one output has several minima, a search for all of them seldom leaves a wrong one.
                 begun = tuple(_alone(own, used, i, feedback, ramp) for i, own in enumerate(taken))
             structure = joined(begun, inputs, range(inputs))
-            # Of plants in s other starts cost more than the search.
-            near = len(taken) > 1 or taken[0].orders.physical
+            near = len(taken) > 1 or _near(taken[0], inputs)
             estimate = _identified(structure, used, feedback, near=near, ramp=ramp)
         except SpecError as error:
             reason = error
@@ -218,8 +217,18 @@ def _estimated(
 def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool, ramp: bool) -> Candidate:
     """The structure of one output, estimated from the whole record without the others."""
     own = [(u, y[:, output : output + 1]) for u, y in used]
-    estimate = _identified(candidate.model, own, feedback, near=candidate.orders.physical, ramp=ramp)
+    near = _near(candidate, used[0][0].shape[1])
+    estimate = _identified(candidate.model, own, feedback, near=near, ramp=ramp)
     return replace(candidate, model=candidate.model.at(estimate.theta, estimate.noise))
+
+
+def _near(candidate: Candidate, inputs: int) -> bool:
+    """Whether a search from where the first part has led is enough.
+
+    Of plants in s other starts cost more than the search. Of several inputs that move much together what they
+    do may be exchanged between them, which leaves another minimum.
+    """
+    return candidate.orders.physical and inputs == 1
 
 
 def _identified(structure: Model, used: Parts, feedback: bool, *, near: bool, ramp: bool) -> Estimate:

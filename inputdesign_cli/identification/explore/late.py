@@ -1,4 +1,4 @@
-"""Answers that come later than delays are looked for: by what is new in u and in y, or by the output error."""
+"""Answers that come later than delays are looked for: by what is new in u and y, or by the output error."""
 
 from __future__ import annotations
 

@@ -14,6 +14,8 @@ from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.refutations import chance
+from inputdesign_cli.tasks.result.unidentified import untold_parameters
+from inputdesign_cli.tasks.result.unrelated import driving_nothing
 
 # An input that changes no more often excites little but its steps.
 _FEW_CHANGES = 10
@@ -136,6 +138,18 @@ def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]
         "dither, and write experiment.controller. An input that answers at once is taken to act with a delay"
         for j, p in loops
     ]
+    if not alone:
+        notes += [
+            f"no effect of u{j + 1} on the outputs can be told from none: its delays and parameters say "
+            "nothing"
+            for j in driving_nothing(found.model, found.estimate)
+        ]
+    untold = untold_parameters(found)
+    if untold:
+        notes.append(
+            f"{', '.join(untold)}: not told to one digit; G may be right at the frequencies that the inputs "
+            "excite, but these numbers say nothing of the plant"
+        )
     used = sum(len(y) for _, y in found.used)
     if used < len(log.y):
         notes.append(f"the model is estimated from the {used} samples in which the inputs move most")

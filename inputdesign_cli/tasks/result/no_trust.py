@@ -11,7 +11,7 @@ from inputdesign_cli.identification.explore import Found, by_chance, only_answer
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.at_once import like_inverses
 from inputdesign_cli.tasks.result.integrating import like_integrators
-from inputdesign_cli.tasks.result.unidentified import unidentified
+from inputdesign_cli.tasks.result.unidentified import rivalled, unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing, late_inputs
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
@@ -19,7 +19,7 @@ DRIVE = "move the reference of the loop, or add dither to the input, and record 
 # A simulation that explains less than this of data it has not seen is no model.
 LEAST_FIT = 5.0
 # One that is refuted besides needs more.
-_HALF = 50.0
+HALF = 50.0
 _UNSTEADY = (
     "a mode of the plant loses less than a hundredth in the whole record: it cannot be told from an "
     "integrator, or from drift. Record in a loop or until the output settles, or remove the drift: --detrend "
@@ -50,6 +50,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         *_refuted(found),
         *rising,
         *unseen,
+        *rivalled(found),
         *(() if found.steady or rising or unseen else (_UNSTEADY,)),
         *(f"{told}: {DRIVE}" for told in undriven),
         *(() if loop else late_inputs(log.parts)),
@@ -119,7 +120,7 @@ def _refuted(found: Found) -> tuple[str, ...]:
         "any structure that was tried. It may be nonlinear, vary with time, or have inputs that the log "
         "lacks: record about one operating point, or log what else acts on it"
         for i, fit in enumerate(found.validation.simulation)
-        if fit < _HALF
+        if fit < HALF
     )
 
 

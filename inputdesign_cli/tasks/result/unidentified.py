@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Found, order_of_excitation
+from inputdesign_cli.identification.explore import Found, one_line, order_of_excitation
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.plant.polynomial import Array
+
+# A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
+# not at all beyond the other.
+_NO_DIGIT, _NOT_AT_ALL = 1.0, 100.0
+# A rival of a twentieth of the likelihood, -2 log of that, and how far its G is off, in shares of its peak.
+_AS_LIKELY, _ELSEWHERE = 2.0 * float(np.log(20.0)), 0.1
+_FREQUENCIES = 100
+_OF_A_LINE = 2  # numbers that one frequency tells
 
 
 def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[str, ...]:
@@ -34,6 +42,20 @@ def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[s
             f"tells {order} numbers of the plant, and other models explain this record as well; apply an "
             "input that moves more (idesign signal makes some)"
         )
+    share = one_line(moving) if len(found.moving) == 1 and order >= needed > _OF_A_LINE else None
+    if share is not None:
+        told.append(
+            f"{100.0 * share:.3g} % of the power of the input are one sinusoid, and nothing that the rest "
+            f"moves can be seen: it tells {_OF_A_LINE} numbers of the plant, not {needed}, and two signals "
+            "that share a period (as of days) agree there without one moving the other; apply an input that "
+            "moves more (idesign signal makes some)"
+        )
+    none = untold_parameters(found, _NOT_AT_ALL)
+    if none:
+        told.append(
+            f"{', '.join(none)}: the record does not tell what acts there; move that input more, or leave it "
+            "out (--columns)"
+        )
     longest = max(len(y) for _, y in found.used)
     for candidate, theta in zip(found.taken, _by_output(found), strict=True):
         for letter, value in candidate.orders.beyond(theta, longest):
@@ -49,3 +71,38 @@ def _by_output(found: Found) -> list[Array]:
     """The parameters of every output's plant, in the order of its structure."""
     widths = [len(candidate.orders.delays) * candidate.orders.unknowns for candidate in found.taken]
     return np.split(found.model.theta[: sum(widths)], np.cumsum(widths)[:-1])
+
+
+def untold_parameters(found: Found, share: float = _NO_DIGIT) -> list[str]:
+    """Those of plants in s, dead times apart, that deviate by more than a share of their value."""
+    estimate, model = found.estimate, found.model
+    if not all(candidate.orders.physical for candidate in found.taken):
+        return []
+    counted = model.in_plant & ~model.dead_times
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    return [
+        f"{name} = {value:.3g} +- {deviation:.2g}"
+        for name, value, deviation, is_told in zip(
+            estimate.names, estimate.theta, deviations, counted, strict=True
+        )
+        if is_told and not deviation <= share * abs(value)
+    ]
+
+
+def rivalled(found: Found) -> tuple[str, ...]:
+    """A sentence where parameters of another minimum explain the record about as well, with another G."""
+    w = np.linspace(1e-6, np.pi, _FREQUENCIES)
+    G = found.model.plant_at(w)
+    peaks = np.maximum(np.abs(G).max(axis=0), 1e-300)
+    for rival in found.estimate.rivals:
+        other = found.model.at(rival.theta, found.model.covariance).plant_at(w)
+        apart = float(np.max(np.abs(other - G) / peaks))
+        if rival.excess <= _AS_LIKELY and not apart <= _ELSEWHERE:
+            named = zip(found.estimate.names, found.estimate.theta, rival.theta, strict=True)
+            values = ", ".join(f"{name} {one:.3g} or {two:.3g}" for name, one, two in named)
+            return (
+                f"two sets of parameters explain the record about equally well ({values}; -2 log likelihood "
+                f"differs by {rival.excess:.2g}), and their G by {100.0 * apart:.3g} % of its peak: move the "
+                "inputs independently of each other, and at more frequencies",
+            )
+    return ()

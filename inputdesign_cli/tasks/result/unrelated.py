@@ -104,15 +104,27 @@ def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> li
     Args:
         step: between samples, in the unit of time of the model.
     """
+    return _like_nothing(model, estimate, step, [(i, slice(None)) for i in range(model.outputs)])
+
+
+def driving_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
+    """The inputs (from zero) of a model whose column of G cannot be told from zero."""
+    return _like_nothing(model, estimate, step, [(slice(None), j) for j in range(model.inputs)])
+
+
+def _like_nothing(
+    model: Model, estimate: Estimate, step: float, parts: Sequence[tuple[int | slice, int | slice]]
+) -> list[int]:
+    """The numbers of the parts of G that cannot be told from zero, and are not known to be zero."""
     w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi / step
     with np.errstate(all="ignore"):
         gradient, G = model.plant_gradient(w), model.plant_at(w)
     found = []
-    for i in range(model.outputs):
-        change = _stacked(gradient[:, :, i].swapaxes(0, 1))
-        probability = _chance(estimate, change, _stacked(G[None, :, i])[0], wholly=True)
-        if probability is not None and probability > _ZERO:
-            found.append(i)
+    for number, (i, j) in enumerate(parts):
+        change = _stacked(gradient[:, :, i, j].swapaxes(0, 1))
+        probability = _chance(estimate, change, _stacked(G[None, :, i, j])[0], wholly=True)
+        if np.any(change) and probability is not None and probability > _ZERO:
+            found.append(number)
     return found
 
 

@@ -1,0 +1,64 @@
+"""Inputs that are one sinusoid but for what moves the outputs too little to be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.identification.explore.inputs import left_over, past, untold
+from inputdesign_cli.plant.polynomial import Array
+
+# The share of the power of an input from which it is a sinusoid, mostly, and the level at which what is left
+# of the input moves what is left of the output.
+_MOSTLY, _CERTAIN = 0.9, 1e-3
+_LAGS = 30
+_REFINED = 40
+_HELD = 0.5  # of the samples, at fewer of which an input moves that is held
+
+
+def one_line(parts: Sequence[tuple[Array, Array]]) -> float | None:
+    """The share of the power of u (n, 1) that a sinusoid has, if the rest moves no output of y (n, p).
+
+    Such a record tells G at one frequency ([ljung-1999], Section 13.2), and two slow signals that have a
+    period in common, as of days, are alike there without one moving the other. None of other
+    inputs, and of those that are held: a step is much like a part of a sinusoid.
+    """
+    u, y = max(parts, key=lambda part: len(part[1]))
+    lags = min(_LAGS, len(y) // (6 * (1 + y.shape[1])))
+    if lags < 1 or np.mean(np.diff(u[:, 0]) != 0.0) < _HELD:
+        return None
+    t = np.arange(len(u))
+    level = np.column_stack([np.ones(len(u)), t - t.mean()])
+    level = level / np.linalg.norm(level, axis=0)
+    varying = untold([level], [u[:, 0]])[0]
+    line = np.column_stack([level, _strongest(varying, level)])
+    left, answers = untold([line], [u[:, 0]])[0], untold([line], [y])[0]
+    share = 1.0 - float(left @ left) / max(float(varying @ varying), 1e-300)
+    if share < _MOSTLY:
+        return None
+    own = past(answers, lags)
+    both = np.column_stack([own, left[lags:], past(left[:, None], lags)])
+    for answer in answers[lags:].T:
+        gained = np.log(left_over(own, answer) / max(left_over(both, answer), 1e-300))
+        statistic = max(len(answer) - both.shape[1], 0) * gained
+        if y.shape[1] * scipy.special.chdtrc(lags + 1, statistic) < _CERTAIN:
+            return None
+    return share
+
+
+def _strongest(x: Array, level: Array) -> Array:
+    """(n, 2): cosine and sine of the frequency at which they leave least of x (n,), beside columns (n, m)."""
+    spectrum = np.abs(np.fft.rfft(x))
+    peak = max(int(np.argmax(spectrum)), 1)
+    tried = [
+        _pair(2.0 * np.pi * bins / len(x), len(x))
+        for bins in np.linspace(max(peak - 1.0, 0.25), peak + 1.0, _REFINED)
+    ]
+    return min(tried, key=lambda pair: left_over(np.column_stack([level, pair]), x))
+
+
+def _pair(frequency: float, samples: int) -> Array:
+    phase = frequency * np.arange(samples)
+    return np.column_stack([np.cos(phase), np.sin(phase)])
