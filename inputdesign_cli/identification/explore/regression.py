@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.stability import reflected
@@ -19,7 +20,7 @@ from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 8
 _RIDGE = 1e-12
-_CHI2 = 3.84  # 95 % for one degree of freedom
+_CONFIDENCE = 0.95
 _WIDTH = 6
 # The order of an ARX model that makes noise white.
 _WHITENING = 20
@@ -232,13 +233,16 @@ def delay_ranges(
 
     By the likelihood ratio, one input after the other, within a few samples of what was chosen.
     """
-    samples = sum(len(y) for _, y in parts)
+    samples, b = sum(len(y) for _, y in parts), max(n, 2)
+    # Of few samples the likelihood ratio of one parameter is that of F, not yet chi-squared.
+    free = max(samples - n - b * len(delays) - len(parts) * (n + 1), 1)
+    limit = samples * np.log1p(scipy.special.fdtri(1, free, _CONFIDENCE) / free)
     found = []
     for j, chosen in enumerate(delays):
         near = [d for d in range(chosen - _WIDTH, chosen + _WIDTH + 1) if least[j] <= d <= most]
-        losses = {d: output_error(parts, n, max(n, 2), (*delays[:j], d, *delays[j + 1 :])).loss for d in near}
+        losses = {d: output_error(parts, n, b, (*delays[:j], d, *delays[j + 1 :])).loss for d in near}
         smallest = min(losses.values(), default=0.0)
-        kept = [d for d, loss in losses.items() if samples * np.log(loss / max(smallest, 1e-300)) <= _CHI2]
+        kept = [d for d, loss in losses.items() if samples * np.log(loss / max(smallest, 1e-300)) <= limit]
         # Another structure than that of the quick estimate may have settled elsewhere.
         found.append((min(*kept, chosen), max(*kept, chosen)) if kept else (chosen, chosen))
     return tuple(found)
