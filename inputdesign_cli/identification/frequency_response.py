@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.period_drift import line_of_periods
 from inputdesign_cli.identification.periodic_response import (
     PeriodicResponse,
     Periods,
@@ -29,8 +30,11 @@ CONFIDENCE = 0.95
 _MOST_FREQUENCIES = 200
 _FREEDOM = 8
 _PARABOLA = 3
-_REPEATS, _BEGINNING, _TRIED = 1e-9, 16, 20
+_BEGINNING, _TRIED = 16, 20
 _DEPENDENT = 1e-7
+
+REPEATS = 1e-9
+"""Of the size of a signal that repeats, what one period may be off the next."""
 
 Method = Literal["lines", "local_polynomial"]
 
@@ -77,7 +81,7 @@ def frequency_response(
 
 def found_period(x: Array) -> int:
     """Of a signal (N,) that repeats, at least twice; 0 of others."""
-    tolerance = _REPEATS * float(np.abs(x).max())
+    tolerance = REPEATS * float(np.abs(x).max())
     if x.size < 2:
         return 0
     begin = x[: min(_BEGINNING, x.size // 2)]  # so that it stands a second time in what follows
@@ -107,9 +111,7 @@ def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
         return {}
     periods = Periods(period, skip=int(len(y) // period > 2))
     # A drift is the same ramp in every period, and would speak at all lines.
-    whole = y[len(y) % period :].reshape(-1, period, y.shape[1]).mean(axis=1)
-    ramp = np.polyfit(period * np.arange(len(whole)), whole, 1)[0]
-    level = y - np.outer(np.arange(len(y)), ramp)
+    level = y - line_of_periods(y, periods)
     inside = np.arange(1, (period + 1) // 2)
     silent = np.setdiff1d(inside, excited_harmonics(u, periods))
     found = {}

@@ -45,14 +45,14 @@ class Periods:
 
     def transforms(self, signal: NDArray[np.float64]) -> ComplexArray:
         """(.., blocks, kept, harmonics, channels) of signals (.., N, channels): of exp(jwt) its amplitude."""
-        return np.asarray(np.fft.rfft(self._parts(signal), axis=-2) / self.period)
+        return np.asarray(np.fft.rfft(self.parts(signal), axis=-2) / self.period)
 
     def means(self, signal: NDArray[np.float64], harmonics: NDArray[np.int_]) -> ComplexArray:
         """(.., L, channels, blocks): the means over the periods that count."""
-        found = np.fft.rfft(self._parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
+        found = np.fft.rfft(self.parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
         return np.asarray(np.moveaxis(found, -3, -1))
 
-    def _parts(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    def parts(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         """(.., blocks, kept, period, channels): what counts of signals, cut into periods; the end fits."""
         *runs, samples, channels = signal.shape
         each = self.each(samples)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.repeated import NORMAL
 from inputdesign_cli.plant.polynomial import Array
 
@@ -37,3 +38,22 @@ def spikes(errors: Array) -> list[Spikes]:
         if share >= _MOST:
             found.append(Spikes(output, tuple(far.tolist()), share))
     return found
+
+
+def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spikes]:
+    """Of outputs (N, p) of inputs that repeat, by how each of the periods that count differs from the others.
+
+    Medians of the periods, and over them, so that neither a spike nor a level that drifts counts elsewhere.
+
+    Args:
+        repeats: how many records of equal length with the same input follow each other.
+    """
+    parts = np.concatenate([periods.parts(one) for one in np.split(y, repeats)], axis=1)
+    apart = parts - np.median(parts, axis=1, keepdims=True)
+    levelled = parts - np.median(apart, axis=2, keepdims=True)
+    errors = levelled - np.median(levelled, axis=1, keepdims=True)
+    index = np.arange(float(len(y)))[:, None]
+    where = np.concatenate([periods.parts(one) for one in np.split(index, repeats)], axis=1)
+    at = where.reshape(-1).astype(np.int64)
+    found = spikes(errors.reshape(-1, y.shape[1]))
+    return [replace(one, samples=tuple(sorted(at[list(one.samples)].tolist()))) for one in found]

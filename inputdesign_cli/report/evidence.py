@@ -111,6 +111,8 @@ _UNDECIDED = {
     "undetermined": "the data do not determine the model: other parameters explain them nearly as well",
     "chance": "chance may stand behind what was measured",
     "nonlinearity": "the plant is not linear enough for what is asked",
+    "drift": "outputs drift, and that was not taken away",
+    "spikes": "a few samples decide what the data say",
 }
 
 _RIGHT = " if the structure of the model is right"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
+from inputdesign_cli.identification.period_drift import period_drift
 from inputdesign_cli.identification.periodic_response import (
     PeriodicResponse,
     Periods,
@@ -24,7 +25,9 @@ from inputdesign_cli.identification.periodic_response import (
     periodic_response,
 )
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
+from inputdesign_cli.identification.spikes import period_spikes
 from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
@@ -32,8 +35,10 @@ from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.response import ResponseTask
 from inputdesign_cli.tasks.result.measured_response import REMEDY, UNLIKE, Judged, measured_results, unexcited
+from inputdesign_cli.tasks.result.response_doubts import Doubts, drift_told, spikes_told
 from inputdesign_cli.tasks.result.responses import response_of_data
 from inputdesign_cli.tasks.result.silent_lines import Distorted, distorted
+from inputdesign_cli.tasks.whole_periods import left_out, whole_periods
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
@@ -81,7 +86,7 @@ def measure(
                 hint="record longer, or excite more frequencies",
             )
     else:
-        periods, repeats = _periods(task, data, paths[0].name)
+        data, periods, repeats = whole_periods(task.periods, data, paths[0].name, units.sample_time)
         excited = excited_lines(data.u, periods, task.grid.excited, repeats=repeats)
         missing = unexcited(question.header, task.grid.frequencies, excited)
         by_lines = periodic_response(data.u, data.y, periods, task.grid.excited[excited], repeats=repeats)
@@ -93,13 +98,11 @@ def measure(
             )
         found = of_periods(by_lines, periods.period)
         judged = _judged(task, by_lines, data, periods, repeats, excited)
-        silent = _silent(task, data, periods, repeats)
-        if "odd" in silent:
-            judged = replace(
-                judged, distorted=_distorted(question.model, task, by_lines, data, judged, silent)
-            )
+        silent, doubts = _doubted(question, task, by_lines, data, judged, repeats)
+        judged = replace(judged, doubts=doubts)
         lacking = [f"{missing}: {REMEDY}"] if missing else []
-        data = replace(data, notes=(*data.notes, *lacking, *_seen(data, periods, judged.differing)))
+        told = [*lacking, *left_out(data, periods), *_unlike(judged)]
+        data = replace(data, notes=(*data.notes, *told))
     shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
     results = measured_results(
         question.header, found, shown, judged, silent, data, time.perf_counter() - started, assess=assess
@@ -107,49 +110,63 @@ def measure(
     return results, judged
 
 
-def _periods(task: ResponseTask, data: Data, name: str) -> tuple[Periods, int]:
-    """How the data repeat, and how many records of equal length there are.
+def _unlike(judged: Judged) -> Iterator[str]:
+    """Whether the inputs repeat at all."""
+    if judged.differing > UNLIKE:
+        yield (
+            f"{100.0 * judged.differing:.3g} % of the power of the inputs differs from period to period of "
+            f"{judged.periods.period} samples: they do not repeat as the spec says; was its signal.csv "
+            "applied, and is u recorded as it was?"
+        )
 
-    Raises:
-        DataError: `bad-period`.
+
+def _doubted(
+    question: Measurement,
+    task: ResponseTask,
+    found: PeriodicResponse,
+    data: Data,
+    judged: Judged,
+    repeats: int,
+) -> tuple[dict[str, SilentLines], Doubts]:
+    """What silent lines have beside a drift, and what besides noise decides on the response.
+
+    Spikes are in every line: beside them silent lines tell nothing.
     """
-    stated, lengths = task.periods, set(data.lengths)
-    length, whole = data.lengths[0], stated.blocks * stated.period
-    fits = len(lengths) == 1 and (stated.blocks == 1 or length % whole == 0)
-    if not fits:
-        what = " and ".join(str(one) for one in sorted(lengths))
-        raise DataError.because(
-            "bad-period",
-            f"{name} has stretches of {what} samples, and the design has {stated.blocks} blocks of "
-            f"whole periods of {stated.period}",
-            hint="cut every record to the length of signal.csv (--skip, --range), and close gaps",
-        )
-    if stated.kept(length) < 1 or stated.kept(length) * len(data.lengths) < 2:
-        raise DataError.because(
-            "too-few-samples",
-            f"{name} has {stated.each(length)} periods of {stated.period} samples, {stated.skip} of them "
-            "transient: the scatter of two that count is needed to tell the noise",
-            hint="record more periods, or give several records",
-        )
-    return stated, len(data.lengths)
+    units, periods, doubts = question.header.units, judged.periods, judged.doubts
+    kept = repeats * periods.kept(data.lengths[0])
+    spiked = spikes_told(units, period_spikes(data.y, periods, repeats=repeats), data, kept)
+    if spiked:
+        return {}, replace(doubts, spiked=spiked)
+    drift = period_drift(
+        data.y, data.time, periods, _noise_at_rest(question.model, task, judged), repeats=repeats
+    )
+    if drift is not None:
+        data = replace(data, y=data.y - drift.curve)
+        without = periodic_response(data.u, data.y, periods, found.harmonics, repeats=repeats)
+        if without is not None:
+            scatter = np.abs(found.deviation**2 - without.deviation**2)
+            moved = judged.lines.ratios(np.sqrt(np.abs(found.G - without.G) ** 2 + scatter))
+            w = judged.grid.frequencies / units.frequency
+            drifting, moved = drift_told(units, drift, moved, w, lined=data.lined)
+            found, doubts = without, replace(doubts, drifting=drifting, moved=moved)
+    silent = _silent(task, data, periods, repeats)
+    if "odd" not in silent:
+        return silent, doubts
+    bent = _distorted(question.model, task, found, data, judged, silent)
+    return silent, replace(doubts, distorted=bent)
 
 
-def _seen(data: Data, periods: Periods, share: float) -> list[str]:
-    """What is left out of the records, and whether the inputs repeat at all."""
-    told, samples = [], data.lengths[0]
-    left = samples - periods.each(samples) * periods.blocks * periods.period
-    if left:
-        told.append(
-            f"the first {left} of {samples} samples are left out: the others are whole periods of "
-            f"{periods.period}"
-        )
-    if share > UNLIKE:
-        told.append(
-            f"{100.0 * share:.3g} % of the power of the inputs differs from period to period of "
-            f"{periods.period} samples: they do not repeat as the spec says; was its signal.csv applied, and "
-            "is u recorded as it was?"
-        )
-    return told
+def _noise_at_rest(model: Model, task: ResponseTask, judged: Judged) -> Array:
+    """(p,): the spectrum of the noise towards frequency zero, of the data, by that at their lowest line.
+
+    Noise of the spec may go on rising below that line.
+    """
+    lowest = int(np.argmin(judged.grid.frequencies))
+    there = judged.noise[lowest]
+    if task.tabulated:
+        return there
+    known = NoiseSpectrum.of(model).at(judged.periods.period, np.array([0]))[0]
+    return np.maximum(there, there / judged.lines.noise[lowest] * known)
 
 
 def _judged(
@@ -211,6 +228,8 @@ def _judged(
         least=low * at_most.ratios(smooth),
         largest=high * at_least.ratios(smooth),
         counted=counted,
+        noise=lines.noise * excess,
+        doubts=Doubts(np.zeros(len(found.harmonics))),
     )
 
 

@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.identification import spikes
+from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.spikes import period_spikes
 
 
 @settings(deadline=None, max_examples=60)
@@ -38,3 +40,27 @@ def test_what_is_frequent_or_without_spread_is_no_spike():
     e[:30:4] += 1e3  # eight of a hundred: an event, or a model that is wrong
     assert spikes(e) == []
     assert spikes(np.zeros((50, 1))) == []
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    blocks=st.integers(1, 2),
+    repeats=st.integers(1, 2),
+    skip=st.integers(0, 1),
+    where=st.sets(st.integers(0, 399), min_size=1, max_size=3),
+    drift=st.floats(-10, 10),
+)
+def test_spikes_of_periods_are_found_whatever_the_period_holds(seed, blocks, repeats, skip, where, drift):
+    """Not in the transient; from 400 samples of each record on, the first seven do not fill a period."""
+    rng = np.random.default_rng(seed)
+    periods, samples = Periods(100, blocks=blocks, skip=skip), blocks * 600
+    y = np.concatenate([np.tile(100.0 * rng.standard_normal(100), samples // 100) for _ in range(1)])
+    y = np.tile(y, repeats) + rng.standard_normal(samples * repeats)
+    y += np.repeat(drift * np.arange(samples * repeats // 100), 100)
+    assert period_spikes(y[:, None], periods, repeats=repeats) == []
+    at = sorted(100 * skip + x for x in where)
+    y[at] += 200.0
+    transient = {x for x in at if blocks == 2 and 600 <= x < 700 and skip}
+    (found,) = period_spikes(y[:, None], periods, repeats=repeats)
+    assert set(found.samples) == set(at) - transient

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
-from inputdesign_cli.identification.frequency_response import found_period
+from inputdesign_cli.identification.frequency_response import REPEATS, found_period
 from inputdesign_cli.plant.polynomial import Array
 
 # How far back a controller looks; what rounding of its output may leave of the power of an input.
@@ -22,6 +22,8 @@ _MOSTLY, _EXACT = 0.8, 5e-3
 _MOVE, _STRETCHES, _ROUNDS, _TO_DEVIATION = 4.0, 20, 20, 1.4826
 # An input that moves at fewer of its samples is held, and one of so few levels is switched.
 _HELD, _LEVELS = 1.0 / 3.0, 4
+# Jumps in a period of a relay that swings by itself are no more than these.
+_SWINGS = 8
 _LAGS, _WHITE = 20, 0.01
 TOGETHER = 4.0
 """A correlation of white signals beyond this, over the root of their number, is none by chance."""
@@ -128,6 +130,44 @@ def set_apart(parts: Parts, j: int) -> bool:
     if np.mean(moves != 0.0) < _HELD or len(np.unique(np.concatenate(u))) <= _LEVELS:
         return True
     return all(found_period(one - one.mean()) for one in u) or _is_white(u)
+
+
+def repeats_apart(parts: Parts, j: int) -> bool:
+    """Whether input j repeats from period to period, and some output does not: then it does not answer them.
+
+    What an input answers it has of the noise, too, which never repeats. A relay may swallow noise, and so an
+    input of few levels must jump more often in a period than a relay that swings. All parts must repeat with
+    the same period, and one of them hold two; rest before the input moves and after it tells nothing.
+    """
+    moving = [(u[at], y[at]) for u, y in parts for at in [_moving(u[:, j])]]
+    return _repeat_apart(parts, j) or _repeat_apart(moving, j)
+
+
+def _repeat_apart(parts: Parts, j: int) -> bool:
+    """The same of parts as they are."""
+    longest = max((u[:, j] for u, _ in parts), key=len)
+    if not longest.size:
+        return False
+    period = found_period(longest - longest.mean())
+    jumps = int(np.sum(np.diff(longest[: period + 1]) != 0.0))
+    return bool(
+        period
+        and (jumps > _SWINGS or len(np.unique(longest)) > _LEVELS)
+        and all(_follows(u[:, j], period) for u, _ in parts)
+        and not all(_follows(x, period) for _, y in parts for x in y.T)
+    )
+
+
+def _moving(x: Array) -> slice:
+    """From the first move of a signal (n,) to the last one."""
+    moves = np.flatnonzero(np.diff(x))
+    return slice(int(moves[0]) + 1, int(moves[-1]) + 2) if moves.size else slice(0)
+
+
+def _follows(x: Array, period: int) -> bool:
+    """Whether a signal (n,) comes again after so many samples, as far as it goes."""
+    far = np.abs(x[period:] - x[:-period])
+    return not far.size or bool(np.all(far <= REPEATS * np.abs(x - x.mean()).max()))
 
 
 def _is_white(u: Sequence[Array]) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
-from inputdesign_cli.identification.explore.laws import TOGETHER, answers_between_moves
+from inputdesign_cli.identification.explore.laws import TOGETHER, answers_between_moves, repeats_apart
 from inputdesign_cli.identification.explore.switched import switched_by
 from inputdesign_cli.plant.polynomial import Array
 
@@ -49,7 +49,9 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
     would help to predict one that is held. A third test is that of an answer at once, see `_at_once`, a
     fourth that of a relay, see `switched_by`. An input that follows the outputs exactly between moves of a
-    reference tells nothing new of itself, and is seen by that, see `answers_between_moves`.
+    reference tells nothing new of itself, and is seen by that, see `answers_between_moves`. One that repeats
+    while the outputs do not is never one: what a nonlinear plant adds at every period looks new in an output,
+    and goes together with what is left of the input, see `repeats_apart`.
 
     Args:
         parts: records u (n, r), y (n, p).
@@ -74,6 +76,8 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     brief = [(u, y) for u, y in busiest(centred, _MOST_SAMPLES) if len(y) > 3 * lags]
     found = []
     for j, target in enumerate(targets.T):
+        if repeats_apart(parts, j):
+            continue
         probability = min(
             _foretold(own, more, target), *_between_jumps(brief, lags, j), switched_by(brief, j)
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from inputdesign_cli.identification import Estimate, frozen, shifted, spikes
@@ -69,17 +71,22 @@ def _file(data: Data, at: int) -> str:
     return f" of {data.files[int(np.searchsorted(ends, at, side='right'))][0]}" if several else ""
 
 
+def places(units: Units, data: Data, samples: Sequence[int]) -> str:
+    """When samples were taken, and in which file; the first few of many."""
+    shown = [f"{data.time[at]:.10g} {units.time_unit}{_file(data, at)}" for at in samples[:_SHOWN]]
+    return ", ".join(shown) + ", .." * (len(samples) > _SHOWN)
+
+
 def _spikes(units: Units, estimate: Estimate, data: Data) -> list[str]:
     """A sentence for every output in whose residuals a few samples hold most of the sum of squares."""
     told = []
     for one in spikes(estimate.errors):
-        places = [f"{data.time[at]:.10g} {units.time_unit}{_file(data, at)}" for at in one.samples[:_SHOWN]]
         many, output = len(one.samples), f"y{one.output + 1}" if units.outputs > 1 else "y"
         told.append(
             f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
-            f"{100 * one.share:.3g} % of the squares of its residuals (at {', '.join(places)}"
-            f"{', ..' * (many > _SHOWN)}): spikes, or events that the model does not know, decide what "
-            "these data say; empty the cells that are faults of measurement, which cuts the record there, "
-            "and try again"
+            f"{100 * one.share:.3g} % of the squares of its residuals (at "
+            f"{places(units, data, one.samples)}): spikes, or events that the model does not know, decide "
+            "what these data say; empty the cells that are faults of measurement, which cuts the record "
+            "there, and try again"
         )
     return told

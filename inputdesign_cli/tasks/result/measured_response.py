@@ -19,7 +19,8 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.tasks.build.data import Data
-from inputdesign_cli.tasks.result.silent_lines import MATTERS, Distorted, silent_entry, silent_notes
+from inputdesign_cli.tasks.result.response_doubts import Doubts, bent_told
+from inputdesign_cli.tasks.result.silent_lines import Distorted, silent_entry, silent_notes
 
 Verdict = Literal["met", "missed", "undecided"]
 REMEDY = "apply the signal.csv of the spec, and record u as it was applied; or is this the record of another?"
@@ -38,8 +39,9 @@ class Judged:
         counted: samples that count.
         asked: how many lines the spec has, of which these are those that the inputs excite.
         differing: the share of the power of the inputs that differs from period to period.
+        noise: (L, p), the spectrum of the noise of the data, averaged along the lines.
         times: with so many times the periods a verdict would be met, by the same plant and noise.
-        distorted: what a nonlinearity does to the response; None where none is seen, or none is watched for.
+        doubts: what decides besides noise.
     """
 
     grid: HarmonicGrid
@@ -54,12 +56,13 @@ class Judged:
     asked: int
     differing: float
     times: float
-    distorted: Distorted | None = None
+    noise: NDArray[np.float64]
+    doubts: Doubts
 
     @property
     def doubted(self) -> bool:
-        """Whether a nonlinearity may decide."""
-        return self.distorted is not None and self.distorted.matters
+        """Whether something else than noise may decide."""
+        return bool(np.any(self.doubts.changed > 0.0)) or bool(self.doubts.spiked)
 
     @property
     def worst(self) -> int:
@@ -68,10 +71,16 @@ class Judged:
 
     @property
     def verdict(self) -> Verdict:
-        """Met or missed where neither chance nor a nonlinearity decides."""
-        if np.all(self.largest <= 1.0):
-            return "undecided" if self.doubted else "met"
-        return "missed" if np.any(self.least > 1.0) else "undecided"
+        """Met or missed where neither chance nor anything else than noise decides.
+
+        What is admitted may be a share of |G|, so that it is not known better than the response itself.
+        Spikes and drifts are in the scatter, too.
+        """
+        sure = self.least / (1.0 + (self.lines.share or 0.0) * self.doubts.changed)
+        noisy = not self.doubts.spiked and not self.doubts.drifting
+        if noisy and np.any(sure > 1.0):
+            return "missed"
+        return "undecided" if self.doubted or np.any(self.largest > 1.0) else "met"
 
 
 def measured_results(
@@ -120,11 +129,14 @@ def measured_results(
     if silent:
         entry["nonlinearity"] = silent_entry(silent)
         notes += silent_notes(silent)
-        if judged is not None and judged.distorted is not None:
-            entry["nonlinearity"]["odd"] |= _odd(judged.distorted, w)
-            # As the reason of a verdict it stands among the notes anyway.
-            if not (assess and judged.verdict == "undecided" and judged.doubted):
-                notes.append(_of_nonlinearity(header, judged.distorted, w))
+    if judged is not None:
+        bent = judged.doubts.distorted
+        if bent is not None:
+            entry["nonlinearity"]["odd"] |= _odd(bent, w)
+            notes += [] if bent.matters else [bent_told(units, bent, w)]
+        # As the reasons of a verdict they stand among the notes anyway.
+        if not (assess and judged.verdict == "undecided"):
+            notes += [reason for _, reason in _reasons(header, judged, w)]
     if assess and judged is not None:
         assessment = _assessment(header, judged, w)
         result |= {"status": judged.verdict, "assessment": assessment}
@@ -162,26 +174,36 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
         "met": verdict == "met",
         "requirements": [{"name": "frequency_response", "worst_ratio": ratio, "frequency": float(w[worst])}],
     }
-    causes, reasons = list[str](), list[str]()
-    if high > 1.0:
+    doubts = _reasons(header, judged, w)
+    if doubts and verdict == "missed":
+        entry["no_top_up"] = "more periods alone are no remedy: the notes say what stands behind that"
+    elif high > 1.0 and not doubts:
         counted = periods_needed(judged)
         entry |= {} if counted is None else {"periods": counted}
         enough = _enough(judged, counted)
-        if verdict == "undecided":
-            causes.append("chance")
-            reasons.append(
+        if verdict == "missed":
+            entry["no_top_up"] = enough if counted is None else f"repeat the record: {enough}"
+        else:
+            by_chance = (
                 f"the largest deviation is {ratio:.4g} of what is admitted, at {w[worst]:.4g} "
                 f"{header.units.per_time}, and by chance anything between {low:.3g} and {high:.3g} may stand "
                 f"behind that: {enough}"
             )
-        else:
-            entry["no_top_up"] = enough if counted is None else f"repeat the record: {enough}"
+            doubts = [("chance", by_chance)]
     if verdict == "undecided":
-        if judged.distorted is not None and judged.distorted.matters:
-            causes.append("nonlinearity")
-            reasons.append(_of_nonlinearity(header, judged.distorted, w))
-        entry |= {"causes": causes, "undecided": reasons}
+        causes, reasons = zip(*doubts, strict=True)
+        entry |= {"causes": list(dict.fromkeys(causes)), "undecided": list(reasons)}
     return entry
+
+
+def _reasons(header: Header, judged: Judged, w: Array) -> list[tuple[str, str]]:
+    """What decides besides noise: causes of `assessment.causes`, each with a sentence."""
+    doubts, found = judged.doubts, list[tuple[str, str]]()
+    found += [("spikes", told) for told in doubts.spiked]
+    found += [("drift", doubts.drifting)] if doubts.drifting else []
+    if doubts.distorted is not None and doubts.distorted.matters:
+        found.append(("nonlinearity", bent_told(header.units, doubts.distorted, w)))
+    return found
 
 
 def periods_needed(judged: Judged) -> int | None:
@@ -219,17 +241,3 @@ def _odd(distorted: Distorted, w: Array) -> dict[str, Json]:
     """What `nonlinearity.odd` of the result says of the response."""
     cubed = {"cubed": distorted.cubed} if distorted.cubed else {}
     return {"worst_ratio": distorted.share, "frequency": float(w[distorted.line]), **cubed}
-
-
-def _of_nonlinearity(header: Header, distorted: Distorted, w: Array) -> str:
-    """What a nonlinearity of odd degree does to the response, and what to do."""
-    share = f"{distorted.share:.2g} of what is admitted, at {w[distorted.line]:.3g} {header.units.per_time}"
-    if not distorted.matters:
-        return f"what a nonlinearity of odd degree changes of the response is small: about {share}"
-    kind = f"the cube of {distorted.cubed}" if distorted.cubed else "a nonlinearity, or a drift"
-    return (
-        f"odd lines that are not excited tell of {kind} (probability of chance "
-        f"{distorted.probability:.2g}), that changes the response by about {share}; from {MATTERS:g} on "
-        "that is not called met. More periods do not help: measure at a smaller amplitude, and see whether "
-        "the response stays"
-    )

@@ -26,15 +26,24 @@ class Distorted:
     """What a nonlinearity of odd degree does to a response: at most this share of what is admitted.
 
     Attributes:
-        line: at which that is.
+        shares: (L,), that at every line.
         probability: that noise alone has as much at the silent lines.
         cubed: what the silent lines have the cube of, such as u1; empty where their power alone tells.
     """
 
-    share: float
-    line: int
+    shares: Array
     probability: float
     cubed: str
+
+    @property
+    def line(self) -> int:
+        """That of the largest share."""
+        return int(np.argmax(self.shares))
+
+    @property
+    def share(self) -> float:
+        """The largest share."""
+        return float(self.shares[self.line])
 
     @property
     def matters(self) -> bool:
@@ -61,7 +70,7 @@ def distorted(
         output = int(np.argmin(cube.probability))
         source = int(cube.source[output])
         told = f"y{output + 1}" if source < 0 else f"u{source + 1}"
-    found = Distorted(float(both[line]), line, min(power, like), told)
+    found = Distorted(np.asarray(both), min(power, like), told)
     small = min(_chance(silent, "odd"), like) < _SPEAKS
     return found if (min(power, like) < _DOUBT if found.matters else small) else None
 

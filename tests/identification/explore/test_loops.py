@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.signal
+from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.identification.explore import answers_output, explore_records
 
@@ -32,10 +33,11 @@ def noise(rng, samples, name, size):
     return size * v / v.std()
 
 
-def looped(rng, plant, colour, hold, samples=800, size=0.3):
-    """u (n, 1) and y (n, 1) of a loop that answers y(t) by u(t), its reference held."""
+def looped(rng, plant, colour, hold, samples=800, size=0.3, reference=None):
+    """u (n, 1) and y (n, 1) of a loop that answers y(t) by u(t), its reference held if none is given."""
     b, a, (gain, integral) = PLANTS[plant]
-    r, v = steps(rng, samples, hold), noise(rng, samples, colour, size)
+    r = steps(rng, samples, hold) if reference is None else reference
+    v = noise(rng, samples, colour, size)
     u, y, x, total = np.zeros(samples), np.zeros(samples), np.zeros(samples), 0.0
     for k in range(samples):
         x[k] = sum(c * u[k - i] for i, c in enumerate(b) if 0 < i <= k)
@@ -118,6 +120,66 @@ def test_an_input_that_repeats_is_foretold_by_no_output(shape):
             }[shape]
             y = scipy.signal.lfilter(*OPEN["second order"][:2], u) + size * rng.standard_normal(1400)
             assert answers_output([(u[600:, None], y[600:, None])]) == []
+
+
+def play(x, width):
+    out, at = np.zeros_like(x), 0.0
+    for k, value in enumerate(x):
+        out[k] = at = min(max(at, value - width), value + width)
+    return out
+
+
+CURVES = {
+    "clipping": lambda x: np.clip(x, -1.0, 1.0),
+    "cube": lambda x: x + 0.15 * x**3,
+    "dead zone": lambda x: np.sign(x) * np.maximum(np.abs(x) - 0.5, 0.0),
+    "play": lambda x: play(x, 0.4),
+}
+
+
+def one_period(rng, kind, period):
+    t = np.arange(period)
+    lines = np.arange(1, period // 3, 2 if kind == "odd lines" else 1)
+    lines = lines[rng.random(lines.size) < 0.7]
+    x = {
+        "levels": lambda: np.repeat(rng.standard_normal(period // 5 + 1), 5)[:period],
+        "four levels": lambda: rng.choice([-1.0, -0.2, 0.5, 1.5], period),
+    }.get(kind, lambda: np.cos(2 * np.pi * np.outer(t, lines) / period + rng.random(lines.size) * 7).sum(1))()
+    return x / x.std()
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    kind=st.sampled_from(["lines", "odd lines", "levels", "four levels"]),
+    curve=st.sampled_from(sorted(CURVES)),
+    period=st.integers(60, 400),
+    times=st.integers(2, 6),
+    cut=st.floats(0.0, 0.5),
+    rest=st.integers(0, 150),
+)
+def test_no_nonlinear_plant_makes_a_repeating_input_a_loop(seed, kind, curve, period, times, cut, rest):
+    """In one record, two with a gap, or from rest: what comes again without the noise does not answer."""
+    rng = np.random.default_rng(seed)
+    u = np.concatenate([np.zeros(rest), np.tile(one_period(rng, kind, period), times)])
+    x = scipy.signal.lfilter([0, 0.4, 0.1], [1, -1.5, 0.8], CURVES[curve](u))
+    y = x + noise(rng, len(u), "ar", 0.1 * x.std())
+    records = [(u[:, None], y[:, None])]
+    assert answers_output(records) == []
+    at = rest + int(cut * (len(u) - rest - 2 * period))
+    if at > rest:
+        assert answers_output([(u[:at, None], y[:at, None]), (u[at:, None], y[at:, None])]) == []
+
+
+@pytest.mark.parametrize("size", [0.01, 0.1, 0.3])
+@pytest.mark.parametrize("plant", PLANTS)
+def test_a_loop_with_a_reference_that_repeats_is_seen(plant, size):
+    """The noise that comes round the loop does not repeat, and so the input does not."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        reference = np.tile(one_period(rng, "lines", 200), 5)
+        record = looped(rng, plant, "ar", 1, samples=1000, size=size, reference=reference)
+        assert [j for j, _ in answers_output([record])] == [0]
 
 
 @pytest.mark.slow

@@ -1,0 +1,114 @@
+"""Which samples of data are the periods that a design counts, gaps or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.tasks.build.data import Data
+
+
+def whole_periods(stated: Periods, data: Data, name: str, step: float) -> tuple[Data, Periods, int]:
+    """The data that count, how they repeat, and how many records of equal length there are.
+
+    Records of equal length stay as they are. Of pieces between gaps, and of records of several lengths, the
+    periods that lie in one piece are taken: those that begin at the sample of a period of which there are
+    most, counted from the begin of each file, so that all have the same phase.
+
+    Args:
+        name: of the file that messages name.
+        step: the sample time, in the unit of the times of the data.
+
+    Raises:
+        DataError: `bad-period`, `too-few-samples`.
+    """
+    lengths, length = set(data.lengths), data.lengths[0]
+    whole = stated.blocks * stated.period
+    if len(lengths) == 1 and len(data.files) == len(data.lengths):
+        if stated.blocks == 1 or length % whole == 0:
+            _check(stated.kept(length), stated.kept(length) * len(data.lengths), stated, name)
+            return data, stated, len(data.lengths)
+    elif stated.blocks == 1:
+        return _from_pieces(stated, data, name, step)
+    what = " and ".join(str(one) for one in sorted(lengths))
+    raise DataError.because(
+        "bad-period",
+        f"{name} has stretches of {what} samples, and the design has {stated.blocks} blocks of "
+        f"whole periods of {stated.period}",
+        hint="cut every record to the length of signal.csv (--skip, --range), and close gaps",
+    )
+
+
+def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> tuple[Data, Periods, int]:
+    """One record of the periods without a gap."""
+    period, places = stated.period, _places(data, step)
+    transient = stated.skip * period
+    follow = np.ones(len(places), dtype=bool)
+    follow[np.cumsum(data.lengths)[:-1]] = False
+    gaps = np.cumsum(~follow)
+    last = np.arange(len(places)) + period - 1
+    begins = np.flatnonzero((last < len(places)) & (places >= transient))
+    begins = begins[gaps[last[begins]] == gaps[begins]]
+    taken: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    if begins.size:
+        phase = int(np.argmax(np.bincount(places[begins] % period)))
+        taken = begins[places[begins] % period == phase]
+    _check(taken.size, taken.size, stated, name)
+    samples = (taken[:, None] + np.arange(period)).ravel()
+    ends = np.cumsum([count for _, count in data.files])
+    counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=ends.size)
+    note = (
+        f"the data have {len(data.lengths)} pieces without gaps: the {taken.size} whole periods of {period} "
+        "samples in them count, after the transient"
+    )
+    kept = replace(
+        data,
+        u=data.u[samples],
+        y=data.y[samples],
+        r=None if data.r is None else data.r[samples],
+        time=data.time[samples],
+        lengths=(len(samples),),
+        files=tuple((file, int(count)) for (file, _), count in zip(data.files, counts, strict=True)),
+        notes=(*data.notes, note),
+        recorded=None if data.recorded is None else data.recorded.at(samples),
+    )
+    return kept, replace(stated, skip=0), 1
+
+
+def _places(data: Data, step: float) -> NDArray[np.int64]:
+    """(N,): how many samples after the begin of its file each one was taken."""
+    ends = np.cumsum([count for _, count in data.files])[:-1]
+    return np.concatenate([np.round((part - part[0]) / step) for part in np.split(data.time, ends)]).astype(
+        np.int64
+    )
+
+
+def _check(each: int, together: int, stated: Periods, name: str) -> None:
+    """Enough periods count, in a block and in all records.
+
+    Raises:
+        DataError: `too-few-samples`.
+    """
+    if each < 1 or together < 2:
+        raise DataError.because(
+            "too-few-samples",
+            f"{name} has {max(each, 0)} whole periods of {stated.period} samples after {stated.skip} that "
+            "are transient: the scatter of two that count is needed to tell the noise",
+            hint="record more periods, or give several records",
+        )
+
+
+def left_out(data: Data, periods: Periods) -> Iterator[str]:
+    """A sentence on samples before the first whole period."""
+    samples = data.lengths[0]
+    left = samples - periods.each(samples) * periods.blocks * periods.period
+    if left:
+        yield (
+            f"the first {left} of {samples} samples are left out: the others are whole periods of "
+            f"{periods.period}"
+        )
