@@ -18,7 +18,8 @@ def like_inverses(found: Found, moving: Parts) -> tuple[str, ...]:
     """A sentence for every plant that may be the inverse of a controller, -1/C ([ljung-1999], Section 13.4).
 
     It answers at once, and either nobody sets the input without a look at the output, as far as the input
-    tells, or the plant has no static gain and |G| hardly falls with frequency, as where C integrates.
+    tells, or a plant of one input and output has no static gain and |G| hardly falls with frequency, as where
+    C integrates.
 
     Args:
         moving: records of the inputs that move.
@@ -46,6 +47,8 @@ def like_inverses(found: Found, moving: Parts) -> tuple[str, ...]:
 
 
 def _like_integral_action(found: Found, i: int, j: int) -> bool:
+    if found.model.inputs > 1 or found.model.outputs > 1:
+        return False
     G = np.abs(found.model.plant_at(np.linspace(1e-6, np.pi, _FREQUENCIES))[:, i, j])
     highest = np.maximum.accumulate(G)
     return bool(G[0] <= _NO_GAIN * highest[-1] and np.all(_FALLS * highest <= G))
