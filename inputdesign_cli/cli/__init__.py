@@ -16,6 +16,7 @@ from inputdesign_cli.cli.designs import analyse, simulate, solve
 from inputdesign_cli.cli.examples import examples
 from inputdesign_cli.cli.explore import explore
 from inputdesign_cli.cli.init import init
+from inputdesign_cli.cli.once import OnceCommand
 from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
 from inputdesign_cli.cli.signal import signal
@@ -83,7 +84,8 @@ COMMANDS = (
 # A word of Python is no name of a function.
 _NAMES = {"proceed": "next"}
 for command in COMMANDS:
-    app.command(_NAMES.get(command.__name__))(guarded(command))
+    once = OnceCommand if command is signal else None
+    app.command(_NAMES.get(command.__name__), cls=once)(guarded(command))
 
 
 def main() -> None:

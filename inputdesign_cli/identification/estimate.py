@@ -193,7 +193,7 @@ def concluded(
         directed=directed_tests(records, point, alternatives, echoes),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
-        repeated=repetition(point.errors, records.u),
+        repeated=repetition(point.errors, records.u, feedback=feedback),
     )
 
 

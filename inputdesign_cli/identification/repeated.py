@@ -4,6 +4,10 @@ Errors of different times are independent if the model is right, and so is every
 the same noise, also where it was rounded, shifted or scaled, comes again. Where the model is wrong errors are
 coloured, and slow ones follow each other by chance; and inputs that come again bring the same errors. So what
 past errors and the inputs explain is taken off first, by an autoregression with inputs.
+
+A controller makes u(t) from y(t), so that u(t) tells e(t): what is left beside it are steps of the reference,
+which come again. In a loop only past inputs count, therefore. Without one u(t) may act at once; since a loop
+may be unknown, samples are given twice if they come again both beside u(t) and without it.
 """
 
 from __future__ import annotations
@@ -37,11 +41,12 @@ class Repetition:
     length: int
 
 
-def repetition(errors: Array, inputs: Array | None = None) -> Repetition | None:
+def repetition(errors: Array, inputs: Array | None = None, *, feedback: bool = False) -> Repetition | None:
     """The longest stretch of errors (samples, p) that comes again; None where none does.
 
     Args:
         inputs: (samples, r), of the same times.
+        feedback: Whether the inputs were made from the outputs.
     """
     spread = np.median(np.abs(errors), axis=0) / NORMAL
     samples = len(errors)
@@ -49,7 +54,16 @@ def repetition(errors: Array, inputs: Array | None = None) -> Repetition | None:
         return None
     columns = np.clip(errors / spread, -_SPIKE, _SPIKE).T
     u = np.zeros((samples, 0)) if inputs is None else inputs
-    e = np.column_stack([_unexplained(x, u) for x in columns])
+    found = _again(np.column_stack([_unexplained(x, u, newest=1) for x in columns]))
+    if found is None or feedback or not np.any(np.ptp(u, axis=0)):
+        return found
+    beside = _again(np.column_stack([_unexplained(x, u, newest=0) for x in columns]))
+    return beside and found
+
+
+def _again(e: Array) -> Repetition | None:
+    """The longest stretch of white errors (samples, p) that comes again."""
+    samples = len(e)
     around = scipy.fft.rfft(e, 2 * samples, axis=0)
     products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)
     lags = np.arange(_IN_A_ROW, samples - _IN_A_ROW + 1)
@@ -69,8 +83,8 @@ def whitened(x: Array) -> Array:
     return np.asarray(np.convolve(x, np.concatenate([[1.0], -ahead]))[: x.size])
 
 
-def _unexplained(x: Array, u: Array) -> Array:
-    """What an autoregression with inputs u (N, r) leaves of a signal (N,)."""
+def _unexplained(x: Array, u: Array, newest: int) -> Array:
+    """What an autoregression with inputs u (N, r), the newest of lag `newest`, leaves of a signal (N,)."""
     order = min(_ORDER, x.size // (_SAMPLES_A_LAG * (1 + u.shape[1])))
     moving = u[:, np.ptp(u, axis=0) > 0.0]
     if not order or not moving.shape[1]:
@@ -78,11 +92,14 @@ def _unexplained(x: Array, u: Array) -> Array:
     own, by = x - x.mean(), (moving - moving.mean(axis=0)) / moving.std(axis=0)
     head = len(own[:_MOST_FITTED])
     signals = [own, *by.T]
-    past = [shifted(one[:head], lag, (head,)) for lag in range(order + 1) for one in signals]
-    weights = np.linalg.lstsq(np.column_stack(past[1:]), own[:head], rcond=None)[0]
+    firsts = [1, *(newest for _ in by.T)]
+    lags = [(one, lag) for one, first in zip(signals, firsts, strict=True) for lag in range(first, order + 1)]
+    past = np.column_stack([shifted(one[:head], lag, (head,)) for one, lag in lags])
+    weights = np.linalg.lstsq(past, own[:head], rcond=None)[0]
     left = own.copy()
-    for one, ahead in zip(signals, np.insert(weights, 0, 0.0).reshape(order + 1, -1).T, strict=True):
-        left -= np.convolve(one, ahead)[: own.size]
+    for one, first in zip(signals, firsts, strict=True):
+        ahead, weights = np.split(weights, [order + 1 - first])
+        left -= np.convolve(one, np.concatenate([np.zeros(first), ahead]))[: own.size]
     return left
 
 

@@ -218,7 +218,8 @@ def from_rest_or_free(
     # determinant allows short steps only.
     errors = near.of_errors
     step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
-    share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED)
+    # Where nothing is left of the errors there is nothing to gain.
+    share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED) if near.cost else 0.0
     if probability(free, near, -near.near.freedom * np.log1p(-share)) > _UNLIKELY:
         return at_rest
     return unless_by_chance(begun_free(at_rest.point.theta, late))

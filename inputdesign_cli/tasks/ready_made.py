@@ -111,6 +111,7 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
                 "a chirp has one frequency at a time, so that several inputs would be told apart by nothing",
                 hint="use a multisine for several inputs, or one chirp after the other",
             )
+        _check_turns(asked, samples)
         return chirp(samples, _band(asked)), samples
     if asked.number is not None and asked.number > samples:
         raise bad_spec(
@@ -135,6 +136,26 @@ def _check_apart(u: Array, asked: ReadyMade) -> None:
         f"of {asked.inputs} inputs over {len(u)} samples, {asked.inputs - rank} follow from the others, "
         "so that what they do could not be told apart",
         hint=f"write {longer}, and --samples enough for them",
+    )
+
+
+def _check_turns(asked: ReadyMade, samples: int) -> None:
+    """Raise `SpecError` (`bad-period`) where a chirp would not turn once, and so not cover its range."""
+    lo, hi = _band(asked)
+    turn = math.ceil(4.0 * math.pi / (lo + hi))
+    if samples >= turn:
+        return
+    most = SIZES["samples of a ready-made signal"].most
+    hint = f"write --samples {turn} or more"
+    if turn > most:
+        least = 4.0 * math.pi / most / asked.sample_time
+        ends = f"{least:.3g} rad/{asked.time_unit}"
+        hint = f"write a band whose ends sum to {ends} or more, or a longer --sample-time"
+    raise bad_spec(
+        "bad-period",
+        f"over {samples} samples the chirp makes less than one turn, so that it neither covers its range nor "
+        "excites its band",
+        hint=hint,
     )
 
 

@@ -119,3 +119,19 @@ def test_an_option_without_effect_is_refused(words):
     result = run(*words)
     assert result.exit_code == 2
     assert "does nothing to" in result.output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--prbs", 5, "--prbs", 6),
+        ("--prbs", 5, "--samples", 20, "--samples=30"),
+        ("--range", "0:1", "--steps", 5, "--range", "0:2"),
+        ("--chirp", "0.1:1", "--seed", 1, "--seed", 1),
+    ],
+)
+def test_an_option_that_stands_twice_is_refused(words, tmp_path):
+    result = run(*words, "-o", tmp_path / "u.csv", "-o", tmp_path / "u.npz")
+    assert result.exit_code == 2
+    assert "stands there twice" in result.output
+    assert not list(tmp_path.iterdir())

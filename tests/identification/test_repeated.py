@@ -72,3 +72,41 @@ def test_what_inputs_bring_again_is_not_given_twice():
     once = missing[:300] + 0.2 * white(300, seed=5)
     assert repetition(np.concatenate([once, once]), u).length >= 200
     assert repetition(errors, np.ones((600, 1))) is not None
+
+
+def loop(proportional, integral, derivative, seed, on_u=0.0, grid=0.0, samples=800):
+    """Errors and inputs (samples, 1) of y = 0.9 y + 0.1 u(t - 3) + e under a PID and steps of a reference."""
+    rng = np.random.default_rng(seed)
+    e, w = 0.05 * rng.standard_normal(samples), on_u * rng.standard_normal(samples)
+    r = np.repeat(0.3 * rng.choice([-1.0, 1.0], samples // 50), 50)
+    u, y, control = np.zeros(samples), np.zeros(samples), np.zeros(samples)
+    total = 0.0
+    for t in range(samples):
+        y[t] = e[t] + (0.9 * y[t - 1] if t else 0.0) + (0.1 * u[t - 3] if t >= 3 else 0.0)
+        control[t] = r[t] - y[t]
+        total += integral * control[t]
+        u[t] = proportional * control[t] + total + derivative * (control[t] - control[t - 1] * (t > 0)) + w[t]
+        u[t] = np.round(u[t] / grid) * grid if grid else u[t]
+    return e[:, None], u[:, None]
+
+
+LOOPS = [(1.0, 0.0, 0.0), (1.0, 0.08, 0.0), (1.0, 0.08, 0.5)]
+
+
+@pytest.mark.parametrize("feedback", [True, False])
+@pytest.mark.parametrize("law", LOOPS)
+@pytest.mark.parametrize("disturbed", [{}, {"on_u": 0.01}, {"grid": 0.02}])
+def test_a_controller_that_tells_the_noise_gives_no_samples_twice(law, disturbed, feedback):
+    """The errors are the noise itself; the loop may be known or not."""
+    loops = [loop(*law, seed, **disturbed) for seed in range(20)]
+    assert [seed for seed, (e, u) in enumerate(loops) if repetition(e, u, feedback=feedback)] == []
+
+
+@pytest.mark.parametrize("law", LOOPS)
+@pytest.mark.parametrize("length", [100, 300])
+def test_samples_of_a_loop_that_are_given_twice_are_found(law, length):
+    for seed in range(20):
+        both = [np.concatenate([x, x[200 : 200 + length]]) for x in loop(*law, seed)]
+        found = repetition(*both, feedback=True)
+        assert found is not None
+        assert found.length == pytest.approx(length, abs=40)

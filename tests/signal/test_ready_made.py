@@ -1,5 +1,7 @@
 """Ready-made signals: what the textbooks say of them."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -128,3 +130,28 @@ def test_what_is_told_is_that_of_the_samples_that_are_made():
     assert told["peak"] == pytest.approx(np.abs(u - np.mean(u)).max())
     circle = np.stack([np.roll(u - np.mean(u), lag) for lag in range(100)])
     assert told["order_of_excitation"] == np.linalg.matrix_rank(circle @ circle.T, hermitian=True)
+
+
+@pytest.mark.parametrize("band", [(0.001, 0.01), (0.0, 0.02), (0.1, 1.0), (0.3, 0.4), (2.0, 3.1)])
+def test_a_chirp_that_is_shorter_than_a_turn_is_refused_with_the_samples_that_cover_its_range(band):
+    levels = ((20.0, 80.0),)
+    with pytest.raises(SpecError, match="less than one turn") as caught:
+        make_signal(ReadyMade("chirp", band=band, samples=2, levels=levels))
+    (least,) = re.findall(r"--samples (\d+) or more", caught.value.diagnostics[0].hint)
+    # A turn is 2 pi of phase, and the phase is the integral of the frequency.
+    assert (int(least) - 1) * np.mean(band) < 2.0 * np.pi <= int(least) * np.mean(band)
+    made = make_signal(ReadyMade("chirp", band=band, samples=int(least), levels=levels))
+    u = made.tables["signal"].columns["u1"]
+    ends = u.min() - 20.0, 80.0 - u.max()
+    assert min(ends) == pytest.approx(0.0, abs=1e-9)
+    if band[1] <= 1.0:  # a few samples for each turn
+        assert max(ends) < 3.0
+
+
+def test_a_chirp_that_no_record_turns_asks_for_another_band():
+    asked = ReadyMade("chirp", band=(0.1, 1.0), sample_time=1e-12)
+    with pytest.raises(SpecError, match="less than one turn") as caught:
+        make_signal(asked)
+    (least,) = re.findall(r"sum to (\S+) rad/s or more", caught.value.diagnostics[0].hint)
+    # The longest record that is made, at the mean of the band, is one turn.
+    assert 10_000_000 * 1e-12 * float(least) / 2.0 == pytest.approx(2.0 * np.pi, rel=0.01)

@@ -202,6 +202,19 @@ def test_bad_records_are_refused(change, code, write):
     assert caught.value.diagnostics[0].code == code
 
 
+@pytest.mark.parametrize("plant", ["{B: [0, 0.5], F: [1, -0.8]}", "{A: [1, -0.8], B: [0, 0.5]}"])
+@pytest.mark.parametrize("first", [[1.0], [1.0, 0.5]])
+@pytest.mark.parametrize("samples", [20, 40, 200])
+def test_an_output_that_the_start_alone_explains_has_no_noise(samples, first, plant, write):
+    """To the last digit: nothing is left to gain, and nothing to divide by."""
+    spec = parse_spec(f"plant: {plant}\nnoise: {{variance: 1}}\nexperiment: {{samples: 200}}\n", design=False)
+    pulse, y = np.eye(1, samples)[0], np.zeros(samples)
+    y[: len(first)] = first
+    with pytest.raises(DataError) as caught:
+        identify(spec, write({"u1": pulse, "y1": y}))
+    assert caught.value.diagnostics[0].code == "noise-free-data"
+
+
 def test_text_is_refused_with_its_line(data):
     lines = data.read_text().splitlines()
     lines[7] = "6,fast,1"

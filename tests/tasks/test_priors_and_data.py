@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from inputdesign_cli import assess, identify, parse_spec, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import DataError, SpecError
 from tests.support.heater import HEATER
 
 
@@ -77,3 +77,36 @@ def test_what_is_no_model_file_is_refused_and_not_shown(tmp_path, text):
     (diagnostic,) = caught.value.diagnostics
     assert (diagnostic.code, diagnostic.key) == ("bad-model-file", "experiment.prior.information")
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["folder", "there-is-none.csv", "text.csv", "output.csv"])
+@pytest.mark.parametrize("ask", [identify, assess, lambda spec, path: solve(spec)])
+def test_a_prior_that_cannot_be_read_is_refused_wherever_it_stands(ask, name, heater_record, tmp_path):
+    path = heater_record("a.csv", 300, 1, power=0.5)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "text.csv").write_text("u1\nhigh\nlow\n")
+    (tmp_path / "output.csv").write_text("time_s,y1\n0,1\n1,2\n")
+    spec = parse_spec(HEATER, overrides=[f"experiment.prior={{information: {name}}}"], folder=tmp_path)
+    with pytest.raises((SpecError, DataError)) as caught:
+        ask(spec, path)
+    assert {d.key for d in caught.value.diagnostics} == {"experiment.prior.information"}
+
+
+def test_the_samples_of_a_prior_do_not_count_for_an_estimate_and_are_told(heater_record, tmp_path):
+    path = heater_record("a.csv", 300, 1, power=0.5)
+    (tmp_path / "earlier.csv").write_bytes(path.read_bytes())
+    spec = parse_spec(HEATER, overrides=["experiment.prior={information: earlier.csv}"], folder=tmp_path)
+    found, plain = identify(spec, path).result, identify(parse_spec(HEATER), path).result
+    assert found["identification"]["theta"] == plain["identification"]["theta"]
+    assert "experiment.prior does not count for this" in " ".join(found["notes"])
+
+
+@pytest.mark.parametrize("name", ["earlier.csv", "model.yaml"])
+@pytest.mark.parametrize("parameters", ["[b1]", "{b1: 3.6}"])
+def test_parameters_beside_a_file_are_refused(name, parameters):
+    """They name the rows of a matrix, which a file of samples has not and a model names itself."""
+    stated = f"experiment.prior={{information: {name}, parameters: {parameters}}}"
+    with pytest.raises(SpecError) as caught:
+        parse_spec(HEATER, overrides=[stated])
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == ("conflicting-keys", "experiment.prior.parameters")

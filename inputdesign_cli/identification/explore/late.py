@@ -7,7 +7,7 @@ import scipy
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past, untold
-from inputdesign_cli.identification.explore.regression import best_delays, output_error
+from inputdesign_cli.identification.explore.regression import SharedDenominator, output_error
 from inputdesign_cli.plant.polynomial import Array
 
 _ORDER = 20
@@ -15,8 +15,8 @@ _ORDER = 20
 _CERTAIN = 1e-6
 # Inputs that move together, or again and again in the same way, are also answered late by half of the best.
 _CLEARLY = 2.0
-# What a lag leaves of the output where no later answer is looked for; what a later one must leave of that.
-_ENOUGH, _MUCH = 0.2, 0.5
+# What any order leaves of the output where no later answer is looked for; what a late lag must leave of that.
+_ENOUGH, _MUCH = 0.05, 0.5
 _TRIED = 80
 
 
@@ -51,27 +51,24 @@ def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def far_answers(parts: Parts, most: int, furthest: int) -> tuple[int, ...]:
+def far_answers(parts: Parts, near: SharedDenominator, most: int, furthest: int) -> tuple[int, ...]:
     """The same by the output error of a lag, which also tells few jumps in noise; zero where it tells none.
 
     An input that is held jumps in few samples, and noise hides what is new in a slow output there.
 
     Args:
         parts: records u (n, r), y (n, 1).
+        near: the best of all orders with delays to `most`.
         furthest: the lag up to which to look.
     """
-    inputs = parts[0][0].shape[1]
-    near = best_delays(parts, 1, 2, most, (0,) * inputs)
     varying = np.concatenate([y - y.mean() for _, y in parts])
     if near.loss <= _ENOUGH * float(np.mean(varying**2)):
-        return (0,) * inputs
+        return (0,) * len(near.delays)
     beyond = range(most + 1, furthest, max((furthest - most) // _TRIED, 1))
     found = []
-    for j in range(inputs):
-        losses = {
-            lag: output_error(parts, 1, 2, (*near.delays[:j], lag, *near.delays[j + 1 :])).loss
-            for lag in beyond
-        }
+    for j in range(len(near.delays)):
+        before, after = near.delays[:j], near.delays[j + 1 :]
+        losses = {lag: output_error(parts, 1, 2, (*before, lag, *after)).loss for lag in beyond}
         best = min(losses, key=lambda lag: losses[lag], default=0)
         found.append(best if best and losses[best] <= _MUCH * near.loss else 0)
     return tuple(found)

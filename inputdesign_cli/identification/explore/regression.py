@@ -24,7 +24,8 @@ _CONFIDENCE = 0.95
 _WIDTH = 6
 # The order of an ARX model that makes noise white.
 _WHITENING = 20
-_LONG = 20
+LONG = 6
+"""Delays beyond this part of a record are long."""
 _COARSE = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150)
 
 
@@ -82,7 +83,7 @@ def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[i
     yield held
     impulse = filtered([1.0], F, np.eye(1, samples)[0])
     yield from (_lagged(impulse, lag) for lag in range(n))
-    yield from (_lagged(held, delay) for delay in delays if _LONG < delay < samples)
+    yield from (_lagged(held, delay) for delay in delays if samples // LONG < delay < samples)
 
 
 def _loss(

@@ -41,6 +41,7 @@ from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import processes
 from inputdesign_cli.identification.explore.regression import (
+    LONG,
     SharedDenominator,
     arx_grid,
     best_delays,
@@ -164,23 +165,22 @@ def explore_structure(
     first, second = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
     samples = sum(len(y) for _, y in first)
     r = first[0][0].shape[1]
-    most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // 6), 1)
+    most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // LONG), 1)
     highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
     # In a loop an input answers the noise; what is left of it must be white to tell the plant.
     clean = whitened(first) if feedback else first
     least = _least_delays(first, clean, most) if feedback else (0,) * r
     later = late_answers(first, most)
+    most = _beyond(most, later)
+    quick = _quick(clean, highest, most, tuple(map(max, least, later)), least)
     if not (feedback or any(later)):
         # What judges must be longer than the delay, too.
-        later = far_answers(
-            first, most, min(2 * max(len(y) for _, y in some) // 3 for some in (first, second))
-        )
-    most = max(most, *(lag + lag // _BEYOND for lag in later))
-    delays = tuple(map(max, least, later))
-    quick = dict[int, SharedDenominator]()
-    for n in range(1, highest + 1):
-        quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)
-        delays = quick[n].delays
+        shorter = min(max(len(y) for _, y in some) for some in (first, second))
+        nearest = min(quick.values(), key=lambda found: found.loss)
+        later = far_answers(first, nearest, most, 2 * shorter // 3)
+        if any(later):
+            most = _beyond(most, later)
+            quick = _quick(clean, highest, most, later, least)
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
     penalty = np.log(samples) / samples
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
@@ -222,6 +222,22 @@ def explore_structure(
     estimated = {c.orders.family for c in found}
     dropped = tuple(family for family in families if family not in estimated)
     return Chosen((best, *rest), by_order, tuple(good), first, least, most, dropped)
+
+
+def _beyond(most: int, later: Sequence[int]) -> int:
+    """The delay up to which to look where answers come so late."""
+    return max(most, *(lag + lag // _BEYOND for lag in later))
+
+
+def _quick(
+    clean: Parts, highest: int, most: int, delays: tuple[int, ...], least: tuple[int, ...]
+) -> dict[int, SharedDenominator]:
+    """The output-error estimates of all orders, each with the delays that suit it."""
+    quick = dict[int, SharedDenominator]()
+    for n in range(1, highest + 1):
+        quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)
+        delays = quick[n].delays
+    return quick
 
 
 def _least_delays(parts: Parts, clean: Parts, most: int) -> tuple[int, ...]:

@@ -145,9 +145,14 @@ class Prior(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every row of the matrix has a name."""
+        """Every row of a matrix has a name; a file says itself what it is of."""
         if isinstance(self.information, tuple):
             yield from check_names(self.names, len(self.information), "information")
+        elif self.parameters is not None:
+            of = "tells its parameters itself" if self.names_a_model else "holds samples, not a matrix"
+            message = f"{{key}} stands beside {self.information}, which {of}"
+            hint = "remove it, or write the matrix under information in numbers"
+            yield PathDiagnostic("conflicting-keys", message, hint, ("parameters",), at_key=True)
 
     @property
     def names(self) -> tuple[str, ...] | None:

@@ -36,11 +36,12 @@ from inputdesign_cli.tasks.build.preparation import (
     Segment,
     jitter,
     limits_of_sensor,
+    moves_between,
     resampled,
     trend,
     whole_segments,
 )
-from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
+from inputdesign_cli.tasks.build.signals import Signals, check_stated, signals_of, stated_step
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
 _UNSTATED = " (as it is where none is stated)"
@@ -190,12 +191,20 @@ def prepared(
             )
             hint = "add --resample to interpolate all the same, or give the sample time that holds"
             raise DataError(sheet.error("data-not-uniform", message, hint, row))
+        moved = sum(moves_between(part, step) for part in segments)
         segments = [resampled(part, step) for part in segments]
         told.insert(
             0,
             f"the steps of time jitter by up to {per_cent(off, 2)} of {step:.6g} {time_unit}: resampled "
             "(outputs by interpolation, inputs at the nearest sample)",
         )
+        if moved:
+            told.insert(
+                1,
+                f"inputs move between {moved} of the resampled instants, and are taken as held there: the "
+                "estimate is not that of the plant; resample to a step over which they are held, or estimate "
+                "at the steps of the file",
+            )
     taken = [_detrended(part, signals, preparation) for part in segments]
     return [part for part, _ in taken], [*told, *dict.fromkeys(n for _, notes in taken for n in notes)]
 
@@ -299,8 +308,12 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
     stated = stated_step(sheet, preparation)
+    if steps.size and not preparation.sample_time:
+        stated = None
     if stated is not None and preparation.time_unit is not None:
         stated *= SECONDS[preparation.time_unit] / SECONDS[units.time_unit]
+    if stated is not None:
+        check_stated(signals, stated, resample=preparation.resample)
     typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
     if abs(typical - units.sample_time) <= (EVEN if stated else MOST_JITTER) * units.sample_time:
         return

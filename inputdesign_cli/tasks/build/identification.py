@@ -24,7 +24,7 @@ from inputdesign_cli.tasks.build.model_error import build_calibration, model_err
 from inputdesign_cli.tasks.build.prior import build_earlier, stated_prior
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.signal_settings import operating_points
-from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
+from inputdesign_cli.tasks.build.system import build_experiment, build_model, prior_record, record_step
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
 from inputdesign_cli.tasks.result.blocks import blocks_of
@@ -45,8 +45,10 @@ def build_identification(spec: Spec) -> Identification:
         )
     nominal = build_model(spec)
     stated = stated_prior(spec)
+    # What is wrong with a prior is said before any data are read, whether it counts for them or not.
     if stated is not None:
-        stated.over(spec, nominal.names)  # says what does not fit before any data are read
+        stated.over(spec, nominal.names)
+    prior_record(spec)
     controller = spec.experiment.controller
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(

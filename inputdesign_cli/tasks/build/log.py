@@ -17,7 +17,7 @@ from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
+from inputdesign_cli.tasks.build.signals import check_stated, signals_of, stated_step, typical_step
 from inputdesign_cli.tasks.build.tables import may_be_times, no_column
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
@@ -25,7 +25,7 @@ _CHANNELS = {
     "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
     "y": re.compile(r"(y|output)[ _]?(\d*)(?![a-z0-9]).*"),
 }
-# Steps of time differ from a round number by less than this share of it by rounding alone.
+# Sample times differ by less than this share by rounding alone.
 _ROUND = 1e-4
 
 
@@ -75,7 +75,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     unit = unit or time_unit_in(sheet, signals.name) or "s"
     stated = stated_step(sheet, preparation)
     if signals.name and not preparation.sample_time:
-        step = _typical(signals.time)
+        step = typical_step(signals.time)
         if stated and abs(step - stated) > _ROUND * stated:
             told.append(
                 f"{path.name} states the sample time {stated:g}, and its times advance by {step:g}: "
@@ -83,7 +83,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
             )
     elif stated:
         step = stated
-        _check_apart(sheet, signals, step)
+        check_stated(signals, step, resample=given.resample)
     else:
         step = 1.0
         unread = without_times(sheet, given.columns)
@@ -110,19 +110,6 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         recorded_in(signals, step, segments, signals.u.shape[1]),
         any(part.lined for part in segments),
     )
-
-
-def _check_apart(sheet: Sheet, signals: Signals, step: float) -> None:
-    """Rows are not much farther apart than the stated sample time.
-
-    Raises:
-        DataError: `data-not-uniform`.
-    """
-    apart = _typical(signals.time) if signals.name else step
-    if apart > 1.5 * step:
-        message = f"the rows of {sheet.path.name} are {apart:.6g} apart, and --sample-time says {step:.6g}"
-        hint = "leave --sample-time out: the times tell it; or mind its unit (--time-unit)"
-        raise DataError(sheet.error("data-not-uniform", message, hint, 0))
 
 
 def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
@@ -176,23 +163,6 @@ def _first_of(columns: Mapping[str, str]) -> list[str]:
     """The channels that so many named inputs and outputs are, one of each at least: u1, u2, y1."""
     counts = {letter: sum(name.startswith(letter) for name in columns) for letter in "uy"}
     return [f"{letter}{i + 1}" for letter in "uy" for i in range(max(counts[letter], 1))]
-
-
-def _typical(time: Array) -> float:
-    """The mean step of time, gaps apart, rounded where rounding alone may be the difference."""
-    steps = np.diff(time[~np.isnan(time)])
-    if not steps.size:
-        return np.nan
-    middle = float(np.median(steps))
-    near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
-    if middle <= 0.0 or not near.size:
-        return np.nan
-    mean = float(near.mean())
-    for digits in range(1, 7):
-        rounded = float(f"{mean:.{digits - 1}e}")
-        if abs(rounded - mean) <= _ROUND * mean:
-            return rounded
-    return mean
 
 
 def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:

@@ -135,11 +135,24 @@ def jitter(segments: Sequence[Segment], step: float) -> float:
 
 def resampled(part: Segment, step: float) -> Segment:
     """The same at even times: outputs linearly between samples, inputs, which are held, at the nearest."""
+    even, nearest = _even_instants(part, step)
+    y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
+    return Segment.recorded(even, part.u[nearest], y)
+
+
+def moves_between(part: Segment, step: float) -> int:
+    """After how many of the even instants inputs are, at samples that are left out, others than there."""
+    nearest = _even_instants(part, step)[1]
+    last = np.searchsorted(nearest, np.arange(nearest[-1] + 1), side="right") - 1
+    moved = np.any(part.u[: nearest[-1] + 1] != part.u[nearest[last]], axis=1)
+    return int(np.unique(last[moved]).size)
+
+
+def _even_instants(part: Segment, step: float) -> tuple[Array, NDArray[np.int64]]:
+    """Times that are `step` apart (n,), and the sample (n,) nearest to each."""
     count = int(np.floor((part.time[-1] - part.time[0]) / step + 0.5)) + 1
     even = part.time[0] + step * np.arange(count)
-    y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
-    nearest = np.searchsorted(0.5 * (part.time[1:] + part.time[:-1]), even)
-    return Segment.recorded(even, part.u[nearest], y)
+    return even, np.searchsorted(0.5 * (part.time[1:] + part.time[:-1]), even)
 
 
 def trend(x: Array, kind: Detrend) -> tuple[Array, str, bool]:

@@ -14,15 +14,22 @@ from inputdesign_cli.tasks.build.columns import (
     NO_TIMES,
     channel_columns,
     time_column,
+    time_unit_in,
     time_unit_of,
     without_times,
 )
+from inputdesign_cli.tasks.build.epochs import since_epoch
 from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.sheet import elsewhere
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.other_times import shifted_times
+from inputdesign_cli.tasks.build.preparation import MOST_JITTER, Preparation
 from inputdesign_cli.tasks.build.tables import column_named, columns_of
 
+# Steps of time differ from a round number by less than this share of it by rounding alone.
+_ROUND = 1e-4
+# Times farther apart than so many steps more are not there to be resampled.
+_LONGER = 0.5
 # So many stamps, apart from the first and the last, nearly all of as many rows, are too coarse, not doubled.
 _FEWEST_STAMPS, _MOSTLY = 3, 0.9
 
@@ -90,21 +97,18 @@ def signals_of(
     driving = (*_labels("u", inputs), *references)
     u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
-    times = column_named(sheet, name) if name else None
+    time, told, dated = time[rows], [], False
     if name:
-        _check_rising(kept, time[rows], wanted, dated=times is not None and times.dated)
-    told = (times.told if times else "", elsewhere(sheet.path, sheet.others).lstrip("; "))
-    return Signals(
-        kept,
-        time[rows],
-        name,
-        times is not None and times.dated,
-        u,
-        y,
-        driving,
-        _labels("y", outputs),
-        tuple(filter(None, told)),
-    )
+        times = column_named(sheet, name)
+        dated, told = times.dated, [times.told]
+        if not (dated or preparation.time_unit or time_unit_in(sheet, name)):
+            time, counted = since_epoch(time)
+            dated = bool(counted)
+            told += [f"{name} counts {counted}"] if counted else []
+        _check_rising(kept, time, wanted, dated=dated)
+        told += shifted_times(sheet, name)
+    told.append(elsewhere(sheet.path, sheet.others).lstrip("; "))
+    return Signals(kept, time, name, dated, u, y, driving, _labels("y", outputs), tuple(filter(None, told)))
 
 
 def _nothing_left(sheet: Sheet, preparation: Preparation, time: Array) -> DataError:
@@ -184,6 +188,47 @@ def stated_step(sheet: Sheet, preparation: Preparation) -> float | None:
     message = f"{sheet.path.name} states {wrong}"
     hint = "mend it in the file, or give the one that holds: --sample-time 0.5"
     raise DataError(sheet.error("data-not-uniform", message, hint))
+
+
+def typical_step(time: Array) -> float:
+    """The mean step of time, gaps apart, rounded where rounding alone may be the difference."""
+    steps = np.diff(time[~np.isnan(time)])
+    if not steps.size:
+        return np.nan
+    middle = float(np.median(steps))
+    near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
+    if middle <= 0.0 or not near.size:
+        return np.nan
+    mean = float(near.mean())
+    for digits in range(1, 7):
+        rounded = float(f"{mean:.{digits - 1}e}")
+        if abs(rounded - mean) <= _ROUND * mean:
+            return rounded
+    return mean
+
+
+def check_stated(signals: Signals, step: float, *, resample: bool) -> None:
+    """The times of a file, where it has some, advance by the sample time that the user states.
+
+    Args:
+        resample: whether a longer one is asked for.
+
+    Raises:
+        DataError: `data-not-uniform`.
+    """
+    apart = typical_step(signals.time) if signals.name else step
+    if apart - step > (_LONGER if resample else MOST_JITTER) * step or (
+        step - apart > MOST_JITTER * step and not resample
+    ):
+        message = (
+            f"the times of {signals.sheet.path.name}, in column {signals.name}, advance by {apart:.6g}, and "
+            f"--sample-time says {step:.6g}"
+        )
+        hint = (
+            "leave --sample-time out: the times tell it; or mind their unit (--time-unit); or, if that "
+            "column does not count, add time=none to --columns"
+        )
+        raise DataError(signals.sheet.error("data-not-uniform", message, hint, 0))
 
 
 def _labels(letter: str, count: int) -> tuple[str, ...]:

@@ -222,11 +222,23 @@ def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     stated = stated_prior(spec)
     if stated is not None:
         return stated.over(spec, experiment.model.names)
-    if spec.experiment.prior is None or not isinstance(spec.experiment.prior.information, str):
+    record = prior_record(spec)
+    if record is None:
         return None
-    record = read_excitation_record(spec, spec.experiment.prior.information, PRIOR)
     earlier = replace(experiment, samples=len(record))
     return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
+
+
+def prior_record(spec: Spec) -> Array | None:
+    """(n, r): the earlier samples that `experiment.prior` names; None where it is something else, or absent.
+
+    Raises:
+        DataError: they cannot be used.
+    """
+    prior = spec.experiment.prior
+    if prior is None or prior.names_a_model or not isinstance(prior.information, str):
+        return None
+    return read_excitation_record(spec, prior.information, PRIOR)
 
 
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:

@@ -110,19 +110,24 @@ def columns_of(
 
 def may_be_times(sheet: Sheet, taken: Collection[str]) -> list[str]:
     """What is said of columns not taken that may be times: they rise by even steps, or hold dates or text."""
+    texts: dict[str, str] = {}
     told = []
     for i, column in enumerate(sheet.columns):
         name = sheet.names[i].strip() if i < len(sheet.names) else ""
         steps = np.diff(column.numbers[~np.isnan(column.numbers)])
         middle = float(np.median(steps)) if steps.size > 1 else 0.0
         even = middle > 0.0 and bool(np.mean(np.abs(steps - middle) < _EVENLY * middle) > _MOSTLY)
-        if name.lower() in taken or str(i + 1) in taken or column.fault is not None:
-            continue
         called = name or f"column {i + 1}"
+        if name.lower() in taken or str(i + 1) in taken:
+            continue
+        if column.fault is not None:
+            texts |= {called: "text"} if column.words else {}
+            continue
         if column.dated or even:
             what = "holds dates or times of day" if column.dated else "rises by even steps"
             told.append(f"{called} {what}: if it holds the times, add time={name or i + 1} to --columns")
-    return [*told, *(f"{name} is not used: it holds {what}" for name, what in sheet.left_out.items())]
+    others = {**texts, **sheet.left_out}
+    return [*told, *(f"{name} is not used: it holds {what}" for name, what in others.items())]
 
 
 def column_named(sheet: Sheet, name: str) -> Column:

@@ -155,7 +155,7 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[str]:
     if estimate.agreement is None:
         return [
             "experiment.prior does not count for this estimate: it is information without the parameters "
-            "that it belongs to; write parameters: {b1: 3.6, ..} beside it, name the model.yaml of the "
+            "that it belongs to; write parameters: {b1: 3.6, ..} beside a matrix, name the model.yaml of the "
             "earlier data, or give their records as further files"
         ]
     counted = (

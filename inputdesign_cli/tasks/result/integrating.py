@@ -14,13 +14,16 @@ _UNTOLD, _TOLD, _RISING = 2.0, 4.0, 2.0
 _FREQUENCIES, _HIGHEST = 40, 1.0
 _STATIC = 1e-6  # of the lowest frequency of a record: as good as zero
 _LATE = 0.1
+# Without it, what is fed back would be taken for what the model lacks.
+CONTROLLER = "the controller as it was, experiment: {controller: {numerator: [..], denominator: [..]}}"
 
 
-def like_integrators(found: Found, step: float, unit: str) -> tuple[str, ...]:
+def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tuple[str, ...]:
     """A sentence for every entry whose static gain, hence whose slowest time constant, nothing tells.
 
     Args:
         step, unit: the sample time.
+        loop: whether inputs answer the outputs.
     """
     model, told = found.model, []
     single = model.outputs == model.inputs == 1
@@ -34,7 +37,7 @@ def like_integrators(found: Found, step: float, unit: str) -> tuple[str, ...]:
                     at = 1 + int(np.argmin(deviations[1:] / size[1:]))
                     where = "" if single else f" from u{j + 1} to y{i + 1}"
                     gain = f"{size[0]:.3g} +- {deviations[0]:.1g}"
-                    told.append(_sentence(where, gain, _slope(G[at, i, j], w[at], step), step, unit))
+                    told.append(_sentence(where, gain, _slope(G[at, i, j], w[at], step), step, unit, loop))
     return tuple(told)
 
 
@@ -67,12 +70,13 @@ def _deviations(found: Found, change: ComplexArray) -> Array:
     return np.asarray(np.sqrt(np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)))
 
 
-def _sentence(where: str, gain: str, slope: float, step: float, unit: str) -> str:
+def _sentence(where: str, gain: str, slope: float, step: float, unit: str, loop: bool) -> str:
+    law = f", and {CONTROLLER}" if loop else ""
     sort = "an integrator" if not where else "a matrix with an integrator there"
     return (
         f"the plant{where} cannot be told from an integrator (its static gain is {gain}): no time constant "
         f"follows from this record, only the slope, {slope:.4g} per {unit} for an input of one. Record until "
         f"the output settles; or, if it never does, identify {sort}: idesign identify DATA --spec SPEC, in "
         f"SPEC sample_time: {step:.6g} and plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, "
-        "continuous: {numerator: [K], denominator: [1, 0], delay: L}, sample: zoh}"
+        f"continuous: {{numerator: [K], denominator: [1, 0], delay: L}}, sample: zoh}}{law}"
     )

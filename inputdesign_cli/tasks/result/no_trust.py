@@ -10,7 +10,7 @@ from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.explore import Found, by_chance, only_answers, unstable_pole
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.at_once import like_inverses
-from inputdesign_cli.tasks.result.integrating import like_integrators
+from inputdesign_cli.tasks.result.integrating import CONTROLLER, like_integrators
 from inputdesign_cli.tasks.result.unidentified import rivalled, unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing, late_inputs
 
@@ -40,7 +40,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
     if unstable:  # what stable models say of such a plant is wrong
         return unstable
     moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
-    rising = like_integrators(found, log.step, log.time_unit)
+    rising = like_integrators(found, log.step, log.time_unit, loop=loop)
     inverses = () if loop else like_inverses(found, moving)
     unseen = unidentified(found, moving, log.step, log.time_unit)
     return (
@@ -137,9 +137,8 @@ def _unstable(log: Log) -> tuple[str, ...]:
             f"the plant of {signal_name('y', i, outputs)} is unstable: it has a pole at a radius of "
             f"{pole.radius:.4g} +- {pole.deviation:.1g}, and only stable ones are looked for here. Identify "
             f"it with its loop: idesign identify DATA --spec SPEC, in SPEC sample_time: {log.step:.6g}, "
-            f"plant: {{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and the controller as "
-            "it was, experiment: {controller: {numerator: [..], denominator: [..]}}; raise the orders where "
-            "tests fail"
+            f"plant: {{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and {CONTROLLER}; "
+            "raise the orders where tests fail"
         )
     return tuple(told)
 

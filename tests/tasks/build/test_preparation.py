@@ -269,3 +269,47 @@ def test_short_rounded_records_still_are(samples):
         x = np.round(2.0 * rng.standard_normal(samples)) * 1.04
         assert _said_to_be_rounded(np.round(40.0 + x, 3))
     assert _said_to_be_rounded(np.array([0.0, 1.0] * 5))
+
+
+@pytest.mark.parametrize("stated", [0.5, 0.8, 1.2, 2.0, 1000.0])
+def test_a_sample_time_that_contradicts_the_times_is_refused_with_both(stated, tmp_path):
+    """Unless the column of times is said not to count, which is what the hint says."""
+    units = Units("s", stated, sampled=True, closed_loop=False, inputs=1, outputs=1)
+    read(tmp_path / "a.csv")
+    for read_one in (
+        lambda said: read_log(tmp_path / "a.csv", said),
+        lambda said: read_data([tmp_path / "a.csv"], units, said),
+    ):
+        with pytest.raises(DataError) as caught:
+            read_one(Preparation(sample_time=stated))
+        (found,) = caught.value.diagnostics
+        assert f"in column time, advance by 1, and --sample-time says {stated:g}" in found.message
+        assert "add time=none to --columns" in found.hint
+        assert read_one(Preparation(sample_time=stated, columns={"time": "none"})).lengths == (N,)
+
+
+def test_a_sample_time_that_the_times_advance_by_may_be_stated(tmp_path):
+    jittering = TIME + 0.02 * np.sin(3.0 * TIME)
+    assert read(tmp_path / "a.csv", time=jittering, sample_time=1.0).lengths == (N,)
+    assert read_log(tmp_path / "a.csv", Preparation(sample_time=1.0)).step == 1.0
+
+
+def test_times_count_more_than_the_sample_time_beside_them(tmp_path):
+    """In a record for a spec as in one without."""
+    np.savez(tmp_path / "a.npz", u=U, y=Y, time=TIME, Ts=2.0)
+    assert read_data([tmp_path / "a.npz"], UNITS, Preparation()).lengths == (N,)
+    assert read_log(tmp_path / "a.npz", Preparation()).step == 1.0
+
+
+@pytest.mark.parametrize("held", [1, 2, 3, 4, 6])
+def test_inputs_that_move_between_resampled_instants_are_told(held, tmp_path):
+    """Every second sample is kept: an input that is held for an even number of samples loses nothing."""
+    u = np.repeat(np.random.default_rng(5).standard_normal(N), held)[:N]
+    units = Units("s", 2.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+    read(tmp_path / "a.csv", u=u)
+    found = read_data([tmp_path / "a.csv"], units, Preparation(sample_time=2.0, resample=True))
+    np.testing.assert_array_equal(found.u[:30, 0], [float(f"{x:.12g}") for x in u[::2]])
+    lost = sum(u[k] != u[k - 1] for k in range(1, N - 1, 2))
+    told = [note for note in found.notes if "the resampled instants" in note]
+    assert len(told) == bool(lost)
+    assert all(f"move between {lost} of" in note for note in told)

@@ -45,7 +45,9 @@ def _joined(dates: Column, clock: Column, names: Sequence[str]) -> Column:
     moments = dates.numbers + (clock.numbers + (clock.clock or 0.0)) % _DAY
     there = np.flatnonzero(~np.isnan(moments))
     numbers = moments - moments[there[0]] if there.size else moments
-    return Column(numbers, dated=True, told=f"{' and '.join(names)} were joined: dates and times of day")
+    began = dates.began + float(moments[there[0]]) if there.size else 0.0
+    told = f"{' and '.join(names)} were joined: dates and times of day"
+    return Column(numbers, dated=True, began=began, told=told)
 
 
 def _past_midnight(clock: Column, name: str, sheet: Sheet) -> Column:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,19 +24,37 @@ AS_DATES = (
     "10:15 AM, 12-Mar-2024 10:15:00, where they tell day from month; or as seconds"
 )
 _CLOCK = re.compile(r"\d:\d\d")
+# A year, a day and a month, in digits or in words of any language, in whatever order.
+_DATE = re.compile(
+    r"(?=.*(?<!\d)(19|20)\d\d(?!\d))(?=.*(?<!\d)\d{1,2}(?!\d))(?=.*[^\W\d_]{3}|(\D*\d+){3})"
+    r"|\d{1,2}[./-]\s?[^\W\d_]{3,}\.?[./-]\s?\d\d(?!\d)"
+)
+# Of a column of dates hardly any cell is something else.
+_MOSTLY, _DIFFERENT = 0.9, 3
 # What a time of a day without a date is read as.
 _MIDNIGHT = datetime(1900, 1, 1)
+_YEAR_1970 = datetime(1970, 1, 1)
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Seconds (n,) since the first; None where dates can be read in two ways that differ.
+    """Seconds (n,) since the first, and what that one is since 1970 or, of times of a day, since midnight.
 
-    Of times of a day without a date, `clock` is what the first counts from midnight.
+    They are `unclear` where the dates can be read in two ways that differ.
     """
 
-    seconds: NDArray[np.float64] | None
-    clock: float | None = None
+    seconds: NDArray[np.float64]
+    began: float
+    of_day: bool = False
+    unclear: bool = False
+
+    @classmethod
+    def of(cls, moments: Sequence[datetime], *, of_day: bool = False) -> Moments:
+        """Dates, or times of one day."""
+        first = moments[0]
+        since = _MIDNIGHT if of_day else _YEAR_1970.replace(tzinfo=UTC if first.tzinfo else None)
+        seconds = np.array([(moment - first).total_seconds() for moment in moments])
+        return cls(seconds, (first - since).total_seconds(), of_day)
 
 
 def moments_of(cells: Sequence[str]) -> Moments | None:
@@ -49,17 +67,16 @@ def moments_of(cells: Sequence[str]) -> Moments | None:
         return None
     iso = _iso(texts)
     if iso is not None:
-        return Moments(iso)
+        return iso
     of_day = _parsed(texts, _TIMES)
     if of_day is not None:
-        return Moments(_since_first(of_day), (of_day[0] - _MIDNIGHT).total_seconds())
-    found: list[NDArray[np.float64]] = []
-    for day in _DAYS:
-        moments = _parsed(texts, [f"{day} {time}".strip() for time in ("", *_TIMES)])
-        seconds = _since_first(moments or [])
-        if moments is not None and not any(np.array_equal(seconds, other) for other in found):
-            found.append(seconds)
-    return Moments(found[0] if len(found) == 1 else None) if found else None
+        return Moments.of(of_day, of_day=True)
+    readings = (_parsed(texts, [f"{day} {time}".strip() for time in ("", *_TIMES)]) for day in _DAYS)
+    found = [Moments.of(moments) for moments in readings if moments is not None]
+    if not found:
+        return None
+    alike = all(np.array_equal(found[0].seconds, other.seconds) for other in found)
+    return replace(found[0], unclear=not alike)
 
 
 def seems_moment(text: str) -> bool:
@@ -67,14 +84,20 @@ def seems_moment(text: str) -> bool:
     return _BEGIN.match(text) is not None or _CLOCK.search(text) is not None
 
 
+def look_like_moments(cells: Sequence[str]) -> bool:
+    """Whether most cells (n,) of a column have a date in them, or a time of a day, in whatever language."""
+    found = {cell for cell in set(cells) if _DATE.match(cell.strip()) or _CLOCK.search(cell)}
+    return len(found) >= _DIFFERENT and sum(cell in found for cell in cells) > _MOSTLY * len(cells)
+
+
 def is_moment(text: str) -> bool:
     """Whether a text is a date or a time of a day."""
     return moments_of([text]) is not None
 
 
-def _iso(texts: Sequence[str]) -> NDArray[np.float64] | None:
+def _iso(texts: Sequence[str]) -> Moments | None:
     try:
-        return _since_first([datetime.fromisoformat(text) for text in texts])
+        return Moments.of([datetime.fromisoformat(text) for text in texts])
     except (ValueError, TypeError, OverflowError):  # no dates, or some with and some without a time zone
         return None
 
@@ -93,8 +116,3 @@ def _parsed(texts: Sequence[str], formats: Sequence[str]) -> list[datetime] | No
         else:
             return None
     return found
-
-
-def _since_first(moments: Iterable[datetime]) -> NDArray[np.float64]:
-    every = list(moments)
-    return np.array([(moment - every[0]).total_seconds() for moment in every])

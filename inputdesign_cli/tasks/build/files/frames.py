@@ -124,11 +124,11 @@ def _plain(pandas: Any, series: Any) -> NDArray:
 
 
 def _dated(array: NDArray) -> list[Column]:
-    """The column of dates and times that cells of text or of Python's dates are; none where they are not."""
+    """The column of dates and times, read or not, of cells of text or of Python's dates; none of others."""
     if array.dtype.kind not in "OUT":
         return []
     column = column_of([_written(cell) for cell in array.ravel()])
-    return [column] if column.dated else []
+    return [column] if column.dated or column.undated else []
 
 
 def _loaded(path: Path, key: str, kind: str, load: Callable[[Any], Any]) -> Any:

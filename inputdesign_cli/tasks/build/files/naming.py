@@ -65,7 +65,8 @@ def time_columns(sheet: Sheet) -> list[str]:
     ] or [(name, column) for name, column in called if column.undated]
     # Dates and times of day that were joined say the same.
     once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
-    return once if len(once) == 1 else [name for name in once if name.startswith("dat")]
+    dates = [name for name in once if name.startswith("dat")]
+    return dates if dates or (len(once) > 1 and clocks[0][1].fault is None) else once
 
 
 def _advances(x: Array) -> bool:

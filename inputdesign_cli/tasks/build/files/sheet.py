@@ -19,10 +19,11 @@ Array = NDArray[np.float64]
 class Column:
     """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
 
-    Dates and times are `dated`: seconds since the first; of times of a day without a date, `clock` is what
-    the first counts from midnight. Of dates that cannot be read all or some are `undated`. What is `wrong`
-    with a fault, and how to mend it, goes into messages; `told` is what was done to make times of a column.
-    `words` are the different texts of one that holds no number.
+    Dates and times are `dated`: seconds since the first, which `began` counts from a moment that columns of a
+    file have in common; of times of a day without a date, `clock` is what the first counts from midnight. Of
+    dates that cannot be read all or some are `undated`. What is `wrong` with a fault, and how to mend it,
+    goes into messages; `told` is what was done to make times of a column. `words` are the different texts of
+    one that holds no number.
     """
 
     numbers: Array
@@ -36,6 +37,7 @@ class Column:
     )
     clock: float | None = None
     undated: bool = False
+    began: float = 0.0
     told: str = ""
     words: tuple[str, ...] = ()
 
@@ -126,7 +128,8 @@ def of_arrays(path: Path, key: str, arrays: Sequence[tuple[str, NDArray]]) -> Sh
         wide = wide.T if wide.shape[0] == 1 else wide
         single = wide.shape[1] == 1
         names += [name if single else f"{name}{i + 1}" for i in range(wide.shape[1])]
-        columns += [Column(column, _infinite(column), dated) for column in wide.T]
+        began = _began(array) if array.dtype.kind == "M" else 0.0
+        columns += [Column(column, _infinite(column), dated, began=began) for column in wide.T]
     lengths = {len(column.numbers) for column in columns}
     if lengths in (set(), {0}):
         raise unreadable(path, key, "holds no rows of numbers", "save the signals as arrays u, y and time")
@@ -144,6 +147,11 @@ def _seconds(moments: NDArray) -> Array:
     since = moments - moments.ravel()[0] if moments.dtype.kind == "M" else moments
     seconds = since / np.timedelta64(1, "s")
     return np.asarray(seconds, dtype=float)
+
+
+def _began(moments: NDArray) -> float:
+    """The first of dates, in seconds since 1970; NaN where there is none."""
+    return float((moments.ravel()[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s"))
 
 
 def _infinite(numbers: Array) -> tuple[int, str] | None:

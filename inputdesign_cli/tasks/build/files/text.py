@@ -14,7 +14,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.cells import is_missing, is_number, measured, with_exponents
-from inputdesign_cli.tasks.build.files.dates import AS_DATES, moments_of, seems_moment
+from inputdesign_cli.tasks.build.files.dates import AS_DATES, look_like_moments, moments_of, seems_moment
 from inputdesign_cli.tasks.build.files.layout import (
     COMMENTS,
     LongFieldError,
@@ -34,6 +34,9 @@ from inputdesign_cli.tasks.build.files.layout import (
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, unreadable
 
 FORMULA = "="
+_AS_DATES = f"{AS_DATES}; where the column holds no times that count, add time=none to --columns"
+# As many as a sheet of a workbook can have: a longer line is no row of a table.
+_MOST_FIELDS = 16_384
 
 
 def read_text(path: Path, key: str, text: str, separated_by: str | None = None) -> Sheet:
@@ -47,6 +50,7 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
     """
     text = with_exponents(text)
     lines = text.splitlines()
+    _check_widths(path, key, lines)
     comment, first = _leading_comment(lines)
     separator = separated_by or separator_of(lines[first:])
     try:
@@ -93,6 +97,18 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
         )
         raise DataError(sheet.error("data-extra-field", message, hint, long))
     return sheet
+
+
+def _check_widths(path: Path, key: str, lines: Sequence[str]) -> None:
+    """Raise `DataError` (`data-unreadable`) where a line has more fields than any table."""
+    for number, line in enumerate(lines, start=1):
+        if len(line) < 2 * _MOST_FIELDS:  # a character and a mark for each
+            continue
+        fields = max(len(line.split()), *(line.count(mark) + 1 for mark in "\t;|,"))
+        if fields > _MOST_FIELDS:
+            what = f"has a line of {fields} fields (line {number}), and at most {_MOST_FIELDS} are taken"
+            hint = "write one sample a line, or keep the columns that are needed"
+            raise unreadable(path, key, what, hint, number)
 
 
 def _leading_comment(lines: Sequence[str]) -> tuple[str, int]:
@@ -167,24 +183,27 @@ def _without_percent(cells: list[str]) -> list[str]:
 
 
 def _of_dates(cells: list[str], otherwise: Column) -> Column:
-    """The same where cells are dates or times, or the first seems to be one; empty ones are missing."""
+    """The same where cells are dates or times, or look like them; empty ones are missing."""
     there = [i for i, cell in enumerate(cells) if not is_missing(cell)]
     written = [cells[i].strip() for i in there]
     moments = moments_of(written)
-    if moments is not None and moments.seconds is not None:
+    if moments is not None and not moments.unclear:
         seconds = np.full(len(cells), np.nan)
         seconds[there] = moments.seconds
-        return Column(seconds, dated=True, clock=moments.clock)
+        clock = moments.began if moments.of_day else None
+        return Column(seconds, dated=True, began=moments.began, clock=clock)
     if moments is not None:
         fault, wrong = (there[0], written[0]), "may have the day or the month first"
-        return Column(otherwise.numbers, fault, wrong=wrong, hint=AS_DATES, undated=True)
-    if is_number(written[0]) or not seems_moment(written[0]):
+        return Column(otherwise.numbers, fault, wrong=wrong, hint=_AS_DATES, undated=True)
+    alike = look_like_moments(cells)
+    if is_number(written[0]) or not (alike or seems_moment(written[0])):
         return otherwise
     # All cells up to one are dates of one kind, and with it they are not.
     at = bisect_left(range(len(written)), 1, key=lambda i: moments_of(written[: i + 1]) is None)
     wrong = "is no date or time as those above are" if at else "is no date or time that can be read"
-    fault = (there[at], written[at])
-    return Column(otherwise.numbers, fault, wrong=wrong, hint=AS_DATES, undated=at > 0)
+    fault, undated = (there[at], written[at]), at > 0 or alike
+    words = () if undated else otherwise.words
+    return Column(otherwise.numbers, fault, wrong=wrong, hint=_AS_DATES, undated=undated, words=words)
 
 
 def _of_numbers(rows: Rows, columns: Sequence[Column]) -> bool:

@@ -184,3 +184,20 @@ def test_bytes_of_any_kind_are_no_text(tmp_path):
     with pytest.raises(DataError, match="is no text") as caught:
         read_sheet(path, key="")
     assert caught.value.diagnostics[0].location is None
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", " ", "|"])
+def test_a_line_of_more_fields_than_a_table_has_is_refused_with_its_line(mark, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(f"u{mark}y\n1{mark}2\n{mark.join('1' * 16_385)}\n")
+    with pytest.raises(DataError, match=r"16385 fields \(line 3\), and at most 16384") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location.line == 3
+
+
+def test_as_many_columns_as_a_workbook_has_are_read(tmp_path):
+    path = tmp_path / "log.csv"
+    numbers = np.arange(3.0 * 16_384).reshape(3, -1)
+    path.write_text("".join(",".join(f"{x:.1f}" for x in row) + "\n" for row in numbers))
+    found = read_sheet(path, key="")
+    np.testing.assert_array_equal(np.column_stack([column.numbers for column in found.columns]), numbers)
