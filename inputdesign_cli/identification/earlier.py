@@ -15,6 +15,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 # Directions of which less than this share of the knowledge is of one side only are the other's alone.
 _OF_ONE_SIDE = 1e-9
+# Two estimates from the same data agree to this share of a deviation, and of what they know.
+_THE_SAME = 1e-3
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,19 @@ class Earlier:
     def q(self, theta: Array) -> float:
         """How far theta is away, squared, in standard deviations."""
         return float(np.sum((self.rows @ (theta - self.theta)) ** 2))
+
+    def is_of_these_data(self, theta: Array, factor: Array) -> bool:
+        """Whether it is the estimate from the data with which it counts: half of all, and nothing moves.
+
+        Other data of the same length have another input or another noise, and move theta by a deviation.
+
+        Args:
+            theta, factor: see `agreement`.
+        """
+        inner = np.linalg.solve(factor, self.rows.T)
+        shares = np.linalg.eigvalsh(inner @ inner.T)
+        away = float(np.linalg.norm(factor.T @ (theta - self.theta)))
+        return bool(np.all(np.abs(shares - 0.5) < _THE_SAME) and away < _THE_SAME * np.sqrt(len(theta)))
 
     def agreement(self, theta: Array, factor: Array) -> float:
         """The probability that two estimates of one system differ as much as this one and that of the data.

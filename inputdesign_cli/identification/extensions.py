@@ -100,7 +100,8 @@ def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo 
     """What past errors add to the gradient of a coefficient of A, C or D; None for others.
 
     epsilon = (D/C)(A y - ..): -d epsilon / d theta is epsilon(t - k) through 1/C for a c_k, through -1/D for
-    a d_k and, by the noise in y, through -1/A for an a_k.
+    a d_k and, by the noise in y, through -1/A for an a_k. Where that grows nothing is known of it: what holds
+    the plant is not 1/A.
     """
     rows = {"a": (larger.A, -1.0), "c": (larger.C, 1.0), "d": (larger.D, -1.0)}
     parameter = next(one for one in larger.parameters if one.name == name)
@@ -109,6 +110,8 @@ def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo 
     polynomials, sign = rows[parameter.letter]
     outputs = {output for output, _ in parameter.places}
     below = {i: (polynomials[0 if len(polynomials) == 1 else i], sign) for i in outputs}
+    if any(np.any(np.abs(np.roots(polynomial)) >= 1.0) for polynomial, _ in below.values()):
+        return None
     return late_echo(below, parameter.power, lengths)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
-from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, TransferMatrix
@@ -149,6 +149,13 @@ def estimated(task: Identification, data: Data, first: Path, taken: Preparation)
     with blaming_columns(first):
         likeliest = from_start(nominal.theta, False)
         estimate, ruled_out = that_agrees(task.knowledge, likeliest, partial(from_start, near=True))
+    if task.earlier is not None and task.earlier.is_of_these_data(estimate.theta, estimate.factor):
+        raise DataError.because(
+            "data-repeated",
+            f"experiment.prior is the estimate from {first.name} itself: what that tells would count twice",
+            "leave the prior out, or give only records that it was not made of",
+            "experiment.prior",
+        )
     model = nominal.at(estimate.theta, estimate.noise)
     try:
         question = task.at(model, len(data.y), estimate.factor, f"{first.name} (estimate)")

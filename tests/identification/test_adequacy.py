@@ -186,3 +186,25 @@ def test_a_dead_time_at_zero_hides_nothing():
     for name, test in by_name(known).items():
         assert by_name(found)[name].statistic == pytest.approx(test.statistic, rel=1e-3)
     assert by_name(found)["recent_inputs"].probability < 1e-12
+
+
+@pytest.mark.parametrize("pole", [1.0, 1.05, 1.2])
+def test_the_right_model_of_a_plant_that_only_its_loop_holds_is_not_refuted(pole):
+    """A proportional controller without noise: the tests err seldom, and see a lag that lacks."""
+    model = PolynomialModel.single([0, 0.1], A=[1, -pole], C=[1, -0.1], variance=0.02)
+    refuted = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        e, r = 0.02 * rng.standard_normal(400), np.repeat(rng.uniform(-1, 1, 20), 20)
+        signals = {}
+        for lag in (0.0, 0.6):
+            y, u, x = np.zeros(400), np.zeros(400), 0.0
+            for t in range(1, 400):
+                x = lag * x + (1.0 - lag) * u[t - 1]
+                y[t] = pole * y[t - 1] + 0.1 * x + e[t] - 0.1 * e[t - 1]
+                u[t] = 3.0 * (r[t] - y[t])
+            signals[lag] = u[:, None], y[:, None]
+        refuted.append([len(identify(model, *signals[lag], feedback=True).failed) > 0 for lag in (0.0, 0.6)])
+    right, wrong = np.sum(refuted, axis=0)
+    assert right <= 1
+    assert wrong >= 7

@@ -90,3 +90,17 @@ def test_what_is_known_of_some_parameters_makes_up_for_excitation():
     information[2, 2] = 1e6
     found = identify(model, u, y, rest=False, earlier=Earlier(np.array([0, 0, 0.2]), information))
     np.testing.assert_allclose(found.theta, [1.0, 0.5, 0.2], atol=0.06)
+
+
+@pytest.mark.parametrize("model", [ARX, JENKINS], ids=["arx", "bj"])
+def test_only_the_data_themselves_are_those_of_their_estimate(model):
+    """Not those of the same input, of the same length, or a part of them."""
+    rng = np.random.default_rng(7)
+    u, y = simulated(model, 200, rng, runs=2)
+    other = y[0] + 0.1 * rng.standard_normal(y[0].shape)
+    first = of(identify(model, u[0], y[0], rest=True))
+    same = []
+    for ours, theirs in ((u[0], y[0]), (u[1], y[1]), (u[0], other), (u[0][:150], y[0][:150])):
+        found = identify(model, ours, theirs, rest=True, earlier=first)
+        same.append(first.is_of_these_data(found.theta, found.factor))
+    assert same == [True, False, False, False]

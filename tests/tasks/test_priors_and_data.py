@@ -55,6 +55,19 @@ def test_a_prior_with_its_estimate_counts_as_its_record_does(heater_record, tmp_
     assert result["identification"]["prior"]["probability"] > 1e-3
 
 
+def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(heater_record, tmp_path):
+    path = heater_record("a.csv", 300, 1, power=0.5)
+    (tmp_path / "model.yaml").write_bytes(identify(parse_spec(HEATER), path).files["model.yaml"])
+    spaced = tmp_path / "b.csv"
+    spaced.write_text(path.read_text().replace(",", ", "))
+    known = parse_spec(HEATER, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
+    for file in (path, spaced):
+        with pytest.raises(DataError) as caught:
+            assess(known, file)
+        assert caught.value.diagnostics[0].code == "data-repeated"
+        assert caught.value.diagnostics[0].key == "experiment.prior"
+
+
 def test_a_prior_of_another_system_decides_nothing(heater_record):
     path = heater_record("a.csv", 700, 1, power=0.5)
     found = identify(parse_spec(HEATER), path).result
