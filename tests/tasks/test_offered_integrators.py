@@ -1,27 +1,29 @@
-"""What is offered for a plant that a record cannot tell from an integrator."""
+"""What is offered for a plant in a loop that a record cannot tell from an integrator."""
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.system import build_model
-from inputdesign_cli.tasks.result import integrating
-
-PLANT = "plant: {B: [0, 1], F: [1, -0.7]}\n"
+from inputdesign_cli.tasks import explore, identify
 
 
-@pytest.mark.parametrize("loop", [True, False])
-def test_an_integrator_in_a_loop_is_offered_with_its_controller(monkeypatch, loop):
-    """Filled in, the offer is a spec; without a loop it has no controller."""
-    monkeypatch.setattr(integrating, "_rises", lambda *_: True)
-    model = parse_spec(f"sample_time: 1\n{PLANT}", design=False)
-    parts = SimpleNamespace(model=build_model(model), moving=[0], used=[(None, np.zeros(100))])
-    monkeypatch.setattr(integrating, "_deviations", lambda found, change: np.ones(len(change)))
-    (reason,) = integrating.like_integrators(parts, 1.0, "s", loop=loop)
-    offer = r"(plant: .*? sample: zoh\})(?:, and the controller as it was, )?(.*)$"
-    plant, law = re.search(offer, reason).groups()
-    spec = parse_spec(f"sample_time: 1\n{plant}\n{law.replace('..', '1')}\n", design=False)
-    assert (spec.experiment.controller is not None) == loop
+def test_an_integrator_in_a_loop_is_offered_with_its_controller(tmp_path):
+    """y(t) = y(t-1) + 0.1 u(t-1), u = 1.5 (r - y): the spec offered, its controller filled in, is right."""
+    rng = np.random.default_rng(1)
+    r, u, y, x = np.repeat(rng.uniform(-1, 1, 8), 50), np.zeros(400), np.zeros(400), 0.0
+    for t in range(400):
+        x = x + 0.1 * u[t - 1] if t else 0.0
+        y[t] = x + 0.02 * rng.standard_normal()
+        u[t] = 1.5 * (r[t] - y[t])
+    log = tmp_path / "log.csv"
+    table = np.column_stack([np.arange(400), u, y])
+    np.savetxt(log, table, delimiter=",", header="t_s,u,y", comments="", fmt="%.9g")
+    (reason,) = [one for one in explore(log).reasons if "integrator" in one]
+    offer = r"in SPEC (sample_time: \S+) and (plant: .*? sample: zoh\}), and the controller as it was, (.*)$"
+    step, plant, controller = re.search(offer, reason).groups()
+    filled = controller.replace("numerator: [..]", "numerator: [1.5]").replace("[..]", "[1]")
+    result = identify(parse_spec(f"{step}\n{plant}\n{filled}\n", design=False), log).result
+    assert result["identification"]["theta"]["K"] == pytest.approx(0.1, rel=0.1)
+    assert result["identification"]["failed"] == []
