@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+import scipy.signal
 from hypothesis import given, strategies as st
 
 from inputdesign_cli.runs.results import Table
@@ -44,7 +45,10 @@ def test_rows_have_as_many_fields_as_the_header(monkeypatch, capsys, tmp_path, v
     if verb == "campaign":
         _, rows = tables(tmp_path / "out")["signal.csv"]
         part = np.array(rows, dtype=float)
-        y = part[:, 1:] @ [[1.0, -0.5], [0.6, 1.2]] + np.random.default_rng(1).normal(size=(len(part), 2))
+        moved = part[:, 1:] @ [[1.0, 0.6], [-0.5, 1.2]]
+        moved = np.vstack([np.zeros(2), moved[:-1]]) + np.random.default_rng(1).normal(size=(len(part), 2))
+        lags = ([1, -0.7], [1, 0.4])
+        y = np.column_stack([scipy.signal.lfilter([1], lags[i], moved[:, i]) for i in range(2)])
         np.savetxt(
             "r.csv", np.column_stack([part, y]), delimiter=",", header="time_s,u1,u2,y1,y2", comments=""
         )
