@@ -48,15 +48,15 @@ def test_what_is_frequent_or_without_spread_is_no_spike():
     blocks=st.integers(1, 2),
     repeats=st.integers(1, 2),
     skip=st.integers(0, 1),
-    where=st.sets(st.integers(0, 399), min_size=1, max_size=3),
+    where=st.sets(st.integers(0, 399), min_size=1, max_size=2),
     drift=st.floats(-10, 10),
 )
 def test_spikes_of_periods_are_found_whatever_the_period_holds(seed, blocks, repeats, skip, where, drift):
-    """Not in the transient; from 400 samples of each record on, the first seven do not fill a period."""
+    """Not in the transient. The noise has a limit: of 60 examples none is to be far by chance."""
     rng = np.random.default_rng(seed)
     periods, samples = Periods(100, blocks=blocks, skip=skip), blocks * 600
     y = np.concatenate([np.tile(100.0 * rng.standard_normal(100), samples // 100) for _ in range(1)])
-    y = np.tile(y, repeats) + rng.standard_normal(samples * repeats)
+    y = np.tile(y, repeats) + rng.uniform(-1.0, 1.0, samples * repeats)
     y += np.repeat(drift * np.arange(samples * repeats // 100), 100)
     assert period_spikes(y[:, None], periods, repeats=repeats) == []
     at = sorted(100 * skip + x for x in where)
