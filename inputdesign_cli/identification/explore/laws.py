@@ -26,7 +26,7 @@ _HELD, _LEVELS = 1.0 / 3.0, 4
 _SWINGS = 8
 _LAGS, _WHITE = 20, 0.01
 TOGETHER = 4.0
-"""A correlation of white signals beyond this, over the root of their number, is none by chance."""
+"""A correlation of white signals, times the root of their number, beyond which it is none by chance."""
 
 Parts = Sequence[tuple[Array, Array]]
 
@@ -107,17 +107,21 @@ def _errors(columns: Array, target: Array, where: slice | NDArray[np.bool_]) -> 
 
 def together_at_once(parts: Parts) -> NDArray[np.bool_]:
     """(p, r), whether y_i(t) and u_j(t) go together beyond what the pasts of u (n, r), y (n, p) tell."""
+    return np.asarray(np.abs(correlation_at_once(parts)) > TOGETHER)
+
+
+def correlation_at_once(parts: Parts) -> Array:
+    """(p, r), the correlation of what is new in y_i(t) and u_j(t), times the root of their number."""
     outputs, inputs = parts[0][1].shape[1], parts[0][0].shape[1]
     lags = max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * (inputs + outputs))), 1)
-    signals = [
-        np.column_stack([y - y.mean(axis=0), u - u.mean(axis=0)]) for u, y in parts if len(y) > 3 * lags
-    ]
+    long = [np.column_stack([y, u]) for u, y in parts if len(y) > 3 * lags]
+    signals = [x - x.mean(axis=0) for x in long]
     if not signals:
-        return np.zeros((outputs, inputs), dtype=bool)
+        return np.zeros((outputs, inputs))
     new = np.concatenate(untold([past(x, lags) for x in signals], [x[lags:] for x in signals]))
     sizes = np.maximum(np.linalg.norm(new, axis=0), 1e-300)
-    correlations = new[:, :outputs].T @ new[:, outputs:] / np.outer(sizes[:outputs], sizes[outputs:])
-    return np.asarray(np.abs(correlations) > TOGETHER / np.sqrt(len(new)))
+    together = new[:, :outputs].T @ new[:, outputs:] / np.outer(sizes[:outputs], sizes[outputs:])
+    return np.asarray(np.sqrt(len(new)) * together)
 
 
 def set_apart(parts: Parts, j: int) -> bool:

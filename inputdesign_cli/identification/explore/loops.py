@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
-from inputdesign_cli.identification.explore.laws import TOGETHER, answers_between_moves, repeats_apart
+from inputdesign_cli.identification.explore.laws import (
+    TOGETHER,
+    answers_between_moves,
+    correlation_at_once,
+    repeats_apart,
+)
 from inputdesign_cli.identification.explore.switched import switched_by
 from inputdesign_cli.plant.polynomial import Array
 
@@ -202,16 +207,7 @@ def acts_late(parts: Parts, gains: Array) -> list[bool]:
         parts: u (n, r), y (n, 1).
         gains: (r,), of the plant, estimated with delays.
     """
-    r = parts[0][0].shape[1]
-    lags = _lags(parts, 1)
-    long = [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > 3 * lags]
-    if not long:
-        return [True] * r
-    before = np.concatenate([np.column_stack([past(u, lags), past(y, lags)]) for u, y in long])
-    new = _without(before, np.concatenate([np.column_stack([u, y])[lags:] for u, y in long]))
-    sizes = np.maximum(np.linalg.norm(new, axis=0), 1e-300)
-    together = new[:, :r].T @ new[:, r] / (sizes[:r] * sizes[r])
-    return [bool(x <= TOGETHER / np.sqrt(len(new))) for x in together * np.sign(gains)]
+    return [bool(x <= TOGETHER) for x in correlation_at_once(parts)[0] * np.sign(gains)]
 
 
 def _innovations(parts: Parts, lags: int) -> list[Array]:
