@@ -32,9 +32,10 @@ from inputdesign_cli.plant.polynomial import Array
 Split = Literal["the first 60 % and the rest", "blocks in turn", "none"]
 
 _SHARE = 0.6
-_BLOCKS = 10
-# An input that moves less than this share of what it does in the whole record is still in that part.
-_STILL = 0.02
+# Where an input steps in blocks of one kind only, fewer or more of them may part its steps.
+_BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
+# An input whose rms about its level is less than this share of that in all records rests.
+_STILL = 0.2
 _FEWEST = 30
 _MOST_SAMPLES = 20_000
 _UNKNOWN = ("gain and dynamics",)
@@ -95,14 +96,7 @@ def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
     still, moved = moving_in(parts)
     moving = [j for j in range(parts[0][0].shape[1]) if j not in still]
     first, second, split = divided(moved)
-    try:
-        found = _structures(first, second, feedback, step, physical=not still)
-    except SpecError:
-        if _move_in(first) & _move_in(second) == _move_in(moved):
-            raise
-        # What moves in one stretch cannot do so in two parts.
-        first, second, split = moved, moved, "none"
-        found = _structures(first, second, feedback, step, physical=not still)
+    found = _structures(first, second, feedback, step, physical=not still)
     used = busiest(moved, _MOST_SAMPLES)
     taken, estimate, model = _estimated(found, used, feedback, ramp)
     validation = beside(
@@ -267,7 +261,17 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
 
 
 def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
-    """Beginning and end of the records, or blocks in turn where an input rests in one of these."""
+    """What estimates and what judges: beginning and end of the records.
+
+    Blocks in turn where an input rests in one of these; the whole twice where it does so in any blocks.
+    """
+    for first, second, split in _divisions(parts):
+        if _moves(first, parts) and _moves(second, parts):
+            return first, second, split
+    return parts, parts, "none"
+
+
+def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, Split]]:
     total = sum(len(y) for _, y in parts)
     first: list[tuple[Array, Array]] = []
     second: list[tuple[Array, Array]] = []
@@ -278,28 +282,25 @@ def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
         for some, piece in ((first, slice(0, at)), (second, slice(at, None))):
             if len(y[piece]):
                 some.append((u[piece], y[piece]))
-    if _moves(first, parts) and _moves(second, parts):
-        return first, second, "the first 60 % and the rest"
-    length = max(total // _BLOCKS, 1)
-    blocks = [
-        (u[begin : begin + length], y[begin : begin + length])
-        for u, y in parts
-        for begin in range(0, len(y), length)
-        if len(y) - begin >= length // 2
-    ]
-    return blocks[::2], blocks[1::2], "blocks in turn"
-
-
-def _move_in(some: Parts) -> set[int]:
-    """The inputs that move within a record."""
-    return {j for j in range(some[0][0].shape[1]) if any(np.any(np.diff(u[:, j])) for u, _ in some)}
+    yield first, second, "the first 60 % and the rest"
+    for count in _BLOCKS:
+        length = max(total // count, 1)
+        blocks = [
+            (u[begin : begin + length], y[begin : begin + length])
+            for u, y in parts
+            for begin in range(0, len(y), length)
+            if len(y) - begin >= length // 2
+        ]
+        yield blocks[::2], blocks[1::2], "blocks in turn"
 
 
 def _moves(some: Parts, whole: Parts) -> bool:
-    """Whether all inputs move in a part, as they do in the whole."""
+    """Whether all inputs move in a part, as they do in the whole, beside its level in every record."""
     if not some:
         return False
-    spread, of_all = (np.concatenate([u for u, _ in records]).std(axis=0) for records in (some, whole))
+    spread, of_all = (
+        np.concatenate([u - u.mean(axis=0) for u, _ in records]).std(axis=0) for records in (some, whole)
+    )
     return bool(np.all(spread > _STILL * of_all))
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.signal
+from hypothesis import given, strategies as st
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.explore import (
@@ -233,6 +234,24 @@ def test_every_input_moves_in_both_parts():
         assert np.all(np.concatenate([x for x, _ in part]).std(axis=0) > 0)
 
 
+@pytest.mark.parametrize("ramp", [1, 3, 8])
+def test_a_single_step_is_not_cut_in_two(ramp):
+    """Wherever it is: one edge of a block in its midst would let two parts seem to move."""
+    flicker = 0.02 * np.random.default_rng(1).choice([-1.0, 1.0], (400, 1))
+    for at in range(4, 390, 5):
+        u = np.clip((np.arange(400.0)[:, None] - at) / ramp, 0.0, 1.0) + flicker
+        assert divided([(u, u)])[2] == "none", at
+
+
+@given(st.integers(20, 260), st.integers(40, 120))
+def test_a_step_and_the_step_back_are_parted(at, width):
+    u = ((np.arange(400) >= at) & (np.arange(400) < at + width)).astype(float)[:, None]
+    first, second, split = divided([(u, u)])
+    assert split != "none"
+    for part in (first, second):
+        assert max(np.ptp(own) for own, _ in part) == 1.0
+
+
 def test_an_input_that_never_moves_has_no_part_of_the_model():
     rng = np.random.default_rng(11)
     u, y = lag_with_dead_time(rng, 2, samples=300)
@@ -251,12 +270,13 @@ def test_too_short_a_record_is_refused():
         explore_records([(rng.standard_normal((20, 1)), rng.standard_normal((20, 1)))])
 
 
-def test_a_record_of_a_single_step_estimates_and_judges_at_once():
-    """A lag of ten samples, gain one; the end of the record alone would tell nothing."""
+@pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), (110, 0.02)])
+def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
+    """A lag of ten samples, gain one; a part of it tells nothing, also where u flickers."""
     rng = np.random.default_rng(1)
-    u = (np.arange(200) >= 20)[:, None].astype(float)
+    u = (np.arange(200) >= at)[:, None].astype(float)
     y = scipy.signal.lfilter([0, 0.1], [1, -0.9], u, axis=0) + 0.02 * rng.standard_normal((200, 1))
-    found = explore_records([(u, y)])
+    found = explore_records([(u + flicker * rng.choice([-1.0, 1.0], u.shape), y)])
     assert found.split == "none"
     gain = float(abs(found.model.plant_at(np.array([1e-4]))[0, 0, 0]))
     at_corner = float(abs(found.model.plant_at(np.array([0.1]))[0, 0, 0]))
