@@ -158,9 +158,16 @@ def _pair(text: str, option: str) -> tuple[float, float]:
         found = plain_number(low), plain_number(high)
     except ValueError:
         found = (math.nan, math.nan)
-    negative = option != "--range" and found[0] < 0.0
-    if not colon or not found[0] < found[1] or negative or math.isinf(found[0]) or math.isinf(found[1]):
+    if not colon or not all(map(math.isfinite, found)):
         raise typer.BadParameter(f"{text!r} is not of the form LOW:HIGH, as in 0.1:2", param_hint=option)
+    if not found[0] < found[1]:
+        message = f"in {text!r}, LOW:HIGH, {low.strip()} is not below {high.strip()}"
+        if found[0] > found[1]:
+            message += f": write the lower one first, {high.strip()}:{low.strip()}"
+        raise typer.BadParameter(message, param_hint=option)
+    if option != "--range" and found[0] < 0.0:
+        message = f"in {text!r}, LOW:HIGH, {low.strip()} is negative, and frequencies are not"
+        raise typer.BadParameter(message, param_hint=option)
     if max(map(abs, found)) > _LARGEST or found[1] - found[0] < _SMALLEST:
         message = f"{text!r} is beyond {_LARGEST:g}, or narrower than {_SMALLEST:g}: take another unit"
         raise typer.BadParameter(message, param_hint=option)

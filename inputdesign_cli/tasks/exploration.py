@@ -11,7 +11,7 @@ import numpy as np
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import cross_correlations, frequency_response, silent_in
-from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.explore import Fits, Found, answers_output, explore_records, fits
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json, Results
@@ -147,7 +147,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     """How a given model does on other data.
 
     Raises:
-        DataError: the data cannot be used.
+        DataError: the data cannot be used, or an output never changes.
     """
     started = time.perf_counter()
     counts = {"u": header.units.inputs, "y": header.units.outputs}
@@ -158,6 +158,8 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     }
     preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
+    with blaming_columns(paths[0]):
+        check_varying((), data.u[:, :0], data.y)
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)

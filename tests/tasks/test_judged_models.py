@@ -80,3 +80,16 @@ def test_a_model_without_a_sample_time_is_named(tmp_path):
     with pytest.raises(DataError, match=r"none is stated.*in model.yaml") as caught:
         explore(lag_log(tmp_path / "log.csv", seed=1), model=load_spec(model, design=False))
     assert "write sample_time: 0.5 in it" in caught.value.diagnostics[0].hint
+
+
+def test_an_output_that_never_changes_is_refused_as_without_a_model(tmp_path):
+    path = lag_log(tmp_path / "stuck.csv")
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *(f"{row.rsplit(',', 1)[0]},5" for row in rows)]))
+    told = []
+    for model in (None, load_spec(stored(tmp_path), design=False)):
+        with pytest.raises(DataError) as caught:
+            explore(path, model=model)
+        told += [(one.code, one.message, one.location) for one in caught.value.diagnostics]
+    assert told[0] == told[1]
+    assert told[0][0] == "constant-output"

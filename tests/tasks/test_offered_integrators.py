@@ -27,3 +27,19 @@ def test_an_integrator_in_a_loop_is_offered_with_its_controller(tmp_path):
     result = identify(parse_spec(f"{step}\n{plant}\n{filled}\n", design=False), log).result
     assert result["identification"]["theta"]["K"] == pytest.approx(0.1, rel=0.1)
     assert result["identification"]["failed"] == []
+
+
+def test_what_is_offered_is_a_spec_in_the_unit_of_the_log(tmp_path):
+    """y(t) = y(t-1) + 0.1 u(t-1): the lines offered, as they stand, identify the slope in the same log."""
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.choice([-1.0, 1.0], 16), 5)
+    y = 0.1 * np.concatenate([[0.0], np.cumsum(u)[:-1]]) + 0.02 * rng.standard_normal(80)
+    log = tmp_path / "log.csv"
+    table = np.column_stack([np.arange(80), u, y])
+    np.savetxt(log, table, delimiter=",", header="time_min,u,y", comments="", fmt="%.9g")
+    (reason,) = [one for one in explore(log).reasons if "cannot be told from an integrator" in one]
+    clock, plant = re.search(r"in SPEC (.*?) and (plant: .*? sample: zoh\})$", reason).groups()
+    text = "\n".join([*clock.split(", "), plant])
+    result = identify(parse_spec(text + "\n", design=False), log).result
+    assert result["identification"]["theta"]["K"] == pytest.approx(0.1, rel=0.1)
+    assert "time_unit: min" in text.splitlines()

@@ -10,7 +10,7 @@ import numpy as np
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.frames import EXCEL
 from inputdesign_cli.tasks.build.files.naming import named_columns, time_columns
-from inputdesign_cli.tasks.build.files.tags import roles_of
+from inputdesign_cli.tasks.build.files.tags import likely_roles, roles_of
 
 _UNNAMED = "NAME"
 # What separates entries of the option, or quotes it.
@@ -33,7 +33,18 @@ def columns_hint(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) 
             told = f"write 0 and 1 for {on} and {off} in column {called(sheet, switches[0])}, then "
             told += "name the columns: "
             return told + columns_option(sheet, named, wanted, sorted({*free, *switches}))
+    if sheet.shown and not _by_name(sheet, wanted, free):
+        told = "name them, or give their numbers; which is which the names do not tell, an example is "
     return told + columns_option(sheet, named, wanted)
+
+
+def _by_name(sheet: Sheet, wanted: Sequence[str], free: Sequence[int]) -> bool:
+    """Whether names tell which of the columns that are free are inputs and outputs, as many as wanted."""
+    likely = likely_roles(sheet.names or [""] * len(sheet.columns))
+    return all(
+        sum(likely[i] == letter for i in free) >= sum(channel.startswith(letter) for channel in wanted)
+        for letter in "uy"
+    )
 
 
 def columns_option(
@@ -72,17 +83,21 @@ def _plain(sheet: Sheet, column: str) -> str:
 
 
 def _chosen(sheet: Sheet, channels: Sequence[str], free: Sequence[int]) -> dict[str, int]:
-    """A column for each channel while there are some: those that are called so, else the next other ones."""
-    roles = dict(enumerate(roles_of(sheet.names or [""] * len(sheet.columns))))
+    """A column for each channel while there are some: those that are called so, else the next other ones.
+
+    What is usually one, as valves are inputs, comes before what may be anything.
+    """
+    names = sheet.names or [""] * len(sheet.columns)
+    likely = likely_roles(names)
     left, found = list(free), {}
-    for strict in (True, False):
+    for roles in (roles_of(names), likely, None):
         for channel in channels:
             letter = channel[0]
-            fit = left if not strict else [i for i in left if roles[i] == letter]
+            fit = left if roles is None else [i for i in left if roles[i] == letter]
             if channel in found or not fit:
                 continue
             found[channel] = min(
-                fit, key=lambda i: ("", *"uyr").index(roles[i] if roles[i] != letter else "")
+                fit, key=lambda i: ("", *"uyr").index(likely[i] if likely[i] != letter else "")
             )
             left.remove(found[channel])
     return found

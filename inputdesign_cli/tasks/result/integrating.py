@@ -41,6 +41,12 @@ def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tup
     return tuple(told)
 
 
+def clock_of(step: float, unit: str) -> str:
+    """The keys of a spec that say the sample time."""
+    keys = {"sample_time": f"{step:.6g}", **({} if unit == "s" else {"time_unit": unit})}
+    return ", ".join(f"{key}: {value}" for key, value in keys.items())
+
+
 def _frequencies(found: Found) -> Array:
     """(n,), rad per sample: as good as zero, then from the lowest of the longest record on."""
     lowest = 2.0 * np.pi / max(len(y) for _, y in found.used)
@@ -77,6 +83,6 @@ def _sentence(where: str, gain: str, slope: float, step: float, unit: str, loop:
         f"the plant{where} cannot be told from an integrator (its static gain is {gain}): no time constant "
         f"follows from this record, only the slope, {slope:.4g} per {unit} for an input of one. Record until "
         f"the output settles; or, if it never does, identify {sort}: idesign identify DATA --spec SPEC, in "
-        f"SPEC sample_time: {step:.6g} and plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, "
+        f"SPEC {clock_of(step, unit)} and plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, "
         f"continuous: {{numerator: [K], denominator: [1, 0], delay: L}}, sample: zoh}}{law}"
     )

@@ -10,7 +10,7 @@ from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.explore import Found, by_chance, only_answers, unstable_pole
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.at_once import like_inverses
-from inputdesign_cli.tasks.result.integrating import CONTROLLER, like_integrators
+from inputdesign_cli.tasks.result.integrating import CONTROLLER, clock_of, like_integrators
 from inputdesign_cli.tasks.result.unidentified import rivalled, unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing, late_inputs
 
@@ -136,7 +136,7 @@ def _unstable(log: Log) -> tuple[str, ...]:
         told.append(
             f"the plant of {signal_name('y', i, outputs)} is unstable: it has a pole at a radius of "
             f"{pole.radius:.4g} +- {pole.deviation:.1g}, and only stable ones are looked for here. Identify "
-            f"it with its loop: idesign identify DATA --spec SPEC, in SPEC sample_time: {log.step:.6g}, "
+            f"it with its loop: idesign identify DATA --spec SPEC, in SPEC {clock_of(log.step, log.time_unit)}, "
             f"plant: {{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and {CONTROLLER}; "
             "raise the orders where tests fail"
         )

@@ -103,7 +103,9 @@ def test_a_column_for_two_channels_stays_with_one(asked, text, tmp_path):
         (("SP", "PV"), "u1=SP,y1=PV"),
         (("CO", "CO2"), "u1=CO,y1=CO2"),
         (("Temp", "PV"), "u1=Temp,y1=PV"),
-        (("signal mV", "valve"), "u1=signal mV,y1=valve"),
+        (("signal mV", "valve"), "u1=valve,y1=signal mV"),
+        (("Heater 1", "Heater 2", "Temperature 1", "Temperature 2"), "u1=Heater 1,y1=Temperature 1"),
+        (("level_1 (m)", "level setpoint", "pump_2 (V)"), "u1=pump_2 (V),y1=level_1 (m)"),
     ],
 )
 def test_names_of_process_control_say_which_is_which(names, text, tmp_path):
@@ -207,3 +209,13 @@ def test_no_column_holds_the_times_if_one_says_so(said, tmp_path):
 def test_a_column_that_is_called_none_is_one(tmp_path):
     path = written(tmp_path / "log.csv", ("None", "u", "y"), ("time", "in", "out"))
     assert read_log(path, Preparation(columns={"time": "none"})).step == pytest.approx(0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("names", "known"), [(("heater", "temp"), True), (("x", "temp"), False), (("one", "other"), False)]
+)
+def test_pairs_that_no_names_tell_are_called_an_example(names, known, tmp_path):
+    path = written(tmp_path / "log.csv", names, ("in", "out"))
+    with pytest.raises(DataError) as raised:
+        read_log(path, Preparation())
+    assert ("an example" in raised.value.diagnostics[0].hint) != known

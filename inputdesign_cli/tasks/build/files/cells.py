@@ -8,6 +8,10 @@ import re
 from inputdesign_cli.specification.yaml.scalars import plain_number
 
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
+# What sheets write in place of a number that they do not have.
+_ERRORS = re.compile(
+    r"#(?:N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)", re.IGNORECASE
+)
 _UNITS = frozenset(
     re.findall(
         r"\w+",
@@ -17,12 +21,15 @@ _UNITS = frozenset(
 )
 _SYMBOLS = re.compile(r"[%°/²³^℃℉]")
 _MEASURED = re.compile(r"([-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*([^\W\d_][^\s,;|]*|[%°℃℉][^\s,;|]*)", re.ASCII)
+# The minus sign of Unicode before a number or in its exponent, not between two words or numbers.
+_MINUS = re.compile(r"(?:(?<![\w.])|(?<=\d[eE]))\u2212(?=[.,]?\d)", re.ASCII)
 # What programs in Fortran write in place of 1.0e+00.
 _FORTRAN = re.compile(r"(?<![\w.])([-+]?(?:\d+[.,]\d*|[.,]\d+))[dD]([-+]?\d{1,3})(?![\w.])", re.ASCII)
 
 
-def with_exponents(text: str) -> str:
-    """A text whose numbers such as 1.0D+00 have the exponents that others have."""
+def in_plain_signs(text: str) -> str:
+    """A text whose numbers such as 1.0D+00 have the exponents, and negative ones the sign, of all others."""
+    text = _MINUS.sub("-", text) if "\u2212" in text else text
     return _FORTRAN.sub(r"\1e\2", text) if "D" in text or "d" in text else text
 
 
@@ -47,7 +54,13 @@ def is_known(text: str) -> bool:
 
 def is_missing(text: str) -> bool:
     """Whether a cell says that there is no number."""
-    return text.strip().lower() in _MISSING
+    bare = text.strip()
+    return bare.lower() in _MISSING or is_error(bare)
+
+
+def is_error(text: str) -> bool:
+    """Whether a cell is an error of a sheet, such as #N/A, in place of a number."""
+    return _ERRORS.fullmatch(text.strip()) is not None
 
 
 def is_number(text: str) -> bool:

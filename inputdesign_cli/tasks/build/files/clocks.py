@@ -47,6 +47,7 @@ def _joined(dates: Column, clock: Column, names: Sequence[str]) -> Column:
     numbers = moments - moments[there[0]] if there.size else moments
     began = dates.began + float(moments[there[0]]) if there.size else 0.0
     told = f"{' and '.join(names)} were joined: dates and times of day"
+    told = "; ".join(filter(None, (told, dates.told, clock.told)))
     return Column(numbers, dated=True, began=began, told=told)
 
 
@@ -58,7 +59,8 @@ def _past_midnight(clock: Column, name: str, sheet: Sheet) -> Column:
     numbers = clock.numbers.copy()
     numbers[there[1:]] += _DAY * np.cumsum(falls)
     at = rows.told(sheet.lines[there[1:][falls]])
-    return replace(clock, numbers=numbers, told=f"{name} passes midnight (before {at}): a day was added")
+    told = f"{name} passes midnight (before {at}): a day was added"
+    return replace(clock, numbers=numbers, told="; ".join(filter(None, (clock.told, told))))
 
 
 def _called(sheet: Sheet, i: int) -> str:

@@ -17,7 +17,7 @@ _DAYS = (
 )
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 # How they all begin, those of ISO 8601 included.
-_BEGIN = re.compile(r"\d{1,4}([/-]\d|\.\d{1,2}\.|[- ]\w{3}[- ]|:\d\d)|\d{8}T|\d{4}-?W\d")
+_BEGIN = re.compile(r"\d{1,4}([/-]\d|\.\d{1,2}\.|[- ]\w{3}[- ]|:\d\d)|\d{8}[T ]\d|\d{4}-?W\d")
 # What to write, for messages.
 AS_DATES = (
     "write all of them in one way, the year first: 2024-03-12 10:15:00; or 12.03.2024 10:15:00, 03/12/2024 "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.isolated import divided
-from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, elsewhere, of_arrays, unreadable
+from inputdesign_cli.tasks.build.files.named_arrays import of_arrays
+from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, elsewhere, unreadable
 from inputdesign_cli.tasks.build.files.text import FORMULA, column_of, read_text
 
 PARQUET = (".parquet", ".pq")
@@ -34,7 +36,7 @@ def read_parquet(path: Path, key: str, raw: bytes) -> Sheet:
     Raises:
         DataError: `data-unreadable`.
     """
-    every = _loaded(path, key, "a parquet file", lambda pandas: _series(pandas, io.BytesIO(raw)))
+    every = _loaded(path, key, "a parquet file", lambda pandas: _series(pandas, path, key, raw))
     arrays = {name: _bare(array) for name, array in every.items()}
     dated = {name: column for name, array in arrays.items() for column in _dated(array)}
     found = divided({name: dated[name].numbers if name in dated else arrays[name] for name in arrays})
@@ -101,9 +103,20 @@ def _formula(cell: object) -> str:
     return text if isinstance(text, str) and text.startswith(FORMULA) else ""
 
 
-def _series(pandas: Any, file: io.BytesIO) -> dict[str, NDArray]:
-    """The columns of a frame by their names, before them what stands in its index; times of a zone in UTC."""
-    frame = pandas.read_parquet(file)
+def _series(pandas: Any, path: Path, key: str, raw: bytes) -> dict[str, NDArray]:
+    """The columns of a frame by their names, before them what stands in its index; times of a zone in UTC.
+
+    Raises:
+        DataError: `data-unreadable`; columns have one name.
+    """
+    try:
+        frame = pandas.read_parquet(io.BytesIO(raw))
+    except ValueError:
+        again = _repeated(raw)
+        if not again:
+            raise
+        what = f"has several columns of one name: {', '.join(again)}"
+        raise unreadable(path, key, what, "give each column a name of its own, or save it as CSV") from None
     levels = [frame.index.get_level_values(i) for i in range(frame.index.nlevels)]
     found: dict[str, NDArray] = {}
     for level in levels:
@@ -113,6 +126,12 @@ def _series(pandas: Any, file: io.BytesIO) -> dict[str, NDArray]:
             if str(name) not in map(str, frame):
                 found[str(name)] = _plain(pandas, level.to_series())
     return found | {str(name): _plain(pandas, frame[name]) for name in frame}
+
+
+def _repeated(raw: bytes) -> list[str]:
+    """The names in a parquet file that several columns have."""
+    names = import_module("pyarrow.parquet").read_schema(io.BytesIO(raw)).names
+    return sorted(name for name, count in Counter(names).items() if count > 1)
 
 
 def _plain(pandas: Any, series: Any) -> NDArray:
@@ -139,6 +158,8 @@ def _loaded(path: Path, key: str, kind: str, load: Callable[[Any], Any]) -> Any:
     except ImportError:
         hint = 'install what reads it: pip install "inputdesign-cli[data]"; or save it as CSV'
         raise unreadable(path, key, f"is {kind}, and pandas is not installed", hint) from None
+    except DataError:
+        raise
     except Exception:  # whatever a broken file leads the reader to
         raise unreadable(path, key, f"is not {kind} that can be read", "save it as CSV") from None
 

@@ -10,7 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.tasks.build.files.cells import is_known, is_missing, is_number, is_unit, measured
+from inputdesign_cli.tasks.build.files.cells import (
+    is_error,
+    is_known,
+    is_missing,
+    is_number,
+    is_unit,
+    measured,
+)
 from inputdesign_cli.tasks.build.files.dates import is_moment
 
 Rows = list[tuple[int, list[str]]]
@@ -23,10 +30,6 @@ COMMENT, COMMENTED = "comment", "commented numbers"
 LEFT_OUT = (BLANK, COMMENTED)
 
 COMMENTS = ("#", "%", "//")
-# What sheets write in place of a number that they do not have.
-_ERRORS = re.compile(
-    r"#(?:N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)", re.IGNORECASE
-)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+", re.ASCII)
 # Numbers with marks between thousands, or in the digits of any script.
 _MARKED = re.compile(r"[-+\u2212]?\d[\d.,'\u2019_\s]*")
@@ -102,17 +105,22 @@ def rows_of(text: str, separator: str | None) -> tuple[Rows, Passed]:
     for line, row in found:
         if not any(map(str.strip, row)):
             passed.append((line, EMPTY if len(row) > 1 else BLANK))
-        elif row[0].lstrip().startswith(COMMENTS):
+        elif row[0].lstrip().startswith(COMMENTS) and not _is_gap(row):
             passed.append((line, _comment(row, separator)))
         else:
             rows.append((line, row))
     return rows, tuple(passed)
 
 
+def _is_gap(row: Sequence[str]) -> bool:
+    """Whether a row begins with an error of a sheet, and holds numbers or nothing else."""
+    return len(row) > 1 and is_error(row[0]) and all(is_plain(cell) or is_missing(cell) for cell in row[1:])
+
+
 def _comment(row: Sequence[str], separator: str | None) -> str:
     """Whether a row that begins as comments do holds samples, or errors of a sheet in place of them."""
     first = row[0].strip()
-    if _ERRORS.fullmatch(first):
+    if is_error(first):
         return COMMENTED
     bare = [first.lstrip("#%/").strip(), *row[1:]]
     if separator is not None and any(is_plain(cell) for cell in bare[1:]):

@@ -15,10 +15,10 @@ _TIME = re.compile(
 _CLOCK = re.compile(
     r"(uhrzeit|zeitpunkt|messzeit|datum|date|clock|hora|fecha|marca[ _]de[ _]tiempo)(?![^\W_]).*"
 )
+_OF_TIME = r"(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?"
+_UNIT_LAST = re.compile(rf".*[^a-z]{_OF_TIME}\s*")
 # The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
-_SHORT = re.compile(
-    r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
-)
+_SHORT = re.compile(rf"t([ _]*[(\[]?\s*{_OF_TIME})?")
 _MOSTLY = 0.9
 
 
@@ -67,6 +67,16 @@ def time_columns(sheet: Sheet) -> list[str]:
     once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
     dates = [name for name in once if name.startswith("dat")]
     return dates if dates or (len(once) > 1 and clocks[0][1].fault is None) else once
+
+
+def called_times(name: str) -> bool:
+    """Whether a name, in small letters, is one of times or of clocks."""
+    return any(pattern.fullmatch(name) for pattern in (_TIME, _CLOCK, _SHORT))
+
+
+def says_unit(name: str) -> bool:
+    """Whether a name, in small letters, ends with a unit of time."""
+    return _UNIT_LAST.fullmatch(name) is not None
 
 
 def _advances(x: Array) -> bool:

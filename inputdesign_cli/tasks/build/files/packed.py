@@ -10,7 +10,7 @@ from pathlib import Path
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.sheet import unreadable
 
-ZIP, _OLE = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+ZIP, _OLE, _ARRAY = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x93NUMPY"
 # How each kind begins, the program that unpacks it, and the ending that this asks for, if any.
 _COMPRESSED = (
     (b"\x1f\x8b", "gzip", "gunzip", ".gz"),
@@ -36,6 +36,8 @@ def check_unpacked(path: Path, key: str, raw: bytes, *, workbook: bool) -> None:
     for mark, kind, program, ending in _COMPRESSED:
         if raw.startswith(mark) and not (mark == b"BZh" and not raw[3:4].isdigit()):
             raise _compressed(path, key, kind, program, ending)
+    if raw.startswith(_ARRAY) and path.suffix.lower() != _ARRAYS:
+        raise unreadable(path, key, "holds an array of NumPy", f"give it the ending {_ARRAYS}")
     if raw.startswith(ZIP):
         names = _names(raw)
         if names and all(name.endswith(_ARRAYS) for name in names):

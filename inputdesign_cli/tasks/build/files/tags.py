@@ -13,7 +13,17 @@ _WORDS = {
 }
 # These mean other things as well (carbon monoxide, a valve): they count beside one of those above.
 _BESIDE = {**dict.fromkeys(("co", "out"), "u"), "cv": "y", "w": "r"}
+# What is named after a thing or a quantity is usually this; it is proposed, and never taken unasked.
+_LIKELY = {
+    **dict.fromkeys(
+        ("heater", "heating", "valve", "pump", "fan", "motor", "actuator", "duty", "command"), "u"
+    ),
+    **dict.fromkeys(("cmd", "drive", "manipulated", "steam", "reflux"), "u"),
+    **dict.fromkeys(("temperature", "temp", "level", "flow", "pressure", "speed", "position", "sensor"), "y"),
+    **dict.fromkeys(("concentration", "composition", "process", "response"), "y"),
+}
 _WITH_UNIT = re.compile(r"[(\[].*")
+_NUMBER = re.compile(r"\d+")
 _NUMBERED = re.compile(r"(.*[a-z])\d+")
 _MILLIVOLTS = "mV"
 
@@ -24,6 +34,14 @@ def roles_of(names: Sequence[str]) -> list[str]:
     return (
         [role or _role(name, _BESIDE) for role, name in zip(sure, names, strict=True)] if any(sure) else sure
     )
+
+
+def likely_roles(names: Sequence[str]) -> list[str]:
+    """The same, and where the names do not say it, `u` or `y` of what is usually one."""
+    return [
+        role or _role(_NUMBER.sub("", name), _LIKELY)
+        for role, name in zip(roles_of(names), names, strict=True)
+    ]
 
 
 def _role(name: str, words: dict[str, str]) -> str:

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.tasks.build.files.cells import is_missing, is_number, measured, with_exponents
+from inputdesign_cli.tasks.build.files import numeric_dates
+from inputdesign_cli.tasks.build.files.cells import in_plain_signs, is_missing, is_number, measured
 from inputdesign_cli.tasks.build.files.dates import AS_DATES, look_like_moments, moments_of, seems_moment
 from inputdesign_cli.tasks.build.files.layout import (
     COMMENTS,
@@ -48,7 +49,7 @@ def read_text(path: Path, key: str, text: str, separated_by: str | None = None) 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    text = with_exponents(text)
+    text = in_plain_signs(text)
     lines = text.splitlines()
     _check_widths(path, key, lines)
     comment, first = _leading_comment(lines)
@@ -168,7 +169,7 @@ def column_of(cells: list[str], *, points: bool = True) -> Column:
         wrong = "may have a mark between thousands, or three decimals: other cells have none"
         return Column(numbers, (thousand, cells[thousand].strip()), wrong=wrong)
     if fault is None:
-        return Column(numbers)
+        return numeric_dates.of_cells(cells, numbers) or Column(numbers)
     written = {cell.strip() for cell in cells if not is_missing(cell)} if np.isnan(numbers).all() else set()
     return _of_dates(cells, Column(numbers, fault, words=tuple(sorted(written))))
 

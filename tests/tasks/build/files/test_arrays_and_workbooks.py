@@ -62,7 +62,7 @@ def test_an_object_beside_other_arrays_is_told_with_the_lines_that_convert_it(mo
     """SciPy writes no such objects: what its reader tells of one."""
     path = tmp_path / "log.mat"
     path.write_bytes(b"MATLAB 5.0 MAT-file")
-    monkeypatch.setattr(isolated, "arrays_of", lambda raw: isolated.Arrays({"v": U}, opaque=True))
+    monkeypatch.setattr(isolated, "arrays_of", lambda raw, named: isolated.Arrays({"v": U}, opaque=True))
     with pytest.raises(DataError) as caught:
         read_log(path, Preparation())
     assert "save('data.mat', '-struct', 's'" in caught.value.diagnostics[0].message
@@ -181,3 +181,87 @@ def test_formulas_without_values_are_told_as_such(columns, tmp_path):
     (told,) = caught.value.diagnostics
     assert told.location.line == 2
     assert "open the file in a spreadsheet program and save it" in told.hint
+
+
+STRUCT = {"u": U, "y": Y, "Ts": 0.5}
+
+
+def _log(path, preparation=None):
+    return read_log(path, preparation or Preparation())
+
+
+def test_one_of_two_structs_with_signals_of_one_name_is_to_be_named(tmp_path):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"ze": STRUCT, "zv": {"InputData": 2.0 * U, "OutputData": Y, "Ts": 0.25}})
+    with pytest.raises(DataError, match="holds ze and zv, each with a u of its own") as caught:
+        _log(path)
+    assert "'log.mat#ze', or 'log.mat#zv'" in caught.value.diagnostics[0].hint
+    first, second = (_log(path.with_name(f"log.mat#{name}")) for name in ("ze", "zv"))
+    np.testing.assert_array_equal(second.u, 2.0 * first.u)
+    np.testing.assert_array_equal(first.u[:, 0], np.ravel(U))
+    assert (first.step, second.step) == (0.5, 0.25)
+
+
+def test_a_variable_that_is_not_there_is_told_with_those_that_are(tmp_path):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"ze": STRUCT, "zv": STRUCT})
+    with pytest.raises(DataError, match="no such variable") as caught:
+        _log(path.with_name("log.mat#data"))
+    assert caught.value.diagnostics[0].hint == "it holds ze, zv"
+
+
+@pytest.mark.parametrize("other", [{"s": STRUCT, "u": 3.0 * U}, {"s": STRUCT, "Ts": 0.25}])
+def test_a_struct_and_an_array_of_its_own_are_not_mixed(other, tmp_path):
+    scipy.io.savemat(tmp_path / "log.mat", other)
+    with pytest.raises(DataError, match="of its own"):
+        _log(tmp_path / "log.mat")
+
+
+def test_what_structs_have_in_common_is_no_matter(tmp_path):
+    scipy.io.savemat(tmp_path / "log.mat", {"ze": STRUCT, "Ts": 0.5, "info": {"Ts": 0.5, "by": "me"}})
+    assert _log(tmp_path / "log.mat").step == 0.5
+
+
+def test_structured_arrays_are_named_as_structs_are(tmp_path):
+    pairs = np.zeros(len(np.ravel(U)), dtype=[("u", float), ("y", float)])
+    pairs["u"], pairs["y"] = np.ravel(U), np.ravel(Y)
+    twice = pairs.copy()
+    twice["u"] *= 2.0
+    np.savez(tmp_path / "log.npz", a=pairs, b=twice)
+    with pytest.raises(DataError, match="holds a and b, each with a u"):
+        _log(tmp_path / "log.npz")
+    np.testing.assert_array_equal(_log(tmp_path / "log.npz#b").u[:, 0], 2.0 * np.ravel(U))
+
+
+def test_a_single_array_is_read_by_numbers_of_its_columns(tmp_path):
+    path = tmp_path / "log.npy"
+    np.save(path, np.column_stack([0.5 * np.arange(np.size(U)), np.ravel(U), np.ravel(Y)]))
+    found = _log(path, Preparation(columns={"time": "1", "u1": "2", "y1": "3"}))
+    assert found.step == 0.5
+    np.testing.assert_array_equal(found.u[:, 0], np.ravel(U))
+    with pytest.raises(DataError) as caught:
+        _log(path)
+    assert '--columns "time=1,u1=2,y1=3"' in caught.value.diagnostics[0].hint
+
+
+@pytest.mark.parametrize("array", [np.array(["a", "b"]), np.array([None, 1]), np.array(1.0), np.zeros(0)])
+def test_a_single_array_of_no_columns_names_the_kind_of_file_to_write(array, tmp_path):
+    np.save(tmp_path / "log.npy", array)
+    with pytest.raises(DataError, match=r"log\.npy") as caught:
+        _log(tmp_path / "log.npy")
+    assert "numpy.savez" in caught.value.diagnostics[0].hint
+
+
+def test_an_array_under_another_ending_is_told(tmp_path):
+    np.save(tmp_path / "log.npy", np.zeros((9, 3)))
+    (tmp_path / "log.npy").rename(tmp_path / "log.csv")
+    with pytest.raises(DataError, match="an array of NumPy"):
+        _log(tmp_path / "log.csv")
+
+
+def test_columns_of_parquet_that_have_one_name_are_told(tmp_path):
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    table = arrow.table([np.ravel(U), np.ravel(U), np.ravel(Y)], names=["u", "u", "y"])
+    parquet.write_table(table, tmp_path / "log.parquet")
+    with pytest.raises(DataError, match="several columns of one name: u"):
+        _log(tmp_path / "log.parquet")

@@ -59,7 +59,7 @@ def test_a_number_is_what_it_says_or_refused(tmp_path, large, small, kind, mark,
         np.testing.assert_array_equal(found, values)
 
 
-@pytest.mark.parametrize("cell", ["1_0", "\u0661", "\uff11.5", "1,250.5", "1\u202f250", "\u22121"])
+@pytest.mark.parametrize("cell", ["1_0", "\u0661", "\uff11.5", "1,250.5", "1\u202f250", "3\u22121"])
 def test_the_hint_says_how_to_write_it(cell, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(f'u,y\n0.5,1\n"{cell}",2\n', encoding="utf-8")
@@ -68,6 +68,17 @@ def test_the_hint_says_how_to_write_it(cell, tmp_path):
     (diagnostic,) = caught.value.diagnostics
     assert diagnostic.location.line == 3
     assert "digits 0 to 9" in diagnostic.hint
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", " "])
+def test_the_minus_of_unicode_is_one(mark, tmp_path):
+    path = tmp_path / "log.txt"
+    rows = [["u\u22121", "y"], ["\u22121.5", "2"], ["3", "\u2212.5e\u22123"], ["\u22124E2", "0"]]
+    path.write_text("\n".join(mark.join(row) for row in rows), encoding="utf-8")
+    sheet = read_sheet(path, key="")
+    assert sheet.names[0] == "u\u22121"
+    np.testing.assert_array_equal(sheet.columns[0].numbers, [-1.5, 3.0, -400.0])
+    np.testing.assert_array_equal(sheet.columns[1].numbers, [2.0, -5e-4, 0.0])
 
 
 @pytest.mark.parametrize(
