@@ -17,6 +17,8 @@ from inputdesign_cli.plant.polynomial import Array
 _OF_ONE_SIDE = 1e-9
 # Two estimates from the same data agree to this share of a deviation, and of what they know.
 _THE_SAME = 1e-3
+# An estimate of data among these knows no more than they do; one that knows far less may be stated modestly.
+_LEAST_SHARE, _MOST_SHARE = 0.2, 0.6
 
 
 @dataclass(frozen=True)
@@ -61,9 +63,28 @@ class Earlier:
             theta: (k,), the estimate from both.
             factor: L (k, k), lower triangular, L L^T the information of both.
         """
+        statistic, directions = self._apart(theta, factor, _OF_ONE_SIDE, 1.0 - _OF_ONE_SIDE)
+        return float(scipy.special.chdtrc(directions, statistic)) if directions else 1.0
+
+    def likeness(self, theta: Array, factor: Array) -> float:
+        """The probability that estimates from different data agree as closely as this and that of the data.
+
+        Of a record that is given again, rounded, or with a few rows less, it is small.
+
+        Args:
+            theta, factor: see `agreement`.
+        """
+        statistic, directions = self._apart(theta, factor, _LEAST_SHARE, _MOST_SHARE)
+        return float(scipy.special.chdtr(directions, statistic)) if directions else 1.0
+
+    def _apart(self, theta: Array, factor: Array, least: float, most: float) -> tuple[float, int]:
+        """How far the two are apart, squared, in deviations of their difference, and in how many directions.
+
+        Args:
+            least, most: of the knowledge in a direction that counts, the share that is of this one.
+        """
         inner = np.linalg.solve(factor, self.rows.T)
         shares, turn = np.linalg.eigh(inner @ inner.T)
         away = (turn.T @ (factor.T @ (theta - self.theta))) ** 2
-        both = (shares > _OF_ONE_SIDE) & (shares < 1.0 - _OF_ONE_SIDE)
-        statistic = float(np.sum(away[both] * shares[both] / (1.0 - shares[both])))
-        return float(scipy.special.chdtrc(both.sum(), statistic)) if np.any(both) else 1.0
+        both = (shares > least) & (shares < most)
+        return float(np.sum(away[both] * shares[both] / (1.0 - shares[both]))), int(both.sum())

@@ -46,6 +46,7 @@ class Estimate:
         first: (records, p), the first residuals if each record began at rest about zero.
         agreement: the probability that an earlier estimate differs as much as the one that counts along; None
             where there is none.
+        likeness: the probability that one from other data agrees as closely; None where there is none.
         lengths: the samples of each of the records, which follow each other.
         rivals: other minima that explain the data nearly as well.
         alike: of several experiments, the probability that each differs as much from the others.
@@ -69,6 +70,7 @@ class Estimate:
     rest_refuted: bool
     first: Array
     agreement: float | None
+    likeness: float | None
     lengths: tuple[int, ...]
     whiteness: ResidualTest
     independence: ResidualTest
@@ -184,6 +186,7 @@ def concluded(
         rest_refuted=found.rest_refuted,
         first=found.first,
         agreement=None if earlier is None else earlier.agreement(point.theta, factor),
+        likeness=None if earlier is None else earlier.likeness(point.theta, factor),
         lengths=lengths,
         whiteness=whiteness(point.errors, fitted=in_noise, lengths=lengths),
         independence=cross_correlations(

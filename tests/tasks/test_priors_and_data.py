@@ -4,10 +4,12 @@ import json
 
 import numpy as np
 import pytest
+import scipy
 import yaml
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.identification.earlier import Earlier
 from tests.support.heater import HEATER
 
 
@@ -66,6 +68,34 @@ def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(heat
             assess(known, file)
         assert caught.value.diagnostics[0].code == "data-repeated"
         assert caught.value.diagnostics[0].key == "experiment.prior"
+
+
+def test_a_prior_of_a_copy_of_the_data_decides_nothing(heater_record, tmp_path):
+    """Rounded to a tenth of the noise, and a few rows less."""
+    path = heater_record("a.csv", 300, 1, power=0.5)
+    (tmp_path / "model.yaml").write_bytes(identify(parse_spec(HEATER), path).files["model.yaml"])
+    known = parse_spec(HEATER, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
+    head, *rows = path.read_text().splitlines()
+    copy = tmp_path / "copy.csv"
+    rounded = [",".join(f"{float(cell):.4g}" for cell in row.split(",")) for row in rows[:298]]
+    copy.write_text("\n".join([head, *rounded]))
+    verdict = assess(known, copy)
+    assert verdict.verdict == "undecided"
+    assert "made of this record" in " ".join(verdict.results.result["notes"])
+
+
+def test_estimates_from_different_data_are_as_alike_as_chance_has_it():
+    """Of two Gaussian estimates the probability is uniform; of the same one it vanishes."""
+    rng = np.random.default_rng(1)
+    information = np.array([[4.0, 1.0], [1.0, 2.0]])
+    deviation = np.linalg.cholesky(np.linalg.inv(information))
+    factor = np.linalg.cholesky(2.0 * information)
+    found = []
+    for _ in range(2000):
+        one, other = (deviation @ rng.standard_normal((2, 2))).T
+        found.append(Earlier(one, information).likeness((one + other) / 2.0, factor))
+    assert scipy.stats.kstest(found, "uniform").pvalue > 1e-3
+    assert Earlier(one, information).likeness(one, factor) < 1e-9
 
 
 def test_a_prior_of_another_system_decides_nothing(heater_record):

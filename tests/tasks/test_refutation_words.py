@@ -24,7 +24,7 @@ def test_samples_that_come_again_in_a_record_without_a_file_are_told():
 
 def test_looks_share_the_level_of_what_they_may_end():
     """0.001 for records and 0.01 for a prior, of two records and twenty looks at data that come in."""
-    estimate = SimpleNamespace(alike=(2e-5, 2e-5), agreement=4e-4)
+    estimate = SimpleNamespace(alike=(2e-5, 2e-5), agreement=4e-4, likeness=0.9)
     assert differences(estimate, ["a.csv", "b.csv"], looks=24)
     assert contradictions(estimate, looks=24)
     assert not differences(estimate, ["a.csv", "b.csv"], looks=26)

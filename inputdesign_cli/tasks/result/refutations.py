@@ -37,7 +37,7 @@ REMEDY = {
     "or give as u what the actuator really does",
 }
 # Experiments of one system differ as much with this probability; a prior, which decides along with the data
-# and may hide what they say, and the data with this one.
+# and may hide what they say, and the data with this one, and so seldom do they agree as closely.
 _ONE_SYSTEM, _PRIOR = 1e-3, 1e-2
 _LEAST = 1e-300
 
@@ -59,17 +59,26 @@ def unsettled(estimate: Estimate) -> list[str]:
 
 
 def contradictions(estimate: Estimate, looks: int = 1) -> list[str]:
-    """What to say where the prior and the data are not of one system.
+    """What to say where the prior and the data are not of one system, or of one record.
 
     Args:
         looks: how often it is asked as data come in; they share the level (Bonferroni).
     """
-    if estimate.agreement is None or estimate.agreement * looks >= _PRIOR:
+    if estimate.agreement is None or estimate.likeness is None:
         return []
-    return [
-        f"experiment.prior and these data contradict each other (probability {chance(estimate.agreement)} "
-        "for one system): remove the prior, or look for what has changed since"
-    ]
+    if estimate.agreement * looks < _PRIOR:
+        return [
+            "experiment.prior and these data contradict each other (probability "
+            f"{chance(estimate.agreement)} for one system): remove the prior, or look for what has changed "
+            "since"
+        ]
+    if estimate.likeness * looks < _PRIOR:
+        return [
+            "experiment.prior and these data agree more closely than others do (probability "
+            f"{chance(estimate.likeness)}): the prior seems to be made of this record, or of a part or copy "
+            "of it, which would count twice; leave it out, or give only records that it was not made of"
+        ]
+    return []
 
 
 def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> list[str]:
