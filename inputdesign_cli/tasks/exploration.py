@@ -30,6 +30,7 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_entry,
     without_drift,
 )
+from inputdesign_cli.tasks.result.faults import biasing
 from inputdesign_cli.tasks.result.no_trust import DRIVE, HALF, LEAST_FIT, distrusted, undriven_inputs
 from inputdesign_cli.tasks.result.refutations import chance, refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
@@ -65,24 +66,22 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
             if not undriven:
                 raise
             raise bad_spec("no-structure", undriven[0], hint=DRIVE, key="u") from error
-    reasons = distrusted(log, found, undriven, loop=bool(loops))
+    doubts = distrusted(log, found, undriven, loop=bool(loops))
     log = without_drift(log, found)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
     times = np.concatenate([log.step * np.arange(length) for length in lengths])
+    data = Data(u, y, None, times, lengths, (), (), recorded=log.recorded.at(found.samples))
+    fitted = found.validation.simulation
+    reasons = (*doubts, *biasing(task.header.units, found.estimate, data, fitted))
     heard = exploration_notes(log, found, loops)
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
         task,
         Identified(
-            found.estimate,
-            found.model,
-            Data(u, y, None, times, lengths, (), notes, recorded=log.recorded.at(found.samples)),
-            preparation,
-            None,
-            loop_told=bool(loops),
+            found.estimate, found.model, replace(data, notes=notes), preparation, None, loop_told=bool(loops)
         ),
     )
     results = identification_results(task, identified, started)

@@ -11,7 +11,12 @@ from inputdesign_cli.identification.explore.fits import (
     fits as fits,
     output_error_form as output_error_form,
 )
-from inputdesign_cli.identification.explore.inputs import order_of_excitation as order_of_excitation
+from inputdesign_cli.identification.explore.helping import unhelpful as unhelpful
+from inputdesign_cli.identification.explore.inputs import (
+    left_of_inputs as left_of_inputs,
+    order_of_excitation as order_of_excitation,
+)
+from inputdesign_cli.identification.explore.interpolated import interpolated_outputs as interpolated_outputs
 from inputdesign_cli.identification.explore.joint import Found as Found
 from inputdesign_cli.identification.explore.laws import (
     answers_between_moves as answers_between_moves,

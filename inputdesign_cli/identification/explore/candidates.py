@@ -62,6 +62,12 @@ class Candidate:
         return self.model.theta
 
     @property
+    def starts(self) -> Array:
+        """(n, k): its parameters, and the same with other dead times that they leave possible."""
+        orders = self.orders
+        return orders.beside(self.theta, self.ranges) if orders.physical is True else self.theta[None]
+
+    @property
     def settled(self) -> bool:
         """Whether the search ended, as far as a quick one tells: kinks at dead times stop it early."""
         return self.converged or self.orders.physical

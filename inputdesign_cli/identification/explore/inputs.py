@@ -9,6 +9,8 @@ import numpy as np
 from inputdesign_cli.plant.polynomial import Array
 
 _FAINT = 1e-9
+# The past of another input that an input may follow, and samples to a regressor, at least.
+_PAST, _PER_LAG = 20, 10
 
 
 def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) -> int:
@@ -35,6 +37,23 @@ def _independent(x: Array, delays: int) -> bool:
     gram = columns.T @ columns
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] > _FAINT * delays)
+
+
+def left_of_inputs(parts: Sequence[tuple[Array, Array]]) -> list[float]:
+    """Of the power of each input of u (n, r) the share that the other inputs and their pasts leave."""
+    inputs, samples = parts[0][0].shape[1], sum(len(u) for u, _ in parts)
+    lags = min(_PAST, samples // (_PER_LAG * inputs))
+    long = [u - u.mean(axis=0) for u, _ in parts if len(u) > 3 * lags]
+    if inputs < 2 or lags < 1 or not long:
+        return [1.0] * inputs
+    found = []
+    for j in range(inputs):
+        others = [np.delete(u, j, axis=1) for u in long]
+        rows = [np.column_stack([other[lags:], past(other, lags)]) for other in others]
+        own = [u[lags:, j] for u in long]
+        left = sum(float(e @ e) for e in untold(rows, own))
+        found.append(left / max(sum(float(x @ x) for x in own), 1e-300))
+    return found
 
 
 def past(signal: Array, lags: int) -> Array:

@@ -187,7 +187,8 @@ def _estimated(
                 begun = tuple(_alone(own, used, i, feedback, ramp) for i, own in enumerate(taken))
             structure = joined(begun, inputs, range(inputs))
             near = len(taken) > 1 or _near(taken[0], inputs)
-            estimate = _identified(structure, used, feedback, near=near, ramp=ramp)
+            start = taken[0].starts if near and len(taken) == 1 else structure.theta
+            estimate = _identified(structure, used, feedback, start, near=near, ramp=ramp)
         except SpecError as error:
             reason = error
             continue
@@ -212,7 +213,8 @@ def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool, ramp:
     """The structure of one output, estimated from the whole record without the others."""
     own = [(u, y[:, output : output + 1]) for u, y in used]
     near = _near(candidate, used[0][0].shape[1])
-    estimate = _identified(candidate.model, own, feedback, near=near, ramp=ramp)
+    start = candidate.starts if near else candidate.theta
+    estimate = _identified(candidate.model, own, feedback, start, near=near, ramp=ramp)
     return replace(candidate, model=candidate.model.at(estimate.theta, estimate.noise))
 
 
@@ -225,13 +227,15 @@ def _near(candidate: Candidate, inputs: int) -> bool:
     return candidate.orders.physical and inputs == 1
 
 
-def _identified(structure: Model, used: Parts, feedback: bool, *, near: bool, ramp: bool) -> Estimate:
+def _identified(
+    structure: Model, used: Parts, feedback: bool, start: Array, *, near: bool, ramp: bool
+) -> Estimate:
     u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
     return identify(
         structure,
         u,
         y,
-        start=structure.theta,
+        start=start,
         feedback=feedback,
         lengths=[len(part) for _, part in used],
         rest=False,

@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
+from inputdesign_cli.identification.explore.held import of_moves
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
 from inputdesign_cli.identification.explore.laws import (
     TOGETHER,
@@ -22,13 +23,14 @@ from inputdesign_cli.identification.explore.laws import (
     correlation_at_once,
     repeats_apart,
 )
+from inputdesign_cli.identification.explore.relays import told_by_levels
 from inputdesign_cli.identification.explore.switched import switched_by
 from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
 _CERTAIN = 1e-4
-# Four tests share the level.
-_TESTS = 4
+# Five tests share the level.
+_TESTS = 5
 # A jump is beyond so many robust standard deviations; an input of which its past leaves less than this share
 # between its jumps does not move there.
 _JUMP, _HELD = 4.0, 1e-6
@@ -53,16 +55,30 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
     innovations of the outputs as well ([ljung-1999], Section 13.4), with its jumps and without them. Not
     outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
     would help to predict one that is held. A third test is that of an answer at once, see `_at_once`, a
-    fourth that of a relay, see `switched_by`. An input that follows the outputs exactly between moves of a
-    reference tells nothing new of itself, and is seen by that, see `answers_between_moves`. One that repeats
-    while the outputs do not is never one: what a nonlinear plant adds at every period looks new in an output,
-    and goes together with what is left of the input, see `repeats_apart`.
+    fourth and a fifth those of a relay, see `switched_by` and `told_by_levels`. An input that follows the
+    outputs exactly between moves of a reference tells nothing new of itself, and is seen by that, see
+    `answers_between_moves`. One that repeats while the outputs do not is never one: what a nonlinear plant
+    adds at every period looks new in an output, and goes together with what is left of the input, see
+    `repeats_apart`. Where inputs move at every k-th sample only, records of these samples are looked at, see
+    `of_moves`: a regression takes the samples between for ones at which the input might have moved.
 
     Args:
         parts: records u (n, r), y (n, p).
         innovations: of the outputs of every part, (n, p), where a model tells them; else those of a
             regression on past inputs and outputs.
     """
+    looks = of_moves(parts)
+    if not looks:
+        return _answers(parts, innovations)
+    found = dict[int, float]()
+    for j, probability in [answer for look in looks for answer in _answers(look, None)]:
+        if len(looks) * probability < _CERTAIN and not repeats_apart(parts, j):
+            found[j] = min(found.get(j, 1.0), len(looks) * probability)
+    return sorted(found.items())
+
+
+def _answers(parts: Parts, innovations: Sequence[Array] | None) -> list[tuple[int, float]]:
+    """Of records as they are, see `answers_output`."""
     lags = _lags(parts, parts[0][1].shape[1])
     long = [len(y) > 3 * lags for _, y in parts]
     centred = [
@@ -84,7 +100,10 @@ def answers_output(parts: Parts, innovations: Sequence[Array] | None = None) -> 
         if repeats_apart(parts, j):
             continue
         probability = min(
-            _foretold(own, more, target), *_between_jumps(brief, lags, j), switched_by(brief, j)
+            _foretold(own, more, target),
+            *_between_jumps(brief, lags, j),
+            switched_by(brief, j),
+            told_by_levels(brief, j),
         )
         if _TESTS * probability < _CERTAIN:
             found.append((j, _TESTS * probability))

@@ -43,6 +43,8 @@ _ZERO = 0.5
 _LEAST = 0.05
 # A dead time this near below a whole number of samples is that number.
 _ROUNDED = 0.01
+# Samples to each side of a dead time in which another minimum may be.
+_ASIDE = 2
 # Below this damping a pair of poles rings; of longest records so many make what is slow a line.
 _RINGING, _LONGER = 0.7, 10.0
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
@@ -113,7 +115,7 @@ class Process:
         return tuple(zip(low, high, strict=True))
 
     def beyond(self, theta: Array, longest: int) -> list[tuple[str, float]]:
-        """Letters and values, of parameters (k,), of poles that a record of so many samples cannot show.
+        """Names and values, of parameters (k,), of poles that a record of so many samples cannot show.
 
         A resonance beyond the Nyquist frequency is one that sampling has folded, and what is as slow as many
         records is a line in each of them.
@@ -122,9 +124,30 @@ class Process:
         for own in theta[: width * len(self.delays)].reshape(-1, width):
             named = dict(zip(self.letters, own.tolist(), strict=True))
             fast = named["T"] * np.pi < self.step and named.get("zeta", 1.0) < _RINGING
-            slow = max(named["T"], named.get("T3", 0.0)) > _LONGER * longest * self.step
-            found += [("T", named["T"])] * (fast or slow)
+            damped = max(named.get("zeta", 1.0), 1.0)
+            slowest = named["T"] * (damped + np.sqrt(damped**2 - 1.0))
+            slow = max(slowest, named.get("T3", 0.0)) > _LONGER * longest * self.step
+            found += [("the slower time constant" if slow else "T", slowest)] * bool(fast or slow)
         return found
+
+    def beside(self, theta: Array, ranges: Sequence[tuple[int, int]]) -> Array:
+        """(n, k): parameters, and the same with one dead time in the midst of another sample of its range.
+
+        A dead time that passes a sampling instant makes a kink of the likelihood, which may have a minimum in
+        every sample. At most two samples to each side are looked at.
+
+        Args:
+            theta: (k,).
+            ranges: see `ranges`.
+        """
+        width, found = len(self.letters), [theta]
+        for j, (delay, (low, high)) in enumerate(zip(self.delays, ranges, strict=True)):
+            for lag in range(max(low, delay - _ASIDE), min(high, delay + _ASIDE) + 1):
+                if lag != delay:
+                    moved = theta.copy()
+                    moved[width * (j + 1) - 1] = (lag - 0.5) * self.step
+                    found.append(moved)
+        return np.array(found)
 
     def _late(self, theta: Array) -> Array:
         """(r,): the dead times."""

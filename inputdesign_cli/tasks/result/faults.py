@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification import Estimate, frozen, shifted, spikes
+from inputdesign_cli.identification import Estimate, Frozen, frozen, shifted, spikes
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import Data
 
 _SHOWN = 5
+# Of so many samples in a hundred a sensor that stands still biases a model; spikes where it explains less.
+_BIASING, _HALF = 0.02, 50.0
 
 
 def faults(units: Units, estimate: Estimate, data: Data) -> list[str]:
@@ -19,26 +21,64 @@ def faults(units: Units, estimate: Estimate, data: Data) -> list[str]:
     return [*_spikes(units, estimate, data), *_frozen(units, estimate, data)]
 
 
-def _frozen(units: Units, estimate: Estimate, data: Data) -> list[str]:
-    """A sentence for every output that stands still while an input moves."""
+def biasing(units: Units, estimate: Estimate, data: Data, fitted: Sequence[float]) -> list[str]:
+    """A sentence for every output whose faults of measurement make its model another than the plant's.
+
+    Args:
+        fitted: (p,), per cent of each output that the simulation explains.
+    """
+    told = []
+    for output, runs in _still(estimate, data).items():
+        share = sum(one.length for one in runs) / len(data.y)
+        if share >= _BIASING:
+            told.append(
+                f"{_named(units, output)} stands still at {100.0 * share:.2g} % of the samples while the "
+                "input moves: a model of what a sensor does not follow has another gain, and other dynamics, "
+                "than the plant; empty these cells, which cuts the record there, and try again"
+            )
+    told += [
+        f"a few samples hold {100.0 * one.share:.3g} % of the squares of the residuals of "
+        f"{_named(units, one.output)}, and the simulation explains {fitted[one.output]:.1f} % of it: spikes, "
+        "or events that the model does not know, decide what it is; empty the cells that are faults of "
+        "measurement, and try again"
+        for one in spikes(estimate.errors)
+        if fitted[one.output] < _HALF
+    ]
+    return told
+
+
+def _named(units: Units, output: int) -> str:
+    return f"y{output + 1}" if units.outputs > 1 else "y"
+
+
+def _still(estimate: Estimate, data: Data) -> dict[int, list[Frozen]]:
+    """The stretches in which outputs stand still while an input moves."""
     if data.recorded is None:
-        return []
+        return {}
     known, simulated = data.recorded, estimate.simulated
     found = frozen(
         known.held, known.resolution, data.u, estimate.errors, data.y - simulated, simulated, data.lengths
     )
+    return {
+        output: [one for one in found if one.output == output]
+        for output in sorted({one.output for one in found})
+    }
+
+
+def _frozen(units: Units, estimate: Estimate, data: Data) -> list[str]:
+    """A sentence for every output that stands still while an input moves."""
     told = []
-    for output in sorted({one.output for one in found}):
-        runs = [one for one in found if one.output == output]
+    for output, runs in _still(estimate, data).items():
         places = [
             f"rows {first} to {last}{_file(data, one.first)}"
             for one in runs[:_SHOWN]
-            for first, last in [known.rows[[one.first, one.first + one.length - 1]]]
+            if data.recorded is not None
+            for first, last in [data.recorded.rows[[one.first, one.first + one.length - 1]]]
         ]
-        name = f"y{output + 1}" if units.outputs > 1 else "y"
         told.append(
-            f"{name} stands still while the input moves, for {sum(one.length for one in runs)} of "
-            f"{len(data.y)} samples ({', '.join(places)}{', ..' * (len(runs) > _SHOWN)}), and rounding does "
+            f"{_named(units, output)} stands still while the input moves, for "
+            f"{sum(one.length for one in runs)} of {len(data.y)} samples ({', '.join(places)}"
+            f"{', ..' * (len(runs) > _SHOWN)}), and rounding does "
             "not explain it: the sensor is frozen or saturated, or the logger repeats its last value; empty "
             "these cells, which cuts the record there, and try again"
         )
@@ -81,7 +121,7 @@ def _spikes(units: Units, estimate: Estimate, data: Data) -> list[str]:
     """A sentence for every output in whose residuals a few samples hold most of the sum of squares."""
     told = []
     for one in spikes(estimate.errors):
-        many, output = len(one.samples), f"y{one.output + 1}" if units.outputs > 1 else "y"
+        many, output = len(one.samples), _named(units, one.output)
         told.append(
             f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
             f"{100 * one.share:.3g} % of the squares of its residuals (at "

@@ -7,7 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.explore import Found, by_chance, only_answers, unstable_pole
+from inputdesign_cli.identification.explore import (
+    Found,
+    by_chance,
+    interpolated_outputs,
+    only_answers,
+    unhelpful,
+    unstable_pole,
+)
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.at_once import like_inverses
 from inputdesign_cli.tasks.result.integrating import CONTROLLER, clock_of, like_integrators
@@ -46,8 +53,9 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
     return (
         *_unjudged(found),
         *_reasons(found),
-        *_idle(found),
+        *(_idle(found) or _unrelated(found)),
         *_refuted(found),
+        *_interpolated(log),
         *rising,
         *unseen,
         *rivalled(found),
@@ -104,6 +112,26 @@ def _idle(found: Found) -> tuple[str, ...]:
     return tuple(told)
 
 
+def _unrelated(found: Found) -> tuple[str, ...]:
+    """Outputs whose own past foretells them as well without the inputs."""
+    return tuple(
+        f"nothing that the inputs do helps to predict {signal_name('y', i, found.model.outputs)} beyond its "
+        "own past: two signals that wander, drift, or follow one cycle (as of days) agree for long without "
+        "one moving the other; move the inputs by steps of your own, at times that nothing else follows"
+        for i in unhelpful(found.model, found.used)
+    )
+
+
+def _interpolated(log: Log) -> tuple[str, ...]:
+    """Outputs that a historian has drawn between the values that it keeps."""
+    return tuple(
+        f"{signal_name('y', i, log.y.shape[1])} is a straight line between some of its samples: it was "
+        "measured at these only, and a line knows where the next one will be, so that delay and dynamics are "
+        "not those of the plant; export the values as they were stored, and give that sample time"
+        for i in interpolated_outputs(log.parts)
+    )
+
+
 def _refuted(found: Found) -> tuple[str, ...]:
     """Outputs of which a model explains less than half, where every kind of test refutes it as well.
 
@@ -127,6 +155,7 @@ def _refuted(found: Found) -> tuple[str, ...]:
 def _unstable(log: Log) -> tuple[str, ...]:
     """Outputs of a plant that is unstable, and goes on only as it is in a loop."""
     outputs, told = log.y.shape[1], []
+    clock = clock_of(log.step, log.time_unit)
     for i in range(outputs):
         pole = unstable_pole(log.parts, i)
         if pole is None:
@@ -136,7 +165,7 @@ def _unstable(log: Log) -> tuple[str, ...]:
         told.append(
             f"the plant of {signal_name('y', i, outputs)} is unstable: it has a pole at a radius of "
             f"{pole.radius:.4g} +- {pole.deviation:.1g}, and only stable ones are looked for here. Identify "
-            f"it with its loop: idesign identify DATA --spec SPEC, in SPEC {clock_of(log.step, log.time_unit)}, "
+            f"it with its loop: idesign identify DATA --spec SPEC, in SPEC {clock}, "
             f"plant: {{A: [{A}], B: [{B}]}}, noise: {{C: [1, -0.1], variance: 1}}, and {CONTROLLER}; "
             "raise the orders where tests fail"
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Found, one_line, order_of_excitation
+from inputdesign_cli.identification.explore import Found, left_of_inputs, one_line, order_of_excitation
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.plant.polynomial import Array
 
@@ -15,6 +15,8 @@ _NO_DIGIT, _NOT_AT_ALL = 1.0, 100.0
 _AS_LIKELY, _ELSEWHERE = 2.0 * float(np.log(20.0)), 0.1
 _FREQUENCIES = 100
 _OF_A_LINE = 2  # numbers that one frequency tells
+# What others leave of an input, in shares of its power, where minima that exchange their effects are many.
+_FOLLOWS = 0.02
 
 
 def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[str, ...]:
@@ -42,6 +44,14 @@ def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[s
             f"tells {order} numbers of the plant, and other models explain this record as well; apply an "
             "input that moves more (idesign signal makes some)"
         )
+    for j, left in zip(found.moving, left_of_inputs(moving), strict=True):
+        if left < _FOLLOWS:
+            told.append(
+                f"u{j + 1} follows from the other inputs and their pasts but for {100.0 * left:.2g} % of its "
+                "power: other models, in which the inputs exchange what they do, explain this record about "
+                "as well; move them one by one, or independently"
+            )
+            break
     share = one_line(moving) if len(found.moving) == 1 and order >= needed > _OF_A_LINE else None
     if share is not None:
         told.append(
