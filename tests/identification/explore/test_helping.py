@@ -47,7 +47,7 @@ def daily(rng):
 def test_signals_that_agree_by_chance_help_nothing(make, least):
     """Of 20 pairs one may help at the level of the test; a model that is scaled to them simulates a part.
 
-    Within a cycle the rest of the input tells, which a model may say to move the output by less than its noise.
+    Within a cycle the rest of the input tells, which may be said to move the output by less than its noise.
     """
     told = 0
     for seed in range(RECORDS):
