@@ -13,8 +13,10 @@ from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import cross_correlations, frequency_response, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.explore import Fits, Found, answers_output, explore_records, fits
+from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.plant import Model
-from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.curves import ResponseCurves
+from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
@@ -33,7 +35,7 @@ from inputdesign_cli.tasks.result.exploration import (
 from inputdesign_cli.tasks.result.faults import biasing
 from inputdesign_cli.tasks.result.no_trust import DRIVE, HALF, LEAST_FIT, distrusted, undriven_inputs
 from inputdesign_cli.tasks.result.refutations import chance, refutations
-from inputdesign_cli.tasks.result.responses import response_note, response_of_data
+from inputdesign_cli.tasks.result.responses import contradicted, response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
 
 # Past inputs explain what a judged model leaves: by chance alone, so seldom.
@@ -74,8 +76,12 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     lengths = tuple(len(part) for _, part in found.used)
     times = np.concatenate([log.step * np.arange(length) for length in lengths])
     data = Data(u, y, None, times, lengths, (), (), recorded=log.recorded.at(found.samples))
-    fitted = found.validation.simulation
-    reasons = (*doubts, *biasing(task.header.units, found.estimate, data, fitted))
+    response = _without_model(task.header.units, log, found, loop=bool(loops))
+    reasons = (
+        *doubts,
+        *biasing(task.header.units, found.estimate, data, found.validation.simulation),
+        *(() if response is None else contradicted(response.told)),
+    )
     heard = exploration_notes(log, found, loops)
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
@@ -95,13 +101,39 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         results, result=result, resolved_spec=text, curves={**results.curves, **structure_curves(found)}
     )
     against = tuple(refutations(found.model, found.estimate))
-    return Exploration(
-        _without_model(complete, task.header.units, log, found, loop=bool(loops)), reasons, against
-    )
+    return Exploration(complete if response is None else response.beside(complete), reasons, against)
 
 
-def _without_model(explored: Results, units: Units, log: Log, found: Found, *, loop: bool) -> Results:
-    """The results with the frequency response of the data alone beside the model, where it can be had.
+@dataclass(frozen=True)
+class _Response:
+    """The frequency response of the data alone, and what silent lines tell."""
+
+    table: Table
+    curves: ResponseCurves
+    told: dict[str, Json]
+    silent: dict[str, SilentLines]
+
+    def beside(self, explored: Results) -> Results:
+        """The results with it."""
+        result = explored.result
+        return replace(
+            explored,
+            result={
+                **result,
+                "exploration": {
+                    **result["exploration"],
+                    "frequency_response": self.told,
+                    **({"nonlinearity": silent_entry(self.silent)} if self.silent else {}),
+                },
+                "notes": [*result.get("notes", []), *response_note(self.told), *silent_notes(self.silent)],
+            },
+            tables={**explored.tables, "frequency_response": self.table},
+            curves={**explored.curves, "frequency_response": self.curves},
+        )
+
+
+def _without_model(units: Units, log: Log, found: Found, *, loop: bool) -> _Response | None:
+    """The frequency response of the data alone, where it can be had.
 
     Args:
         loop: whether inputs answer the outputs.
@@ -109,26 +141,10 @@ def _without_model(explored: Results, units: Units, log: Log, found: Found, *, l
     moving = log.u[:, found.moving]
     response = frequency_response(moving, log.y, lengths=log.lengths)
     if response is None:
-        return explored
+        return None
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
-    table, curves, told = response_of_data(
-        units, found.model, response, by_reference=False, inputs=found.moving, loop=loop
-    )
-    result = explored.result
-    return replace(
-        explored,
-        result={
-            **result,
-            "exploration": {
-                **result["exploration"],
-                "frequency_response": told,
-                **({"nonlinearity": silent_entry(silent)} if silent else {}),
-            },
-            "notes": [*result.get("notes", []), *response_note(told), *silent_notes(silent)],
-        },
-        tables={**explored.tables, "frequency_response": table},
-        curves={**explored.curves, "frequency_response": curves},
-    )
+    made = response_of_data(units, found.model, response, by_reference=False, inputs=found.moving, loop=loop)
+    return _Response(*made, silent)
 
 
 def _asked(task: Identification, identified: Identified) -> Identified:

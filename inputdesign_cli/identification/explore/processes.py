@@ -45,8 +45,10 @@ _LEAST = 0.05
 _ROUNDED = 0.01
 # Samples to each side of a dead time in which another minimum may be.
 _ASIDE = 2
-# Below this damping a pair of poles rings; of longest records so many make what is slow a line.
-_RINGING, _LONGER = 0.7, 10.0
+# Below this damping a pair of poles rings.
+_RINGING = 0.7
+LONGER = 10.0
+"""What lasts so many longest records is a line in each."""
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
 _LONGEST = 1e6
 
@@ -115,20 +117,31 @@ class Process:
         return tuple(zip(low, high, strict=True))
 
     def beyond(self, theta: Array, longest: int) -> list[tuple[str, float]]:
-        """Names and values, of parameters (k,), of poles that a record of so many samples cannot show.
+        """Letters and values, of parameters (k,), of poles that a record of so many samples cannot show.
 
         A resonance beyond the Nyquist frequency is one that sampling has folded, and what is as slow as many
         records is a line in each of them.
         """
-        width, found = len(self.letters), list[tuple[str, float]]()
-        for own in theta[: width * len(self.delays)].reshape(-1, width):
-            named = dict(zip(self.letters, own.tolist(), strict=True))
+        found = list[tuple[str, float]]()
+        for named in self._by_input(theta):
             fast = named["T"] * np.pi < self.step and named.get("zeta", 1.0) < _RINGING
-            damped = max(named.get("zeta", 1.0), 1.0)
-            slowest = named["T"] * (damped + np.sqrt(damped**2 - 1.0))
-            slow = max(slowest, named.get("T3", 0.0)) > _LONGER * longest * self.step
-            found += [("the slower time constant" if slow else "T", slowest)] * bool(fast or slow)
+            slow = max(named["T"], named.get("T3", 0.0)) > LONGER * longest * self.step
+            found += [("T", named["T"])] * (fast or slow)
         return found
+
+    def slowest(self, theta: Array) -> float:
+        """The longest time constant, also where zeta is beyond one, of parameters (k,)."""
+        found = []
+        for named in self._by_input(theta):
+            damped = max(named.get("zeta", 1.0), 1.0)
+            found += [named["T"] * (damped + np.sqrt(damped**2 - 1.0)), named.get("T3", 0.0)]
+        return float(max(found))
+
+    def _by_input(self, theta: Array) -> list[dict[str, float]]:
+        """The parameters (k,) of every input by their letters."""
+        width = len(self.letters)
+        rows = theta[: width * len(self.delays)].reshape(-1, width).tolist()
+        return [dict(zip(self.letters, row, strict=True)) for row in rows]
 
     def beside(self, theta: Array, ranges: Sequence[tuple[int, int]]) -> Array:
         """(n, k): parameters, and the same with one dead time in the midst of another sample of its range.

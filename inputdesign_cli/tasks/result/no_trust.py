@@ -49,7 +49,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
     moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
     rising = like_integrators(found, log.step, log.time_unit, loop=loop)
     inverses = () if loop else like_inverses(found, moving)
-    unseen = unidentified(found, moving, log.step, log.time_unit)
+    unseen = unidentified(found, moving, log.step, log.time_unit, integrates=bool(rising))
     return (
         *_unjudged(found),
         *_reasons(found),

@@ -17,6 +17,8 @@ _BY_U = (
     "the frequency response without a model is from u to y in a loop: where the noise is strong it is drawn "
     "towards -1/C; record the reference as column r, and it is estimated from r"
 )
+# Beyond a disc by more than this share of G, and at how many of the frequencies no model is right any more.
+_FAR, _MOST_FAR = 0.2, 0.1
 
 
 def response_of_data(
@@ -39,7 +41,7 @@ def response_of_data(
     w = found.frequency / units.sample_time
     G = model.plant_at(w * units.frequency)
     columns: dict[str, Array] = {units.frequency_header: w}
-    panels, outside = [], list[NDArray[np.bool_]]()
+    panels, outside, far = [], list[NDArray[np.bool_]](), list[NDArray[np.bool_]]()
     for i in range(units.outputs):
         for k, j in enumerate(range(units.inputs) if inputs is None else inputs):
             own, radius, modelled = found.G[:, i, k], found.radius[:, i, k], G[:, i, j]
@@ -48,7 +50,9 @@ def response_of_data(
             columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
             entry = None if units.single else (i, j)
             panels.append(ResponsePanel(w, own, radius, modelled, entry, units.passage((i, j))))
-            outside.append(np.abs(own - modelled) > radius)
+            apart, size = np.abs(own - modelled), np.maximum(np.abs(own), np.abs(modelled))
+            outside.append(apart > radius)
+            far.append(apart > radius + _FAR * size)
         number = "" if units.single else f"_{i + 1}"
         columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}
     told: dict[str, Json] = {
@@ -57,10 +61,23 @@ def response_of_data(
         "frequencies": int(w.size),
         "entries": len(panels),
         "model_outside": float(np.mean(outside)),
+        "model_far_outside": float(np.mean(far)),
     }
     if (units.closed_loop or loop) and not by_reference:
         told["caveat"] = _BY_U
     return Table(columns), ResponseCurves(tuple(panels)), told
+
+
+def contradicted(told: dict[str, Json]) -> tuple[str, ...]:
+    """That the data alone say otherwise of G than a model does, where both are of one plant: in open loop."""
+    if "caveat" in told or told["model_far_outside"] < _MOST_FAR:
+        return ()
+    return (
+        "what the data say of G without a model contradicts it: the model is farther off than the discs of "
+        f"95 %, and by a fifth of |G| besides, at {100 * told['model_far_outside']:.0f} % of the frequencies "
+        "(frequency_response.png): the data may come from a loop that was not seen, the plant may not be "
+        "linear, or something else moves it along with the inputs",
+    )
 
 
 def response_note(told: dict[str, Json]) -> list[str]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from inputdesign_cli.identification.explore import Found, left_of_inputs, one_line, order_of_excitation
 from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.explore.processes import LONGER
 from inputdesign_cli.plant.polynomial import Array
 
 # A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
@@ -19,12 +20,15 @@ _OF_A_LINE = 2  # numbers that one frequency tells
 _FOLLOWS = 0.02
 
 
-def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[str, ...]:
+def unidentified(
+    found: Found, moving: Parts, step: float, unit: str, *, integrates: bool = False
+) -> tuple[str, ...]:
     """A sentence for every reason why the parameters of the model are not those of the plant alone.
 
     Args:
         moving: records of the inputs that move.
         step, unit: the sample time.
+        integrates: whether it is told already that the plant is like an integrator.
     """
     needed = max(candidate.orders.unknowns for candidate in found.taken)
     order, told = order_of_excitation(moving), []
@@ -68,7 +72,10 @@ def unidentified(found: Found, moving: Parts, step: float, unit: str) -> tuple[s
         )
     longest = max(len(y) for _, y in found.used)
     for candidate, theta in zip(found.taken, _by_output(found), strict=True):
-        for letter, value in candidate.orders.beyond(theta, longest):
+        orders = candidate.orders
+        slow = orders.slowest(theta) if orders.physical is True and not integrates else 0.0
+        late = [("the longest time constant", slow)] if slow > LONGER * longest * step else []
+        for letter, value in orders.beyond(theta, longest) or late:
             told.append(
                 f"{letter} = {value:.3g} {unit} is not told by {longest} samples every {step:g} {unit}: a "
                 "resonance beyond the Nyquist frequency is folded to another, and what is as slow as many "
