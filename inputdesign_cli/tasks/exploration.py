@@ -68,8 +68,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
             if not undriven:
                 raise
             raise bad_spec("no-structure", undriven[0], hint=DRIVE, key="u") from error
-    doubts = distrusted(log, found, undriven, loop=bool(loops))
-    log = without_drift(log, found)
+    measured, log = log, without_drift(log, found)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
@@ -77,11 +76,11 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     times = np.concatenate([log.step * np.arange(length) for length in lengths])
     data = Data(u, y, None, times, lengths, (), (), recorded=log.recorded.at(found.samples))
     response = _without_model(task.header.units, log, found, loop=bool(loops))
-    reasons = (
-        *doubts,
+    doubts = (
         *biasing(task.header.units, found.estimate, data, found.validation.simulation),
         *(() if response is None else contradicted(response.told)),
     )
+    reasons = distrusted(measured, found, undriven, doubts, loop=bool(loops))
     heard = exploration_notes(log, found, loops)
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(

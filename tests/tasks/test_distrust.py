@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.identification.explore import explore_structure
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks import explore, identify
+from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.tasks.result.responses import contradicted, response_of_data
 from tests.support.loops import LAWS, loop
 
 
@@ -97,6 +101,31 @@ def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
     said = [*found.results.result["notes"], *found.reasons]
     assert any(told.startswith("no effect of u2 on the outputs") for told in said)
     assert not any(told.startswith("no effect of u1") for told in said)
+
+
+def test_a_clipped_output_earns_no_trust_and_emptied_cells_bring_its_gain_back(tmp_path):
+    """A lag of ten samples, gain one, cut at 0.5: a third of the gain is lost, and comes back."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], 30), 15)
+    y = np.minimum(scipy.signal.lfilter([0, 0, 0.1], [1, -0.9], u) + 0.02 * rng.standard_normal(450), 0.5)
+    assert any("stands still at" in reason for reason in explore(stored(tmp_path / "a.csv", u, y)).reasons)
+    found = explore(stored(tmp_path / "b.csv", u, np.where(y < 0.5, y, np.nan)))
+    assert not any("stands still" in reason for reason in found.reasons)
+    assert found.results.result["identification"]["theta"]["K"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_model_far_from_what_the_data_say_without_one_earns_no_trust():
+    """Of a lag with a gain of one: half of it more is too far, a tenth more is not."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 500), 4)[:, None]
+    y = scipy.signal.lfilter([0, 0.3], [1, -0.7], u, axis=0) + 1e-3 * rng.standard_normal(u.shape)
+    measured = frequency_response(u, y)
+    units = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+    for gain, closed, far in ((1.0, False, 0), (1.1, False, 0), (1.5, False, 1), (1.5, True, 0)):
+        text = f"plant: {{B: [0, {0.3 * gain}], F: [1, -0.7]}}\nnoise: {{variance: 1e-6}}\n"
+        model = build_model(parse_spec(text, design=False))
+        told = response_of_data(units, model, measured, by_reference=False, loop=closed)[2]
+        assert len(contradicted(told)) == far
 
 
 @pytest.mark.parametrize(("delay", "held", "samples"), [(150, 4, 500), (120, 20, 600)])

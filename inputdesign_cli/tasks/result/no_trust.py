@@ -35,11 +35,14 @@ _UNSTEADY = (
 _KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
-def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -> tuple[str, ...]:
+def distrusted(
+    log: Log, found: Found, undriven: Sequence[str], doubts: Sequence[str], *, loop: bool
+) -> tuple[str, ...]:
     """A sentence for every reason; none where a model deserves trust.
 
     Args:
         undriven: see `undriven_inputs`.
+        doubts: what else speaks against it.
         loop: whether inputs answer the outputs.
     """
     # Without excitation any pole explains the record.
@@ -63,6 +66,7 @@ def distrusted(log: Log, found: Found, undriven: Sequence[str], *, loop: bool) -
         *(f"{told}: {DRIVE}" for told in undriven),
         *(() if loop else late_inputs(log.parts)),
         *(f"{told}: {DRIVE}" for told in inverses),
+        *doubts,
     )
 
 
