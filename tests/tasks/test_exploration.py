@@ -221,8 +221,9 @@ def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
     path.write_text("\n".join(lines))
     found = explore(path).results.result["notes"]
     assert not any("stands still" in note for note in good)
-    (told,) = [note for note in found if "stands still" in note]
+    reason, told = [note for note in found if "stands still" in note]
     assert "rows 201 to 250" in told
+    assert reason.startswith("no trust: y stands still at ")
 
 
 def test_many_spikes_are_told(tmp_path):
@@ -241,10 +242,10 @@ def test_many_spikes_are_told(tmp_path):
 
 @pytest.mark.slow
 def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
-    """Of two inputs the second steps once only: plants in s with more than one pole cannot be told."""
+    """Of two inputs the second steps once only, at the end: plants in s with three poles cannot be told."""
     rng = np.random.default_rng(0)
     n = np.arange(200)
-    u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 40), 5), (n >= 95).astype(float)])
+    u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 40), 5), (n >= 195).astype(float)])
     y = scipy.signal.lfilter([0, 0.2], [1, -0.8], u[:, 0]) + scipy.signal.lfilter(
         [0, 0.3], [1, -0.6], u[:, 1]
     )
@@ -259,6 +260,7 @@ def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
     assert bool(told) == bool(output["not_estimated"])
     assert {"FOPDT", "SOPDT", "TOPDT"} <= left | set(output["not_estimated"])
     assert "u2 changes in 1 of its samples only" in told[0]
+    assert any("an input moves in one stretch of the record only" in note for note in result["notes"])
 
 
 @pytest.mark.slow

@@ -75,7 +75,7 @@ def _unjudged(found: Found) -> tuple[str, ...]:
     if found.split != "none":
         return ()
     return (
-        "the inputs move in one stretch of the record only, which cannot both estimate a model and judge it: "
+        "an input moves in one stretch of the record only, which cannot both estimate a model and judge it: "
         "the model was chosen and judged by the data that it is estimated from. Judge it by another record "
         "(idesign explore OTHER --validate model.yaml), or let the inputs step up and down again, several "
         "times",
