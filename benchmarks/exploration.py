@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.identification.explore import fits
-from inputdesign_cli.identification.explore.joint import divided
+from inputdesign_cli.identification.explore.division import divided
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.specification import load_spec
 from inputdesign_cli.tasks import explore

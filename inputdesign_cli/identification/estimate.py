@@ -22,6 +22,7 @@ from inputdesign_cli.identification.residual_tests import ResidualTest, cross_co
 from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.white import Echoes
+from inputdesign_cli.information.coordinates import triangular_factor
 from inputdesign_cli.plant.polynomial import Array
 
 # Parameters this share apart are the same to rounding.
@@ -171,7 +172,7 @@ def concluded(
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
-        factor=factor,
+        factor=_over_minima(names, found, factor, noise),
         noise=noise,
         errors=point.errors,
         converged=found.converged,
@@ -215,6 +216,31 @@ def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Arr
         SpecError: `not-exciting`.
     """
     return factor_of_data(names, *_gradients(records, point, noise))
+
+
+def _over_minima(names: tuple[str, ...], found: Search, factor: Array, noise: Array) -> Array:
+    """The information where minima beyond sampling instants are about as likely: of their mixture.
+
+    Each has the weight of its likelihood times the square root of the determinant of its covariance
+    (Laplace's method, [tierney-kadane-1986]); the covariance is that of the mixture about the estimate.
+
+    Args:
+        factor: L (k, k) of the best minimum alone, its information L L^T.
+    """
+    weights, spreads = [1.0], [np.eye(len(factor))]
+    for point, excess in found.beside:
+        own = factor_at(names, found.records, point, noise)
+        # In units of the best minimum's own deviations.
+        half = scipy.linalg.solve_triangular(own, factor, lower=True)
+        away = factor.T @ (point.theta - found.point.theta)
+        spreads.append(half.T @ half + np.outer(away, away))
+        smaller = np.sum(np.log(np.abs(np.diag(factor)))) - np.sum(np.log(np.abs(np.diag(own))))
+        weights.append(float(np.exp(smaller - 0.5 * excess)))
+    if len(weights) == 1:
+        return factor
+    mixture = np.tensordot(weights, spreads, 1) / np.sum(weights)
+    rows = scipy.linalg.solve_triangular(np.linalg.cholesky(mixture), factor.T, lower=True)
+    return triangular_factor(rows)[0]
 
 
 def _gradients(records: Records, point: Point, noise: Array) -> tuple[Array, Array]:

@@ -133,8 +133,7 @@ def identify(
             its other numbers are not used.
         u, y: (samples, r), (samples, p).
         step: time between samples of a plant in continuous time.
-        start: (k,), tried besides starts that are made from the data; with `near` also (n, k), the likeliest
-            first.
+        start: (k,), tried besides starts that are made from the data.
         feedback: whether u(t) answers y(t), which the tests of the residuals heed.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; otherwise its start and its level are unknown and

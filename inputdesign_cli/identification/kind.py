@@ -114,7 +114,7 @@ def identify_records(
     Args:
         kind: of which names, orders and delays are those of the estimate; numbers are not used.
         u, y: (N, r), (N, p).
-        start: (k,), or (n, k) of which the first is the likeliest, tried besides starts made from the data.
+        start: (k,), tried besides starts that are made from the data.
         feedback: whether u(t) answers y(t), which the tests of the residuals heed.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
@@ -132,8 +132,6 @@ def identify_records(
     check_length(len(y), len(kind.names), kind.recent, outputs=kind.outputs)
     check_varying(kind.names, u, y)
     parts = split(u, y, lengths)
-    given = None if start is None else np.atleast_2d(start)
-    first = None if given is None else given[0]
 
     def records_of(signals: Sequence[Part]) -> Records:
         made = tuple(kind.record(*part) for part in signals)
@@ -141,10 +139,10 @@ def identify_records(
 
     def searched(records: Records, known: Array | None) -> Search:
         chosen = longest(parts)
-        if near and given is not None:
-            begin = Starts(given, np.zeros(len(given), dtype=np.int64), len(given))
+        if near and start is not None:
+            begin = Starts(start[None], np.zeros(1, dtype=np.int64), 1)
         else:
-            begin = kind.starts(centred(chosen) if records.free else chosen, first)
+            begin = kind.starts(centred(chosen) if records.free else chosen, start)
         others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
         points = np.concatenate([begin.points, *(theta[None] for theta in others)])
         steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
@@ -152,7 +150,7 @@ def identify_records(
         return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
 
     known_rest = False if ramp else rest
-    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), known_rest, searched, first)
+    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), known_rest, searched, start)
     simulated, stable = kind.simulated(best, y, lengths)
     moved = None if kind.continuous or not all(stable) else simulated
     return concluded(

@@ -80,6 +80,11 @@ class OverRecord:
         """Those of the other, whose parameters come first."""
         return self.record.dead_times
 
+    def crossings(self, theta: Array) -> Array:
+        """Those of the other."""
+        own = self.record.crossings(theta[: self.record.size])
+        return np.pad(own, ((0, 0), (0, 0), (0, theta.size - self.record.size)))
+
     def remembering(self, late: int) -> Self:
         """The same, with a record that does."""
         return replace(self, record=self.record.remembering(late))

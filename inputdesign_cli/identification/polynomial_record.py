@@ -71,6 +71,10 @@ class PolynomialRecord:
         """None: delays are whole samples, and known."""
         return np.zeros(0, dtype=np.int64)
 
+    def crossings(self, theta: Array) -> Array:
+        """None."""
+        return np.zeros((0, 2, self.size))
+
     def remembering(self, late: int) -> Self:
         """The same: the delay is known, and among what the filters remember."""
         return self

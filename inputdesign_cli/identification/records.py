@@ -57,6 +57,9 @@ class Record(Protocol):
     def dead_times(self) -> NDArray[np.int64]:
         """The parameters that move dead times: there the cost has kinks."""
 
+    def crossings(self, theta: Array) -> Array:
+        """(m, 2, k): steps of a dead time to sampling instants, kinks of the cost, and half a sample on."""
+
     def remembering(self, late: int) -> Self:
         """The same, with free responses of inputs before it that act for so many samples."""
 
@@ -163,6 +166,10 @@ class Records:
     def dead_times(self) -> NDArray[np.int64]:
         """See `Record`."""
         return self.parts[0].dead_times
+
+    def crossings(self, theta: Array) -> Array:
+        """See `Record`."""
+        return max((part.crossings(theta) for part in self.parts), key=len)
 
     @cached_property
     def u(self) -> Array:

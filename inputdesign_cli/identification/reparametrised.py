@@ -62,6 +62,15 @@ class ReparametrisedRecord(OverRecord):
         rows = self.parametrisation.jacobian[self.record.dead_times]
         return np.flatnonzero(np.any(rows != 0.0, axis=0))
 
+    def crossings(self, theta: Array) -> Array:
+        """The shortest steps of the parameters that move the dead times so."""
+        here, late = self.parametrisation.at(theta), self.record.dead_times
+        steps = self.record.crossings(here.coefficients)[:, :, late]
+        if not steps.size:
+            return np.zeros((0, 2, theta.size))
+        back = np.linalg.pinv(here.jacobian[late], rcond=1e-12)
+        return np.asarray(steps @ back.T)
+
     def lateness(self, theta: Array) -> int:
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)

@@ -16,8 +16,8 @@ from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant.polynomial import Array
 
-# Up to this much more in -2 log likelihood: a thousandth of the likelihood of the best.
-_NEARLY = 2.0 * float(np.log(1000.0))
+NEARLY = 2.0 * float(np.log(1000.0))
+"""What another minimum may have more in -2 log likelihood: a thousandth of the likelihood of the best."""
 # Another minimum: so far apart in squared standard deviations, and by what the slope of one does not explain.
 _APART, _UNEXPLAINED = 25.0, 4.0
 
@@ -39,13 +39,12 @@ def rivals(records: Records, point: Point, found: Minimum) -> tuple[Rival, ...]:
         cost = float(found.cost[run])
         if not np.isfinite(cost):
             break
-        excess = cost - point.cost if records.weights is not None else _log_excess(point, cost)
-        if excess > _NEARLY:
+        excess = excess_of(records, point, cost)
+        if excess > NEARLY:
             break
         theta = np.asarray(found.theta[run], dtype=float)
-        if all(
-            distance(records, point, theta - other.theta)
-            > max(_APART, _UNEXPLAINED * (excess - other.excess))
+        if not any(
+            is_near(records, point, point.theta + theta - other.theta, excess - other.excess)
             for other in (estimate, *best)
         ):
             best.append(Rival(theta, max(excess, 0.0)))
@@ -71,5 +70,13 @@ def distance(records: Records, point: Point, step: Array) -> float:
     return unit * float(step @ point.hessian @ step)
 
 
-def _log_excess(point: Point, cost: float) -> float:
+def is_near(records: Records, point: Point, theta: Array, excess: float) -> bool:
+    """Whether parameters (k,) are of the same minimum, or within five deviations of the one at a point."""
+    return distance(records, point, theta - point.theta) <= max(_APART, _UNEXPLAINED * excess)
+
+
+def excess_of(records: Records, point: Point, cost: float) -> float:
+    """What parameters of a `cost` have more in -2 log likelihood than those of a point."""
+    if records.weights is not None:
+        return cost - point.cost
     return point.near.freedom * float(np.log(cost / point.cost))

@@ -10,6 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.gauss_newton import MOST_STEPS, best_run, minimise
+from inputdesign_cli.identification.instants import beyond_instants, minima_beside
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.rivals import Rival, rivals
@@ -41,6 +42,7 @@ class Search:
     Attributes:
         first: (parts, p), the first residuals if each record began at rest about zero, noise as well.
         rivals: other minima that explain the records nearly as well.
+        beside: those beyond sampling instants, near ones too, with what they have more in -2 log likelihood.
         rest_refuted: whether the records say that they do not begin at rest about zero.
     """
 
@@ -51,6 +53,7 @@ class Search:
     starts: int
     first: Array
     rivals: tuple[Rival, ...]
+    beside: tuple[tuple[Point, float], ...]
     rest_refuted: bool = False
 
 
@@ -67,14 +70,18 @@ def search(
     """
     idle = _IDLE if quick else 0.0
     found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS, idle=idle)
+    if not quick:
+        found = beyond_instants(records, found)
+        before = np.append(np.broadcast_to(before, len(points)), np.zeros(len(found.cost) - len(points)))
     best = best_run(found)
-    steps = int(found.steps[best] + np.broadcast_to(before, len(points))[best])
+    steps = int(found.steps[best] + np.broadcast_to(before, len(found.cost))[best])
     point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])
     if not converged and not quick and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
     others = () if quick else rivals(records, point, found)
-    return Search(records, point, converged, steps, starts, _first(records, point.theta), others)
+    near = () if quick else minima_beside(records, point, found)
+    return Search(records, point, converged, steps, starts, _first(records, point.theta), others, near)
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:

@@ -16,7 +16,7 @@ from inputdesign_cli.identification.of_model import OfModel
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.start import Start, differences
-from inputdesign_cli.identification.transfer_record import late_samples
+from inputdesign_cli.identification.transfer_record import crossings_of, late_samples
 from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
@@ -128,6 +128,10 @@ class StateSpaceRecord:
     def dead_times(self) -> NDArray[np.int64]:
         """That of the structure, if it is free."""
         return np.flatnonzero([letter == DELAY for letter, _, _ in self.structure.entries])
+
+    def crossings(self, theta: Array) -> Array:
+        """Those of its dead time."""
+        return crossings_of(theta, self.dead_times, self.structure.at(theta).sample_time or 1.0, len(self.y))
 
     def remembering(self, late: int) -> Self:
         """The same, where unknown inputs act for so many samples."""

@@ -31,6 +31,23 @@ def late_samples(dead_time: float, sample_time: float) -> int:
     return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0
 
 
+def crossings_of(theta: Array, dead_times: NDArray[np.int64], step: float, samples: int) -> Array:
+    """(m, 2, k): steps that take a dead time to sampling instants beside it, and half a sample beyond.
+
+    Args:
+        theta: (k,), of which `dead_times` are the dead times.
+        step, samples: the sample time, and how many there are.
+    """
+    found = []
+    for index in dead_times:
+        begun = np.floor(theta[index] / step)
+        for instant, beyond in ((begun - 1, -0.5), (begun, -0.5), (begun + 1, 0.5), (begun + 2, 0.5)):
+            if 0.0 < instant < samples - 1:
+                there = (instant * step - theta[index], (instant + beyond) * step - theta[index])
+                found.append(np.outer(there, np.eye(theta.size)[index]))
+    return np.array(found).reshape(-1, 2, theta.size)
+
+
 @dataclass(frozen=True)
 class TransferRecord:
     """Samples u (N, r), y (N, p), and the `structure` that is to explain them by parameters theta (k,).
@@ -104,6 +121,11 @@ class TransferRecord:
     def dead_times(self) -> NDArray[np.int64]:
         """Where the dead times stand in theta."""
         return np.flatnonzero([parameter.letter == DELAY for parameter in self.structure.parameters])
+
+    def crossings(self, theta: Array) -> Array:
+        """Those of inputs that are held: others move no less between the instants."""
+        late = self.dead_times if self.intersample.hold else self.dead_times[:0]
+        return crossings_of(theta, late, self.intersample.sample_time, self.samples)
 
     def remembering(self, late: int) -> Self:
         """The same, where unknown inputs act for so many samples."""

@@ -85,7 +85,7 @@ def lags(u, plants, rng, noise=0.05):
 
 def test_inputs_between_which_what_they_do_may_be_exchanged_earn_no_trust(tmp_path):
     """The second input is half of the first but for little: another minimum is about as likely."""
-    rng = np.random.default_rng(8)
+    rng = np.random.default_rng(0)
     one = np.repeat(rng.choice([-1.0, 1.0], 40), 8)
     u = np.column_stack([one, 0.5 * one + 0.003 * rng.standard_normal(320)])
     y = lags(u, [(1.0, 8.0, 3), (2.0, 15.0, 1)], rng)

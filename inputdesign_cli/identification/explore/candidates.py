@@ -41,7 +41,7 @@ class Candidate:
         failed: tests of the residuals that refute it.
         steady: whether its plant is stable, as far as the record tells, and within what it shows.
         ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
-        feedback: whether the record is from a loop.
+        by_prediction: whether prediction errors rank it: in a loop, and where the noise integrates.
     """
 
     orders: Shape
@@ -54,18 +54,12 @@ class Candidate:
     converged: bool
     steady: bool
     ranges: tuple[tuple[int, int], ...]
-    feedback: bool
+    by_prediction: bool
 
     @property
     def theta(self) -> Array:
         """(k,)."""
         return self.model.theta
-
-    @property
-    def starts(self) -> Array:
-        """(n, k): its parameters, and the same with other dead times that they leave possible."""
-        orders = self.orders
-        return orders.beside(self.theta, self.ranges) if orders.physical is True else self.theta[None]
 
     @property
     def settled(self) -> bool:
@@ -79,7 +73,7 @@ class Candidate:
         A wrong noise model biases an A that plant and noise share, not the plant of OE and BJ
         ([ljung-1999], Section 8.4); in a loop it biases them all (Section 13.4).
         """
-        return (self.orders.shared or self.feedback) and bool(self.failed)
+        return (self.orders.shared or self.by_prediction) and bool(self.failed)
 
     @property
     def unknowns(self) -> int:
@@ -144,7 +138,7 @@ def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
 
     In a loop all of them: a plant with the wrong noise is none.
     """
-    if plain[0].feedback:
+    if plain[0].by_prediction:
         return [shape for c in plain for shape in c.orders.with_coloured_noise()]
     best, most = max(plain, key=lambda c: c.validation), _most_error(plain)
     near = [c for c in plain if 100.0 - c.validation <= most and c.unknowns < best.unknowns]
@@ -153,7 +147,7 @@ def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
 
 def about_as_good(usable: Sequence[Candidate]) -> list[Candidate]:
     """Those that simulate about as well as any, the one to take first; in a loop, the likeliest first."""
-    if usable[0].feedback:
+    if usable[0].by_prediction:
         return sorted(usable, key=lambda c: (not c.settled, not c.steady, bool(c.failed), c.criterion))
     most = _most_error(usable)
     return sorted((c for c in usable if 100.0 - c.validation <= most), key=_preference)
@@ -165,7 +159,7 @@ def likeliest(c: Candidate) -> float:
     An input that answers the noise tells of it, so that in a loop a wrong plant may simulate the output
     better than the right one. Prediction errors do not err ([ljung-1999], Section 13.4).
     """
-    return c.criterion if c.feedback else -c.validation
+    return c.criterion if c.by_prediction else -c.validation
 
 
 def noise_first(good: Sequence[Candidate], filtered: Sequence[Candidate]) -> list[Candidate]:

@@ -1,4 +1,4 @@
-"""Outputs that drift along a line: its slope is found beside the plant, before structures are compared.
+"""Outputs that drift: along a line, whose slope is found beside the plant, or as random walks do.
 
 Taking lines away from u and y, each by itself, would not do: what the plant makes of the input has a line of
 its own.
@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.explore.fits import Parts, output_error_form
-from inputdesign_cli.identification.explore.joint import Found, explored, moving_in
+from inputdesign_cli.identification.explore.integrated import like_random_walks
+from inputdesign_cli.identification.explore.joint import Found, criterion, explored, moving_in
 from inputdesign_cli.identification.explore.regression import best_delays, output_error
 from inputdesign_cli.plant.polynomial import Array
 
@@ -26,6 +26,8 @@ _MOST_SAMPLES, _FEWEST = 4000, 10
 _LONG, _PLAIN = 20_000, 4.0
 # A mode that decays by fewer nepers than that over the longest record is like a line.
 _DECAYS = 3.0
+# A model with noise of the other kind that has a twentieth of the likelihood, by BIC, is a rival.
+_AS_LIKELY = 2.0 * float(np.log(20.0))
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ class Lines:
 def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, ramp: bool = False) -> Found:
     """The model that records u (n, r), y (n, p) speak for, samples `step` apart.
 
-    Where tests say that what is left drifts, lines are taken away from the outputs, if that helps.
+    Where tests say that what is left drifts, lines are taken away from the outputs, if that helps. Where it
+    may be a random walk, noise that integrates is tried as well ([ljung-1999], Section 14.1).
 
     Args:
         feedback: whether u(t) may answer y(t).
@@ -57,6 +60,22 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
     """
+    level = _about_levels(parts, feedback=feedback, step=step, ramp=ramp)
+    which = _may_wander(level)
+    if feedback or not any(which):  # in a loop the noise is estimated with every structure
+        return level
+    try:
+        walk = explored(parts, feedback=False, step=step, ramp=ramp, wanders=which)
+    except SpecError:
+        return level
+    more = _criterion(walk) - _criterion(level)
+    # What a walk leaves of the gain at low frequencies is the less of the two, and the safer claim.
+    best, other = (walk, level) if more < _AS_LIKELY and walk.steady else (level, walk)
+    return replace(best, rival=other.model if abs(more) < _AS_LIKELY else None)
+
+
+def _about_levels(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
+    """The same, noise about levels and lines being the only one."""
     _, moved = moving_in(parts)
     longest, samples = max(len(y) for _, y in moved), sum(len(y) for _, y in moved)
     if ramp or samples > _LONG:
@@ -67,10 +86,10 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
         with suppress(SpecError):
             if np.any(lines.slopes):
                 even = _even(parts, lines, feedback=feedback, step=step)
-                if not _drifts(even.estimate):
+                if not any(_drifting(even)):
                     return even
     level = explored(parts, feedback=feedback, step=step, ramp=False)
-    if not (_drifts(level.estimate) or _hardly_decays(level)):
+    if not (any(_drifting(level)) or _hardly_decays(level)):
         return level
     lines = lines_of(moved).beyond(np.sqrt(np.diag(level.estimate.noise)), longest)
     if not np.any(lines.slopes):
@@ -79,8 +98,7 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
         even = _even(parts, lines, feedback=feedback, step=step)
     except SpecError:
         return level
-    better = _criterion(even, lines=1) < _criterion(level)
-    return even if better and not _drifts(even.estimate) else level
+    return even if _criterion(even) < _criterion(level) and not any(_drifting(even)) else level
 
 
 def _even(parts: Parts, lines: Lines, *, feedback: bool, step: float) -> Found:
@@ -89,8 +107,20 @@ def _even(parts: Parts, lines: Lines, *, feedback: bool, step: float) -> Found:
     return replace(found, slopes=lines.slopes)
 
 
-def _drifts(estimate: Estimate) -> bool:
-    return any(test.fault == "drift" for test in estimate.failed)
+def _drifting(found: Found) -> list[bool]:
+    """Of each output whether tests say that its residuals drift."""
+    outputs = {test.output for test in found.estimate.failed if test.fault == "drift"}
+    return [i in outputs for i in range(found.model.outputs)]
+
+
+def _may_wander(found: Found) -> list[bool]:
+    """Of each output whether what is left of it may be a random walk, or may be hidden in lines and modes."""
+    if _hardly_decays(found):
+        return [True] * found.model.outputs
+    slopes = np.zeros(found.model.outputs) if found.slopes is None else found.slopes
+    y, ends = np.concatenate([y for _, y in found.used]), np.cumsum([len(y) for _, y in found.used])[:-1]
+    left = np.split(y - found.estimate.simulated, ends)
+    return [any(told) for told in zip(_drifting(found), slopes != 0.0, like_random_walks(left), strict=True)]
 
 
 def _hardly_decays(found: Found) -> bool:
@@ -99,11 +129,9 @@ def _hardly_decays(found: Found) -> bool:
     return output_error_form(found.model).radius > 1.0 - _DECAYS / longest
 
 
-def _criterion(found: Found, *, lines: int = 0) -> float:
-    """BIC of the estimate from the whole record, with so many lines of each output."""
-    samples, outputs = found.estimate.errors.shape
-    unknowns = found.estimate.theta.size + lines * outputs * len(found.used)
-    return float(samples * np.linalg.slogdet(found.estimate.noise)[1] + unknowns * np.log(samples))
+def _criterion(found: Found) -> float:
+    lines = 0 if found.slopes is None else found.model.outputs * len(found.used)
+    return criterion(found.taken, found.estimate, lines=lines)
 
 
 def lines_of(parts: Parts) -> Lines:

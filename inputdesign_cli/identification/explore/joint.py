@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.candidates import Candidate, Chosen, Ranges
+from inputdesign_cli.identification.explore.division import Split, divided
 from inputdesign_cli.identification.explore.fits import (
     NOT_COMPUTED,
     Fits,
@@ -23,23 +23,19 @@ from inputdesign_cli.identification.explore.fits import (
     fits,
     is_steady,
     output_error_form,
+    percent,
 )
-from inputdesign_cli.identification.explore.processes import process_models
+from inputdesign_cli.identification.explore.integrated import integrating
 from inputdesign_cli.identification.explore.search import explore_structure
-from inputdesign_cli.plant import Model, PolynomialModel
+from inputdesign_cli.identification.explore.together import joined
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
-Split = Literal["the first 60 % and the rest", "blocks in turn", "none"]
-
-_SHARE = 0.6
-# Where an input steps in blocks of one kind only, fewer or more of them may part its steps.
-_BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
-# An input whose rms about its level is less than this share of that in all records rests.
-_STILL = 0.2
 _FEWEST = 30
 _MOST_SAMPLES = 20_000
 _UNKNOWN = ("gain and dynamics",)
 _TOO_SIMPLE = "the input moves too little or too simply: apply steps of several lengths, or a PRBS"
+_KINDS = (True, False)
 # So many structures, the best first, are tried for all outputs together where those that were chosen fail.
 _MOST_TRIED = 4
 
@@ -55,9 +51,12 @@ class Found:
         estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
             stand in all.
         validation: the fits of the same structures, estimated on one part, to the other.
+        helped: (p,), per cent by which what inputs do makes the prediction errors of that part smaller.
         split: which part estimates and which judges; of none the whole record does both.
         still: inputs (from zero) that never move.
+        wanders: (p,), the outputs whose noise integrates.
         slopes: (p,), of the lines that were taken away from the outputs, a sample; None: of none.
+        rival: a model that explains the records about as well, its noise being of the other kind.
     """
 
     outputs: tuple[Chosen, ...]
@@ -68,9 +67,12 @@ class Found:
     used: Parts
     samples: NDArray[np.int64]
     validation: Fits
+    helped: tuple[float, ...]
     split: Split
     still: tuple[int, ...]
+    wanders: tuple[bool, ...]
     slopes: Array | None = None
+    rival: Model | None = None
 
     @property
     def moving(self) -> list[int]:
@@ -83,12 +85,15 @@ class Found:
         return is_steady(self.model, sum(len(y) for _, y in self.used))
 
 
-def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
+def explored(
+    parts: Parts, *, feedback: bool, step: float, ramp: bool, wanders: Sequence[bool] | None = None
+) -> Found:
     """The model that records u (n, r), y (n, p) speak for, samples `step` apart.
 
     Args:
         feedback: whether u(t) may answer y(t).
         ramp: whether a line of each output is estimated along, in every record, from the whole of it.
+        wanders: (p,), the outputs whose noise integrates; None: of none.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
@@ -96,13 +101,15 @@ def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
     still, moved = moving_in(parts)
     moving = [j for j in range(parts[0][0].shape[1]) if j not in still]
     first, second, split = divided(moved)
-    found = _structures(first, second, feedback, step, physical=not still)
+    walks = (False,) * parts[0][1].shape[1] if wanders is None else tuple(wanders)
+    found = _structures(first, second, feedback, step, walks, physical=not still)
     used = busiest(moved, _MOST_SAMPLES)
-    taken, estimate, model = _estimated(found, used, feedback, ramp)
-    validation = beside(
-        [fits(c.model, [(u, y[:, i : i + 1]) for u, y in second]) for i, c in enumerate(taken)]
-    )
-    whole = joined(taken, parts[0][0].shape[1], moving).at(model.theta, model.covariance)
+    taken, estimate, model = _estimated(found, used, feedback, ramp, walks)
+    single = [[(u, y[:, i : i + 1]) for u, y in second] for i in range(len(taken))]
+    judged = [fits(c.model, own) for c, own in zip(taken, single, strict=True)]
+    idle = [fits(c.model, [(0.0 * u, y) for u, y in own]) for c, own in zip(taken, single, strict=True)]
+    whole = integrating(joined(taken, parts[0][0].shape[1], moving), walks)
+    whole = whole.at(model.theta, model.covariance)
     return Found(
         tuple(found),
         taken,
@@ -111,13 +118,17 @@ def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
         replace(estimate, names=whole.names),
         busiest(parts, _MOST_SAMPLES),
         _busiest_samples(moved),
-        validation,
+        beside(judged),
+        tuple(percent(own.errors, none.errors)[0] for own, none in zip(judged, idle, strict=True)),
         split,
         still,
+        walks,
     )
 
 
-def _structures(first: Parts, second: Parts, feedback: bool, step: float, *, physical: bool) -> list[Chosen]:
+def _structures(
+    first: Parts, second: Parts, feedback: bool, step: float, wanders: Sequence[bool], *, physical: bool
+) -> list[Chosen]:
     """What is found for each output.
 
     Raises:
@@ -126,7 +137,9 @@ def _structures(first: Parts, second: Parts, feedback: bool, step: float, *, phy
     found, outputs = [], first[0][1].shape[1]
     for i in range(outputs):
         own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
-        chosen = explore_structure(own[0], own[1], feedback=feedback, step=step, physical=physical)
+        chosen = explore_structure(
+            own[0], own[1], feedback=feedback, step=step, physical=physical, wanders=wanders[i]
+        )
         if chosen is None:
             name = signal_name("y", i, outputs)
             raise bad_spec(
@@ -169,38 +182,40 @@ def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
     return np.concatenate([at[:, 0] for _, at in busiest(counted, _MOST_SAMPLES)]).astype(np.int64)
 
 
+_Together = tuple[tuple[Candidate, ...], Estimate, Model]
+"""Structures of all outputs, and what the whole record makes of them."""
+
+
 def _estimated(
-    found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool
-) -> tuple[tuple[Candidate, ...], Estimate, Model]:
+    found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool, wanders: Sequence[bool]
+) -> _Together:
     """The best structures on the whole record; simpler ones where these cannot be estimated there.
 
     Where all of them stand on the limit of stability, the first that is stable: it is like an integrator.
     """
-    inputs, samples = used[0][0].shape[1], sum(len(y) for _, y in used)
+    samples = sum(len(y) for _, y in used)
     reason: SpecError | None = None
-    edge: tuple[tuple[Candidate, ...], Estimate, Model] | None = None
+    steady, edge = list[_Together](), list[_Together]()
+    # Prediction errors need no unseen data to judge: the whole record tells more than its first part.
+    enough = len(_KINDS) if any(wanders) else 1
     for taken in _combinations(found):
         try:
-            begun = taken
-            if len(taken) > 1:
-                # Where one output has several minima, a search for all of them seldom leaves a wrong one.
-                begun = tuple(_alone(own, used, i, feedback, ramp) for i, own in enumerate(taken))
-            structure = joined(begun, inputs, range(inputs))
-            near = len(taken) > 1 or _near(taken[0], inputs)
-            start = taken[0].starts if near and len(taken) == 1 else structure.theta
-            estimate = _identified(structure, used, feedback, start, near=near, ramp=ramp)
+            made = _together(taken, used, feedback, ramp, wanders)
         except SpecError as error:
             reason = error
             continue
         except NOT_COMPUTED:
             continue
-        model = structure.at(estimate.theta, estimate.noise)
-        if is_steady(model, samples):
-            return taken, estimate, model
-        if edge is None and output_error_form(model).radius < 1.0:
-            edge = (taken, estimate, model)
-    if edge is not None:
-        return edge
+        if is_steady(made[2], samples):
+            steady.append(made)
+            if len(steady) == enough:
+                break
+        elif output_error_form(made[2]).radius < 1.0:
+            edge.append(made)
+    if steady:
+        return min(steady, key=lambda made: criterion(*made[:2]))
+    if edge:
+        return edge[0]
     raise reason or bad_spec(
         "no-structure",
         "no stable model explains the record",
@@ -209,12 +224,31 @@ def _estimated(
     )
 
 
+def _together(
+    taken: tuple[Candidate, ...], used: Parts, feedback: bool, ramp: bool, wanders: Sequence[bool]
+) -> _Together:
+    inputs, begun = used[0][0].shape[1], taken
+    if len(taken) > 1:
+        # Where one output has several minima, a search for all of them seldom leaves a wrong one.
+        begun = tuple(_alone(own, used, i, feedback, ramp) for i, own in enumerate(taken))
+    structure = integrating(joined(begun, inputs, range(inputs)), wanders)
+    near = len(taken) > 1 or _near(taken[0], inputs)
+    estimate = _identified(structure, used, feedback, structure.theta, near=near, ramp=ramp)
+    return taken, estimate, structure.at(estimate.theta, estimate.noise)
+
+
+def criterion(taken: Sequence[Candidate], estimate: Estimate, *, lines: int = 0) -> float:
+    """BIC of an estimate from the whole record, delays counted, and so many lines besides."""
+    samples, _ = estimate.errors.shape
+    unknowns = sum(candidate.unknowns for candidate in taken) + lines
+    return float(samples * np.linalg.slogdet(estimate.noise)[1] + unknowns * np.log(samples))
+
+
 def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool, ramp: bool) -> Candidate:
     """The structure of one output, estimated from the whole record without the others."""
     own = [(u, y[:, output : output + 1]) for u, y in used]
     near = _near(candidate, used[0][0].shape[1])
-    start = candidate.starts if near else candidate.theta
-    estimate = _identified(candidate.model, own, feedback, start, near=near, ramp=ramp)
+    estimate = _identified(candidate.model, own, feedback, candidate.theta, near=near, ramp=ramp)
     return replace(candidate, model=candidate.model.at(estimate.theta, estimate.noise))
 
 
@@ -250,8 +284,8 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
     The kind that is best for the first output where both will do; then those that judge next best, and at
     last the simplest.
     """
-    kinds = (found[0].best.orders.physical, not found[0].best.orders.physical)
-    for choices in ([chosen.best_of(physical=kind) for chosen in found] for kind in kinds):
+    first = found[0].best.orders.physical
+    for choices in ([chosen.best_of(physical=kind == first) for chosen in found] for kind in _KINDS):
         taken = tuple(choice for choice in choices if choice is not None)
         if len(taken) == len(found):
             yield taken
@@ -262,86 +296,3 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
         for rank in range(_MOST_TRIED):
             yield tuple(own[min(rank, len(own) - 1)] for own in plain)
         yield tuple(min(own, key=lambda c: c.orders.size) for own in plain)
-
-
-def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
-    """What estimates and what judges: beginning and end of the records.
-
-    Blocks in turn where an input rests in one of these; the whole twice where it does so in any blocks.
-    """
-    for first, second, split in _divisions(parts):
-        if _moves(first, parts) and _moves(second, parts):
-            return first, second, split
-    return parts, parts, "none"
-
-
-def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, Split]]:
-    total = sum(len(y) for _, y in parts)
-    first: list[tuple[Array, Array]] = []
-    second: list[tuple[Array, Array]] = []
-    left = int(_SHARE * total)
-    for u, y in parts:
-        at = min(max(left, 0), len(y))
-        left -= len(y)
-        for some, piece in ((first, slice(0, at)), (second, slice(at, None))):
-            if len(y[piece]):
-                some.append((u[piece], y[piece]))
-    yield first, second, "the first 60 % and the rest"
-    for count in _BLOCKS:
-        length = max(total // count, 1)
-        blocks = [
-            (u[begin : begin + length], y[begin : begin + length])
-            for u, y in parts
-            for begin in range(0, len(y), length)
-            if len(y) - begin >= length // 2
-        ]
-        yield blocks[::2], blocks[1::2], "blocks in turn"
-
-
-def _moves(some: Parts, whole: Parts) -> bool:
-    """Whether all inputs move in a part, as they do in the whole, beside its level in every record."""
-    if not some:
-        return False
-    spread, of_all = (
-        np.concatenate([u - u.mean(axis=0) for u, _ in records]).std(axis=0) for records in (some, whole)
-    )
-    return bool(np.all(spread > _STILL * of_all))
-
-
-def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
-    """The models of single outputs, of structures of one kind, as one model.
-
-    Args:
-        inputs: of the whole; those that are `moving` are those of the single models. Plants in s have all.
-    """
-    processes = [(c.orders, c.theta) for c in taken if c.orders.physical is True]
-    if processes:
-        shapes, thetas = zip(*processes, strict=True)
-        return process_models(shapes, thetas, np.eye(len(shapes)))
-    single = rows([c.orders.model().at(c.theta) for c in taken if c.orders.physical is False])
-    return embedded(single, inputs, moving)
-
-
-def rows(models: Sequence[PolynomialModel]) -> PolynomialModel:
-    """Models of one output each, of the same inputs, as one model."""
-    return PolynomialModel(
-        tuple(model.B[0] for model in models),
-        tuple(model.A[0] for model in models),
-        tuple(model.F[0] for model in models),
-        tuple(model.C[0] for model in models),
-        tuple(model.D[0] for model in models),
-        np.diag([float(model.covariance[0, 0]) for model in models]),
-    )
-
-
-def embedded(model: PolynomialModel, inputs: int, moving: Sequence[int]) -> PolynomialModel:
-    """The same model among `inputs` inputs, of which those that are not `moving` have no effect."""
-    if len(moving) == inputs:
-        return model
-    B = [[np.zeros(1)] * inputs for _ in range(model.outputs)]
-    F = [[np.ones(1)] * inputs for _ in range(model.outputs)]
-    delays = [[1] * inputs for _ in range(model.outputs)]  # of what is absent, the length of B
-    for i in range(model.outputs):
-        for k, j in enumerate(moving):
-            B[i][j], F[i][j], delays[i][j] = model.B[i][k], model.F[i][k], model.first[i][k]
-    return replace(model, B=tuple(map(tuple, B)), F=tuple(map(tuple, F)), delays=tuple(map(tuple, delays)))

@@ -43,8 +43,6 @@ _ZERO = 0.5
 _LEAST = 0.05
 # A dead time this near below a whole number of samples is that number.
 _ROUNDED = 0.01
-# Samples to each side of a dead time in which another minimum may be.
-_ASIDE = 2
 # Below this damping a pair of poles rings.
 _RINGING = 0.7
 LONGER = 10.0
@@ -142,25 +140,6 @@ class Process:
         width = len(self.letters)
         rows = theta[: width * len(self.delays)].reshape(-1, width).tolist()
         return [dict(zip(self.letters, row, strict=True)) for row in rows]
-
-    def beside(self, theta: Array, ranges: Sequence[tuple[int, int]]) -> Array:
-        """(n, k): parameters, and the same with one dead time in the midst of another sample of its range.
-
-        A dead time that passes a sampling instant makes a kink of the likelihood, which may have a minimum in
-        every sample. At most two samples to each side are looked at.
-
-        Args:
-            theta: (k,).
-            ranges: see `ranges`.
-        """
-        width, found = len(self.letters), [theta]
-        for j, (delay, (low, high)) in enumerate(zip(self.delays, ranges, strict=True)):
-            for lag in range(max(low, delay - _ASIDE), min(high, delay + _ASIDE) + 1):
-                if lag != delay:
-                    moved = theta.copy()
-                    moved[width * (j + 1) - 1] = (lag - 0.5) * self.step
-                    found.append(moved)
-        return np.array(found)
 
     def _late(self, theta: Array) -> Array:
         """(r,): the dead times."""

@@ -36,6 +36,7 @@ from inputdesign_cli.identification.explore.fits import (
     output_error_form,
     simulation_fit,
 )
+from inputdesign_cli.identification.explore.integrated import differenced, integrating
 from inputdesign_cli.identification.explore.late import far_answers, late_answers
 from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
@@ -72,11 +73,15 @@ _STEPS, _AGAIN = {False: 100, True: 30}, 4
 
 @dataclass(frozen=True)
 class _Parts:
-    """What structures are estimated from and judged by, the first `late` samples of each record left out."""
+    """What structures are estimated from, `first`, and judged by.
+
+    Of each record that is `judged` the first `late` samples are left out.
+    """
 
     first: Parts
-    second: Parts
+    judged: tuple[Parts, Parts]
     feedback: bool
+    wanders: bool
     quick: dict[int, SharedDenominator]
     resting: Mapping[int, Parts]
     late: int
@@ -108,7 +113,11 @@ class _Parts:
         """The same, levels and starts estimated along: the search goes on from where it ended."""
         try:
             return self._searched(
-                candidate.orders, candidate.model, centred(self.first), candidate.theta[None], free=True
+                candidate.orders,
+                candidate.orders.model(),
+                centred(self.first),
+                candidate.theta[None],
+                free=True,
             )
         except NOT_COMPUTED:
             return None
@@ -131,10 +140,10 @@ class _Parts:
         )
         echoes = kind.echoes(found.point.theta, records.lengths)
         tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
-        fitted = structure.at(found.point.theta, noise)
-        on_first, on_second = (fits(fitted, part, self.late) for part in (self.first, self.second))
+        fitted = integrating(structure.at(found.point.theta, noise), (self.wanders,))
+        on_first, on_second = (fits(fitted, part, self.late) for part in self.judged)
         settled = orders.at(found.point.theta)
-        if max(settled.delays) >= max(len(y) for _, y in self.second):
+        if max(settled.delays) >= max(len(y) for _, y in self.judged[1]):
             raise ArithmeticError("a delay is longer than all that the model is to be judged by")
         return Candidate(
             settled,
@@ -147,12 +156,18 @@ class _Parts:
             found.converged,
             is_steady(fitted, self.samples) and not orders.beyond(found.point.theta, self.samples),
             orders.ranges(found.point.theta, deviations),
-            self.feedback,
+            self.feedback or self.wanders,
         )
 
 
 def explore_structure(
-    first: Parts, second: Parts, *, feedback: bool = False, step: float = 1.0, physical: bool = True
+    first: Parts,
+    second: Parts,
+    *,
+    feedback: bool = False,
+    step: float = 1.0,
+    physical: bool = True,
+    wanders: bool = False,
 ) -> Chosen | None:
     """The structures of one output, y (n, 1), from all inputs (n, r); None where nothing can be estimated.
 
@@ -161,19 +176,22 @@ def explore_structure(
         feedback: whether u(t) may answer y(t).
         step: the sample time.
         physical: whether plants in s are tried.
+        wanders: whether the noise integrates.
     """
-    first, second = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
+    levels = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
+    first, second = map(differenced, levels) if wanders else levels
+    by_prediction = feedback or wanders
     samples = sum(len(y) for _, y in first)
     r = first[0][0].shape[1]
     most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // LONG), 1)
     highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
     # In a loop an input answers the noise; what is left of it must be white to tell the plant.
-    clean = whitened(first) if feedback else first
+    clean = whitened(first) if by_prediction else first
     least = _least_delays(first, clean, most) if feedback else (0,) * r
     later = late_answers(first, most)
     most = _beyond(most, later)
     quick = _quick(clean, highest, most, tuple(map(max, least, later)), least)
-    if not (feedback or any(later)):
+    if not (by_prediction or any(later)):
         # What judges must be longer than the delay, too.
         shorter = min(max(len(y) for _, y in some) for some in (first, second))
         nearest = min(quick.values(), key=lambda found: found.loss)
@@ -186,7 +204,7 @@ def explore_structure(
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
     late = max(max(found.delays) for found in quick.values())
-    parts = _Parts(first, second, feedback, quick, resting, late)
+    parts = _Parts(first, levels, feedback, wanders, quick, resting, late)
 
     families = dict[str, None]()
 
@@ -195,30 +213,32 @@ def explore_structure(
         families.update(dict.fromkeys(shape.family for shape in small))
         return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
 
-    tried: list[Shape] = [static_gain(best_delays(clean, 0, 1, most, quick[1].delays, least).delays)]
-    for n in sorted({*range(1, min(highest, _ALWAYS) + 1), near}):
-        tried += plant_order(n, quick[n].delays)
-    begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(least))]
-    tried += _best_arx(first, second, begun, samples, late)
-    if physical:
-        tried += [process for n, found in quick.items() for process in processes(n, found.delays, step)]
-    found = judged(tried)
-    for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
-        plain = [c for c in found if c.orders.family in family]
-        if plain:
-            found += judged(with_noise(plain))
+    orders = sorted({*range(1, min(highest, _ALWAYS) + 1), near})
+    gain = static_gain(best_delays(clean, 0, 1, most, quick[1].delays, least).delays)
+    in_s = [process for n in quick if physical for process in processes(n, quick[n].delays, step)]
+    if wanders:
+        plain: list[Shape] = [gain, *(plant_order(n, quick[n].delays)[-1] for n in orders), *in_s]
+        found = judged(shape.with_coloured_noise()[0] for shape in plain)
+    else:
+        begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(least))]
+        known = [shape for n in orders for shape in plant_order(n, quick[n].delays)]
+        found = judged([gain, *known, *_best_arx(first, second, begun, samples, late), *in_s])
+        for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
+            simulating = [c for c in found if c.orders.family in family]
+            if simulating:
+                found += judged(with_noise(simulating))
     again = {c.orders: parts.refined(c) for c in _leading(found)}
     found = [again.get(c.orders) or c for c in found]
     usable = [c for c in again.values() if c is not None and np.isfinite(c.validation)]
     if not usable:
         return None
     good = about_as_good(usable)
-    if good[0].failed and not (feedback or good[0].orders.coloured):
+    if good[0].failed and not (by_prediction or good[0].orders.coloured):
         filtered = map(parts.refined, judged(good[0].orders.with_coloured_noise()))
         good = noise_first(good, [c for c in filtered if c is not None])
     best = good[0]
-    known = {c.orders: c for c in (*found, *good)}
-    rest = sorted((c for c in known.values() if c.orders != best.orders), key=likeliest)
+    every = {c.orders: c for c in (*found, *good)}
+    rest = sorted((c for c in every.values() if c.orders != best.orders), key=likeliest)
     estimated = {c.orders.family for c in found}
     dropped = tuple(family for family in families if family not in estimated)
     return Chosen((best, *rest), by_order, tuple(good), first, least, most, dropped)

@@ -76,9 +76,10 @@ def exploration_entry(
                 "output_error_by_order": {str(n): rms for n, rms in chosen.by_order.items()},
                 "structures": [_structure(candidate) for candidate in chosen.candidates],
                 "not_estimated": list(chosen.dropped),
+                "noise_integrates": wanders,
             }
-            for i, (chosen, taken, ranges) in enumerate(
-                zip(found.outputs, found.taken, found.ranges, strict=True)
+            for i, (chosen, taken, ranges, wanders) in enumerate(
+                zip(found.outputs, found.taken, found.ranges, found.wanders, strict=True)
             )
         ],
         "trusted": not reasons,
@@ -125,6 +126,13 @@ def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]
         f"record does not tell all its parameters{_least_moved(log, found)}"
         for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True))
         if chosen.dropped and taken.orders.order
+    ]
+    notes += [
+        f"{'y' if single else f'y{i + 1}'} wanders as a random walk does, whatever the inputs do: its noise "
+        "integrates (noise: {drift: true}), structures are ranked by prediction errors, and the gain is that "
+        "of the steps, not of levels that lie far apart"
+        for i, wanders in enumerate(found.wanders)
+        if wanders
     ]
     notes += [
         f"u{j + 1} never moves in this record: the model has no part of it, and an experiment must move it"

@@ -88,13 +88,19 @@ def _reasons(found: Found) -> tuple[str, ...]:
     unseen = int(np.sum(found.validation.counted))
     told = []
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
+        output = signal_name("y", i, found.model.outputs)
         luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
-        if fit < max(LEAST_FIT, luck):
+        # What wanders leaves any simulation; what is new in it from sample to sample does not wander.
+        if found.wanders[i] and not found.helped[i] > 0.0:
             told.append(
-                f"the simulation explains {fit:.1f} % of {signal_name('y', i, found.model.outputs)} in "
-                f"{unseen} samples{which}, and of noise alone it may explain {luck:.1f} %: the inputs "
-                f"hardly act on it, or by more than {chosen.most} samples later, or the record is too short "
-                "or too noisy to tell how"
+                f"{output} wanders, and what the inputs do by this model does not help to predict it in "
+                f"{unseen} samples{which}: move the inputs more, or more often, or record for longer"
+            )
+        elif not found.wanders[i] and fit < max(LEAST_FIT, luck):
+            told.append(
+                f"the simulation explains {fit:.1f} % of {output} in {unseen} samples{which}, and of noise "
+                f"alone it may explain {luck:.1f} %: the inputs hardly act on it, or by more than "
+                f"{chosen.most} samples later, or the record is too short or too noisy to tell how"
             )
     return tuple(told)
 
@@ -104,7 +110,7 @@ def _idle(found: Found) -> tuple[str, ...]:
     nothing = driven_by_nothing(found.model, found.estimate)
     told = []
     for i, fit in enumerate(found.estimate.fit):
-        worse = fit is not None and fit <= 0.0
+        worse = fit is not None and fit <= 0.0 and not found.wanders[i]
         if worse or i in nothing:
             why = f"the simulation explains {fit:.1f} %" if worse else "its standard deviations reach zero"
             output = signal_name("y", i, found.model.outputs)

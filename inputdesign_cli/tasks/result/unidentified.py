@@ -8,12 +8,15 @@ from inputdesign_cli.identification.explore import Found, left_of_inputs, one_li
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.processes import LONGER
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.result.unrelated import chance_of_response
 
 # A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
 # not at all beyond the other.
 _NO_DIGIT, _NOT_AT_ALL = 1.0, 100.0
 # A rival of a twentieth of the likelihood, -2 log of that, and how far its G is off, in shares of its peak.
 _AS_LIKELY, _ELSEWHERE = 2.0 * float(np.log(20.0)), 0.1
+# G of a rival with other noise is off by chance so seldom.
+_BY_CHANCE = 1e-3
 _FREQUENCIES = 100
 _OF_A_LINE = 2  # numbers that one frequency tells
 # What others leave of an input, in shares of its power, where minima that exchange their effects are many.
@@ -73,7 +76,9 @@ def unidentified(
     longest = max(len(y) for _, y in found.used)
     for candidate, theta in zip(found.taken, _by_output(found), strict=True):
         orders = candidate.orders
-        slow = orders.slowest(theta) if orders.physical is True and not integrates else 0.0
+        if integrates:
+            continue
+        slow = orders.slowest(theta) if orders.physical is True else 0.0
         late = [("the longest time constant", slow)] if slow > LONGER * longest * step else []
         for letter, value in orders.beyond(theta, longest) or late:
             told.append(
@@ -122,4 +127,14 @@ def rivalled(found: Found) -> tuple[str, ...]:
                 f"differs by {rival.excess:.2g}), and their G by {100.0 * apart:.3g} % of its peak: move the "
                 "inputs independently of each other, and at more frequencies",
             )
-    return ()
+    if found.rival is None:
+        return ()
+    apart = float(np.max(np.abs(found.rival.plant_at(w) - G) / peaks))
+    chance = chance_of_response(found.model, found.estimate, found.rival)
+    if apart <= _ELSEWHERE or (chance is not None and chance > _BY_CHANCE):
+        return ()
+    return (
+        "an output that wanders as a random walk does, and one about a level, explain the record about "
+        f"equally well, and G of the two differs by {100.0 * apart:.3g} % of its peak, beyond chance: record "
+        "for longer, and let the input step more often, so that what it does stands out from the drift",
+    )

@@ -112,6 +112,18 @@ def driving_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list
     return _like_nothing(model, estimate, step, [(slice(None), j) for j in range(model.inputs)])
 
 
+def chance_of_response(model: Model, estimate: Estimate, other: Model, step: float = 1.0) -> float | None:
+    """The probability, if an estimate is right but for chance, of a G as far from its own as another model's.
+
+    None where G is infinite, or no step of the parameters changes it.
+    """
+    w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi / step
+    with np.errstate(all="ignore"):
+        gradient, away = model.plant_gradient(w), other.plant_at(w) - model.plant_at(w)
+    change = _stacked(gradient.swapaxes(0, 1))
+    return _chance(estimate, change, _stacked(away[None])[0], wholly=False)
+
+
 def _like_nothing(
     model: Model, estimate: Estimate, step: float, parts: Sequence[tuple[int | slice, int | slice]]
 ) -> list[int]:

@@ -38,6 +38,7 @@ def test_correlated_noise_is_not_taken_for_white(seed):
     found = explore_records([heater(seed)], step=STEP)
     is_the_heater(found)
     assert found.slopes is None
+    assert found.wanders == (False,)
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from inputdesign_cli.identification.explore import (
     fits,
     order_of_excitation,
 )
-from inputdesign_cli.identification.explore.joint import divided
+from inputdesign_cli.identification.explore.division import divided
 from inputdesign_cli.identification.explore.regression import best_delays, output_error
 from inputdesign_cli.plant import PolynomialModel
 
