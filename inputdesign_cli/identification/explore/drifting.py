@@ -26,7 +26,7 @@ _MOST_SAMPLES, _FEWEST = 4000, 10
 _LONG, _PLAIN = 20_000, 4.0
 # A mode that decays by fewer nepers than that over the longest record is like a line.
 _DECAYS = 3.0
-# A model with noise of the other kind that has a twentieth of the likelihood, by BIC, is a rival.
+# Noise about a level is believed where it is so much likelier, by BIC: twenty times.
 _AS_LIKELY = 2.0 * float(np.log(20.0))
 
 
@@ -61,8 +61,9 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
     """
     level = _about_levels(parts, feedback=feedback, step=step, ramp=ramp)
-    which = _may_wander(level)
-    if feedback or not any(which):  # in a loop the noise is estimated with every structure
+    # In a loop the noise is estimated with every structure.
+    which = [] if feedback else _may_wander(level)
+    if not any(which):
         return level
     try:
         walk = explored(parts, feedback=False, step=step, ramp=ramp, wanders=which)
@@ -70,8 +71,10 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
         return level
     more = _criterion(walk) - _criterion(level)
     # What a walk leaves of the gain at low frequencies is the less of the two, and the safer claim.
-    best, other = (walk, level) if more < _AS_LIKELY and walk.steady else (level, walk)
-    return replace(best, rival=other.model if abs(more) < _AS_LIKELY else None)
+    if more >= _AS_LIKELY or not walk.steady:
+        return level
+    # A mode as slow as the record has taken the walk for its own, and says nothing of the plant.
+    return replace(walk, rival=level.model if more > 0.0 and not _hardly_decays(level) else None)
 
 
 def _about_levels(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:

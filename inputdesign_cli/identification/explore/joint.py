@@ -56,7 +56,7 @@ class Found:
         still: inputs (from zero) that never move.
         wanders: (p,), the outputs whose noise integrates.
         slopes: (p,), of the lines that were taken away from the outputs, a sample; None: of none.
-        rival: a model that explains the records about as well, its noise being of the other kind.
+        rival: where noise integrates, a model with noise about a level that is somewhat likelier.
     """
 
     outputs: tuple[Chosen, ...]

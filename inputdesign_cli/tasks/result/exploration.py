@@ -46,7 +46,8 @@ def without_drift(log: Log, found: Found) -> Log:
     )
     told = [
         words.format("y" if single else f"y{i + 1}", f"{slope / log.step:.4g} per {log.time_unit}")
-        + "; it was taken away (what is left of it was estimated along)"
+        + "; it was taken away (what is left of it was estimated along), which --detrend linear does for "
+        "identify and assess"
         for i, slope in enumerate(found.slopes)
         if slope
     ]

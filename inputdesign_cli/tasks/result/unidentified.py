@@ -134,7 +134,7 @@ def rivalled(found: Found) -> tuple[str, ...]:
     if apart <= _ELSEWHERE or (chance is not None and chance > _BY_CHANCE):
         return ()
     return (
-        "an output that wanders as a random walk does, and one about a level, explain the record about "
-        f"equally well, and G of the two differs by {100.0 * apart:.3g} % of its peak, beyond chance: record "
+        "noise about a level explains the record somewhat better than a random walk, which is the safer "
+        f"claim, and G of the two differs by {100.0 * apart:.3g} % of its peak, beyond chance: record "
         "for longer, and let the input step more often, so that what it does stands out from the drift",
     )
