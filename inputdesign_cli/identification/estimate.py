@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
@@ -227,17 +228,21 @@ def _over_minima(names: tuple[str, ...], found: Search, factor: Array, noise: Ar
     Args:
         factor: L (k, k) of the best minimum alone, its information L L^T.
     """
-    weights, spreads = [1.0], [np.eye(len(factor))]
+    logarithms, spreads = [0.0], [np.eye(len(factor))]
     for point, excess in found.beside:
-        own = factor_at(names, found.records, point, noise)
+        try:
+            own = factor_at(names, found.records, point, noise)
+        except SpecError:  # what determines nothing there has no covariance to count
+            continue
         # In units of the best minimum's own deviations.
         half = scipy.linalg.solve_triangular(own, factor, lower=True)
         away = factor.T @ (point.theta - found.point.theta)
         spreads.append(half.T @ half + np.outer(away, away))
         smaller = np.sum(np.log(np.abs(np.diag(factor)))) - np.sum(np.log(np.abs(np.diag(own))))
-        weights.append(float(np.exp(smaller - 0.5 * excess)))
-    if len(weights) == 1:
+        logarithms.append(float(smaller - 0.5 * excess))
+    if len(logarithms) == 1:
         return factor
+    weights = np.exp(np.array(logarithms) - max(logarithms))
     mixture = np.tensordot(weights, spreads, 1) / np.sum(weights)
     rows = scipy.linalg.solve_triangular(np.linalg.cholesky(mixture), factor.T, lower=True)
     return triangular_factor(rows)[0]

@@ -136,7 +136,7 @@ class Chosen:
 def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
     """The plant that simulates best with filtered noise, and simpler ones that do so about as well.
 
-    In a loop all of them: a plant with the wrong noise is none.
+    In a loop, or beside noise that integrates, all of them: a plant with the wrong noise is none.
     """
     if plain[0].by_prediction:
         return [shape for c in plain for shape in c.orders.with_coloured_noise()]
@@ -146,7 +146,7 @@ def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
 
 
 def about_as_good(usable: Sequence[Candidate]) -> list[Candidate]:
-    """Those that simulate about as well as any, the one to take first; in a loop, the likeliest first."""
+    """Those that simulate about as well as any, the one to take first; by prediction, the likeliest first."""
     if usable[0].by_prediction:
         return sorted(usable, key=lambda c: (not c.settled, not c.steady, bool(c.failed), c.criterion))
     most = _most_error(usable)

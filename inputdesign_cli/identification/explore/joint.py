@@ -35,6 +35,7 @@ _FEWEST = 30
 _MOST_SAMPLES = 20_000
 _UNKNOWN = ("gain and dynamics",)
 _TOO_SIMPLE = "the input moves too little or too simply: apply steps of several lengths, or a PRBS"
+# Structures of the kind of the first output's best (in s or in q^-1), then of the other.
 _KINDS = (True, False)
 # So many structures, the best first, are tried for all outputs together where those that were chosen fail.
 _MOST_TRIED = 4

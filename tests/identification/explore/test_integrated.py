@@ -88,4 +88,4 @@ def test_differences_have_the_plant_of_noise_that_integrates(pole, c, level, see
 
 def test_what_has_no_noise_of_that_kind_is_refused():
     with pytest.raises(TypeError, match="no noise that integrates"):
-        integrating(object(), (True,))  # type: ignore[arg-type]
+        integrating(object(), (True,))
