@@ -26,7 +26,11 @@ _TRUSTED = 0.25
 # Rounding of a sum of squares: a cost that rises by less has not risen.
 _ROUNDING = 1e-12
 _RIDGE = 1e-14
+# Looked at every so many steps: a run that took less than this off -2 log likelihood, and less than this
+# share of what its next step promises, is stuck. Where that is next to nothing, only rounding stops it.
 _WATCHED = 10
+_STUCK, _SHARE = 0.05, 0.01
+_NOTHING = 1e-6
 
 
 class Problem(Protocol):
@@ -65,7 +69,7 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
 
     Args:
         idle: a run has settled as well where ten steps take less than this off -2 log likelihood, or where
-            no step however short takes anything; at zero it has not.
+            no step however short takes anything; at zero it has not, and is given up.
     """
     theta = problem.stabilised(start)
     runs = theta.shape[0]
@@ -75,19 +79,26 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
     finite = np.isfinite(cost)
     active, earlier = np.flatnonzero(finite), cost.copy()
     going_on = problem if np.all(finite) else problem.kept(finite)
-    for number in range(1, most + 1):
+    for number in range(most + 1):
         newton, gain = _step(hessian[active], slope[active], np.zeros(active.size))
-        settled = gain * (problem.errors / np.maximum(cost[active], 1e-300)) < _SETTLED
-        settled |= cost[active] <= 0.0
+        least = np.maximum(cost[active], 1e-300)
+        promised = gain * (problem.errors / least)
+        stuck = damping[active] > _MOST_DAMPING
+        if number and number % _WATCHED == 0:
+            took = problem.errors * np.log(np.maximum(earlier[active], 1e-300) / least)
+            stuck |= took <= idle if idle else (took < _STUCK) & (took < _SHARE * promised)
+            earlier = cost.copy()
+        # Where there is next to nothing to take, rounding hides it.
+        settled = (promised < _SETTLED) | (cost[active] <= 0.0) | (stuck & (promised < _NOTHING))
         converged[active[settled]] = True
         theta[active[settled]] = problem.stabilised(theta[active[settled]] + newton[settled])
-        lost = ~settled & (damping[active] > _MOST_DAMPING)
+        lost = ~settled & stuck
         converged[active[lost]] = idle > 0.0
         going = ~(settled | lost)
         if not np.all(going):
             active, newton = active[going], newton[going]
             going_on = going_on.kept(going)
-        if not active.size:
+        if not active.size or number == most:
             break
         damped = damping[active] > _LEAST_DAMPING
         move, gain = newton.copy(), gain[going]
@@ -107,13 +118,6 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
         damping[chosen] = np.maximum(damping[chosen], np.where(kept, 0.0, _FIRST_DAMPING))
         worse = active[~better]
         damping[worse] = 10.0 * np.maximum(damping[worse], 1e-4)
-        if idle and number % _WATCHED == 0:
-            resting = cost[active] >= earlier[active] * np.exp(-idle / problem.errors)
-            converged[active[resting]] = True
-            active, going_on = active[~resting], going_on.kept(~resting)
-            earlier = cost.copy()
-            if not active.size:
-                break
     return Minimum(theta, cost, hessian, converged, steps)
 
 

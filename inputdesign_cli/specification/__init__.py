@@ -1,7 +1,7 @@
 """Specifications: YAML in, frozen and validated objects out, every diagnostic with its line."""
 
 from inputdesign_cli.specification.loading import load_spec, parse_spec
-from inputdesign_cli.specification.model_file import load_estimate
+from inputdesign_cli.specification.model_file import is_prior, load_estimate
 from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
 from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
@@ -25,6 +25,7 @@ __all__ = [
     "SpecTemplate",
     "Sweep",
     "from_control",
+    "is_prior",
     "json_schema",
     "load_estimate",
     "load_spec",

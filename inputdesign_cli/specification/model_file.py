@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isclose
 
 from pydantic import ValidationError
@@ -53,6 +53,15 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         ) from error
     _check_clock(spec, name, data, key)
     return estimated
+
+
+def is_prior(parameters: Mapping[str, float], covariance: Sequence[Sequence[float]]) -> bool:
+    """Whether a later spec will accept such a block: the covariance is positive definite beyond rounding."""
+    try:
+        Estimated.model_validate({"parameters": parameters, "covariance": covariance})
+    except ValidationError:
+        return False
+    return True
 
 
 def _check_clock(spec: Spec, name: str, data: Mapping[str, Plain], key: str) -> None:

@@ -1,11 +1,17 @@
 """model.yaml holds at the sample time of its data: a spec takes it over, says the same, or is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification.estimators import identify as identify_model
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.tasks.result.estimates import model_text
 
 STRUCTURE = """
 sample_time: 5
@@ -109,3 +115,23 @@ def test_a_model_file_without_a_sample_time_is_taken_as_before(model, tmp_path):
     (tmp_path / "model.yaml").write_text("\n".join(lines))
     text = STRUCTURE + ASKED.replace("\nexperiment: {samples: 200}\n", PRIOR)
     assert solve(parse_spec(text, folder=tmp_path)).result["status"] in ("optimal", "nothing_needed")
+
+
+def test_a_covariance_that_is_singular_to_rounding_is_no_prior(model, tmp_path):
+    """Of two directions one has 1e-18 of the information of the other: it is below rounding."""
+    spec = parse_spec(STRUCTURE, design=False)
+    plant, rng = build_model(spec), np.random.default_rng(1)
+    u = rng.standard_normal((200, 1))
+    y = plant.simulate(u, 0.1 * rng.standard_normal((200, 1)), 1.0)[0] + 0.1 * rng.standard_normal((200, 1))
+    estimate = identify_model(plant, u, y)
+    sound = yaml.safe_load(model_text(build_units(spec), plant, estimate))
+    assert np.all(np.linalg.eigvalsh(sound["estimate"]["covariance"]) > 0.0)
+    blind = replace(estimate, factor=np.array([[1.0, 0.0], [1.0, 1e-9]]))
+    text = model_text(build_units(spec), plant, blind)
+    assert "covariance" not in yaml.safe_load(text)["estimate"]
+    assert "singular to rounding" in text
+    (tmp_path / "model.yaml").write_text(text)
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(STRUCTURE + ASKED.replace("\nexperiment: {samples: 200}\n", PRIOR), folder=tmp_path))
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == ("bad-model-file", "experiment.prior.information")

@@ -1,6 +1,7 @@
 """From a record alone to a model: delays, orders and families, judged on data that they have not seen."""
 
 from inputdesign_cli.identification.explore.candidates import Candidate as Candidate, Chosen as Chosen
+from inputdesign_cli.identification.explore.cycles import own_cycles as own_cycles
 from inputdesign_cli.identification.explore.drifting import (
     explore_records as explore_records,
     levelled as levelled,

@@ -283,8 +283,17 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
     """What may be taken for all outputs together: all in s by their names, or all polynomials in q^-1.
 
     The kind that is best for the first output where both will do; then those that judge next best, and at
-    last the simplest.
+    last the simplest; none of them twice.
     """
+    tried = set[tuple[int, ...]]()
+    for taken in _in_order(found):
+        which = tuple(map(id, taken))
+        if which not in tried:
+            tried.add(which)
+            yield taken
+
+
+def _in_order(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
     first = found[0].best.orders.physical
     for choices in ([chosen.best_of(physical=kind == first) for chosen in found] for kind in _KINDS):
         taken = tuple(choice for choice in choices if choice is not None)

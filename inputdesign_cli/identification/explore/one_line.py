@@ -36,7 +36,7 @@ def one_line(parts: Sequence[tuple[Array, Array]]) -> float | None:
     level = np.column_stack([np.ones(len(u)), t - t.mean()])
     level = level / np.linalg.norm(level, axis=0)
     varying = untold([level], [u[:, 0]])[0]
-    line = np.column_stack([level, _pair(_strongest(varying, level), len(u))])
+    line = np.column_stack([level, wave(strongest(varying, level), len(u))])
     left, answers = untold([line], [u[:, 0]])[0], untold([line], [y])[0]
     share = 1.0 - float(left @ left) / max(float(varying @ varying), 1e-300)
     if share < MOSTLY:
@@ -62,26 +62,27 @@ def cycle(u: Array, level: Array) -> tuple[Array, float]:
     With them the share of the power of what `level` leaves that they explain.
     """
     varying = untold([level], [u])[0]
-    strongest = _strongest(varying, level)
+    peak = strongest(varying, level)
     lowest = 2.0 * np.pi * _CYCLES / len(u)
     found = [(level, left_over(level, u))]
     for part in range(1, _STRONGEST + 1):
-        frequency = strongest / part
+        frequency = peak / part
         if frequency >= lowest:
             harmonics = [n for n in range(1, _HARMONICS + 1) if n * frequency < np.pi]
-            columns = np.column_stack([level, *(_pair(n * frequency, len(u)) for n in harmonics)])
+            columns = np.column_stack([level, *(wave(n * frequency, len(u)) for n in harmonics)])
             found.append((columns, left_over(columns, u)))
     columns, left = min(found, key=lambda each: each[1])
     return columns, 1.0 - left / max(float(varying @ varying), 1e-300)
 
 
-def _strongest(x: Array, level: Array) -> float:
+def strongest(x: Array, level: Array) -> float:
     """The frequency, in rad per sample, at which a sinusoid leaves least of x (n,), beside columns (n, m)."""
     peak = max(int(np.argmax(np.abs(np.fft.rfft(x)))), 1)
     tried = 2.0 * np.pi / len(x) * np.linspace(max(peak - 1.0, 0.25), peak + 1.0, _REFINED)
-    return float(min(tried, key=lambda w: left_over(np.column_stack([level, _pair(w, len(x))]), x)))
+    return float(min(tried, key=lambda w: left_over(np.column_stack([level, wave(w, len(x))]), x)))
 
 
-def _pair(frequency: float, samples: int) -> Array:
+def wave(frequency: float, samples: int) -> Array:
+    """Cosine and sine (n, 2) of a frequency in rad per sample."""
     phase = frequency * np.arange(samples)
     return np.column_stack([np.cos(phase), np.sin(phase)])

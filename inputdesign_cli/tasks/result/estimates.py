@@ -13,6 +13,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.specification import is_prior
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 from inputdesign_cli.tasks.result.refutations import contradictions, unsettled
 from inputdesign_cli.tasks.result.remedies import vague_notes
@@ -179,7 +180,13 @@ def model_text(units: Units, model: Model, estimate: Estimate) -> str:
         "# How far to trust them; a later spec may say experiment: {prior: {information: model.yaml}}.",
         "estimate:",
         f"  parameters: {json.dumps(values)}",
-        "  covariance:",
-        *(f"    - {json.dumps(row)}" for row in estimate.covariance.tolist()),
     ]
+    covariance = estimate.covariance.tolist()
+    if is_prior(values, covariance):
+        lines += ["  covariance:", *(f"    - {json.dumps(row)}" for row in covariance)]
+    else:
+        lines += [
+            "  # No covariance: it is singular to rounding, for the data do not tell some of these apart.",
+            "  # Take more data, or fewer parameters; this file is no prior.",
+        ]
     return "\n".join(lines) + "\n"

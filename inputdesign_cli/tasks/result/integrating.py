@@ -10,12 +10,15 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # The static gain is within so many deviations of none, that at some frequency of the record is not; and the
 # first is larger by this factor: G still rises there towards low frequencies.
-_UNTOLD, _TOLD, _RISING = 2.0, 4.0, 2.0
+_UNTOLD, _TOLD, _RISING = 3.0, 4.0, 2.0
 _FREQUENCIES, _HIGHEST = 40, 1.0
 _STATIC = 1e-6  # of the lowest frequency of a record: as good as zero
 _LATE = 0.1
 # Without it, what is fed back would be taken for what the model lacks.
 CONTROLLER = "the controller as it was, experiment: {controller: {numerator: [..], denominator: [..]}}"
+
+# What wanders beside an integrator would be taken for its own doing.
+_WALK = ", and noise: {variance: 1, C: [1, -0.1], drift: true}"
 
 
 def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tuple[str, ...]:
@@ -37,7 +40,9 @@ def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tup
                     at = 1 + int(np.argmin(deviations[1:] / size[1:]))
                     where = "" if single else f" from u{j + 1} to y{i + 1}"
                     gain = f"{size[0]:.3g} +- {deviations[0]:.1g}"
-                    told.append(_sentence(where, gain, _slope(G[at, i, j], w[at], step), step, unit, loop))
+                    besides = f", and {CONTROLLER}" if loop else _WALK if single and found.wanders[i] else ""
+                    slope = _slope(G[at, i, j], w[at], step)
+                    told.append(_sentence(where, gain, slope, step, unit, besides))
     return tuple(told)
 
 
@@ -76,13 +81,12 @@ def _deviations(found: Found, change: ComplexArray) -> Array:
     return np.asarray(np.sqrt(np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)))
 
 
-def _sentence(where: str, gain: str, slope: float, step: float, unit: str, loop: bool) -> str:
-    law = f", and {CONTROLLER}" if loop else ""
+def _sentence(where: str, gain: str, slope: float, step: float, unit: str, besides: str) -> str:
     sort = "an integrator" if not where else "a matrix with an integrator there"
     return (
         f"the plant{where} cannot be told from an integrator (its static gain is {gain}): no time constant "
         f"follows from this record, only the slope, {slope:.4g} per {unit} for an input of one. Record until "
         f"the output settles; or, if it never does, identify {sort}: idesign identify DATA --spec SPEC, in "
         f"SPEC {clock_of(step, unit)} and plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, "
-        f"continuous: {{numerator: [K], denominator: [1, 0], delay: L}}, sample: zoh}}{law}"
+        f"continuous: {{numerator: [K], denominator: [1, 0], delay: L}}, sample: zoh}}{besides}"
     )

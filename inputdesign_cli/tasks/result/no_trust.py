@@ -12,6 +12,7 @@ from inputdesign_cli.identification.explore import (
     by_chance,
     interpolated_outputs,
     only_answers,
+    own_cycles,
     unhelpful,
     unstable_pole,
 )
@@ -59,6 +60,7 @@ def distrusted(
         *(_idle(found) or _unrelated(found)),
         *_refuted(found),
         *_interpolated(log),
+        *_cycling(found, log),
         *rising,
         *unseen,
         *rivalled(found),
@@ -140,6 +142,27 @@ def _interpolated(log: Log) -> tuple[str, ...]:
         "not those of the plant; export the values as they were stored, and give that sample time"
         for i in interpolated_outputs(log.parts)
     )
+
+
+def _cycling(found: Found, log: Log) -> tuple[str, ...]:
+    """Outputs that follow a cycle of their own."""
+    estimate = found.estimate
+    told = []
+    for one in own_cycles(found.model, found.used, estimate.factor, estimate.noise):
+        output = signal_name("y", one.output, found.model.outputs)
+        period = f"a period of {one.period * log.step:.3g} {log.time_unit}"
+        what = (
+            f"a mode with {period} goes on in {output} through the whole record, by itself more than by what "
+            "the inputs do: it cannot be told from a cycle"
+            if one.is_mode
+            else f"what the model leaves of {output} is a cycle with {period}, which moves its parameters "
+            "beyond chance: no input has it, and it may be one"
+        )
+        told.append(
+            f"{what} that acts on the output (as of days, or another machine); log what causes it as one "
+            "more input, or record while it rests"
+        )
+    return tuple(told)
 
 
 def _refuted(found: Found) -> tuple[str, ...]:
