@@ -21,8 +21,9 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # A mode that loses more than this, in nepers, over the record is no cycle, nor is less than half a turn.
 _DECAYS, _LEAST_TURN = 3.0, np.pi
-# What a mode does from the start is that much of what the inputs make of it.
-_OF_ITSELF = 0.5
+# What a mode does from the start is that much of what the inputs make of it; its squares, in units of the
+# variance of the noise, are beyond chance.
+_OF_ITSELF, _SEEN = 0.5, 20.0
 # Of a circle about poles, on which G is as smooth as it is far from others.
 _POINTS, _HALF = 64, 0.5
 _DEPENDENT = 1e-9
@@ -53,7 +54,7 @@ def own_cycles(model: Model, parts: Parts, factor: Array, noise: Array) -> list[
     Raises:
         TypeError: see `output_error_form`.
     """
-    modes = _modes(model, parts)
+    modes = _modes(model, parts, noise)
     taken = {one.output for one in modes}
     return modes + [one for one in _left(model, parts, factor, noise) if one.output not in taken]
 
@@ -110,7 +111,7 @@ def _windowed(x: Array) -> Array:
     return np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2
 
 
-def _modes(model: Model, parts: Parts) -> list[Cycle]:
+def _modes(model: Model, parts: Parts, noise: Array) -> list[Cycle]:
     """Modes that go on by themselves rather than by what the inputs do."""
     plant = output_error_form(model)
     # Poles of a stable plant on and above the real axis, those of a pair once.
@@ -125,7 +126,7 @@ def _modes(model: Model, parts: Parts) -> list[Cycle]:
             moved += np.sum(by_inputs**2, axis=0)
             free += np.sum(by_start**2, axis=0)
         period = float(2.0 * np.pi / np.angle(pole))
-        going = np.flatnonzero(free > _OF_ITSELF**2 * moved)
+        going = np.flatnonzero(free > np.maximum(_OF_ITSELF**2 * moved, _SEEN * np.diag(noise)))
         told += [Cycle(int(i), period, is_mode=True) for i in going]
     return told
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore import Found
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.tasks.build.system import build_model
 
 # The static gain is within so many deviations of none, that at some frequency of the record is not; and the
 # first is larger by this factor: G still rises there towards low frequencies.
@@ -18,7 +22,7 @@ _LATE = 0.1
 CONTROLLER = "the controller as it was, experiment: {controller: {numerator: [..], denominator: [..]}}"
 
 # What wanders beside an integrator would be taken for its own doing.
-_WALK = ", and noise: {variance: 1, C: [1, -0.1], drift: true}"
+_WALK = "noise: {variance: 1, C: [1, -0.1], drift: true}"
 
 
 def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tuple[str, ...]:
@@ -40,9 +44,11 @@ def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tup
                     at = 1 + int(np.argmin(deviations[1:] / size[1:]))
                     where = "" if single else f" from u{j + 1} to y{i + 1}"
                     gain = f"{size[0]:.3g} +- {deviations[0]:.1g}"
-                    besides = f", and {CONTROLLER}" if loop else _WALK if single and found.wanders[i] else ""
-                    slope = _slope(G[at, i, j], w[at], step)
-                    told.append(_sentence(where, gain, slope, step, unit, besides))
+                    offer = _offer(_slope(G[at, i, j], w[at], step), step, unit)
+                    besides = f", and {CONTROLLER}" if loop else ""
+                    if single and found.wanders[i] and _wanders_besides(found, offer):
+                        besides = f", and {_WALK}"
+                    told.append(_sentence(where, gain, offer, besides))
     return tuple(told)
 
 
@@ -81,12 +87,38 @@ def _deviations(found: Found, change: ComplexArray) -> Array:
     return np.asarray(np.sqrt(np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)))
 
 
-def _sentence(where: str, gain: str, slope: float, step: float, unit: str, besides: str) -> str:
+def _offer(slope: float, step: float, unit: str) -> tuple[str, str, str]:
+    """The slope in words, then lines of a spec: its clock, and an integrator."""
+    plant = (
+        f"plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, continuous: {{numerator: [K], "
+        "denominator: [1, 0], delay: L}, sample: zoh}"
+    )
+    return f"{slope:.4g} per {unit} for an input of one", clock_of(step, unit), plant
+
+
+def _wanders_besides(found: Found, offer: tuple[str, str, str]) -> bool:
+    """Whether noise that integrates explains the record better, by BIC, beside the integrator itself."""
+    u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
+    criteria = []
+    for noise in ("noise: {variance: 1}", _WALK):
+        lines = [*offer[1].split(", "), offer[2], noise]
+        model = build_model(parse_spec("\n".join(lines), design=False))
+        try:
+            estimate = identify(model, u, y, lengths=[len(part) for _, part in found.used], rest=False)
+        except SpecError:
+            criteria.append(np.inf)
+            continue
+        size = estimate.theta.size * np.log(len(y))
+        criteria.append(len(y) * float(np.log(estimate.noise[0, 0])) + float(size))
+    return bool(criteria[1] < criteria[0])
+
+
+def _sentence(where: str, gain: str, offer: tuple[str, str, str], besides: str) -> str:
+    slope, clock, plant = offer
     sort = "an integrator" if not where else "a matrix with an integrator there"
     return (
         f"the plant{where} cannot be told from an integrator (its static gain is {gain}): no time constant "
-        f"follows from this record, only the slope, {slope:.4g} per {unit} for an input of one. Record until "
+        f"follows from this record, only the slope, {slope}. Record until "
         f"the output settles; or, if it never does, identify {sort}: idesign identify DATA --spec SPEC, in "
-        f"SPEC {clock_of(step, unit)} and plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, "
-        f"continuous: {{numerator: [K], denominator: [1, 0], delay: L}}, sample: zoh}}{besides}"
+        f"SPEC {clock} and {plant}{besides}"
     )

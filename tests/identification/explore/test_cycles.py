@@ -8,6 +8,7 @@ from inputdesign_cli.identification.explore.cycles import _modes, _residues, own
 from inputdesign_cli.plant import PolynomialModel
 
 SAMPLES, PERIOD = 400, 100.0
+NOISE = 1e-4 * np.eye(1)
 
 
 def output_error(*terms):
@@ -35,7 +36,7 @@ def test_a_cycle_that_zeros_hide_from_the_input_is_told_with_its_period(losing):
     lag = (0.15, 0.92)
     parts = [record(output_error(lag), cycle=0.8)]
     # Nearly a common factor: from the input the mode has next to nothing.
-    (cycle,) = _modes(output_error(lag, (1e-4, mode(losing))), parts)
+    (cycle,) = _modes(output_error(lag, (1e-4, mode(losing))), parts, NOISE)
     assert (cycle.output, cycle.is_mode) == (0, True)
     np.testing.assert_allclose(cycle.period, PERIOD, rtol=1e-3)
 
@@ -43,20 +44,20 @@ def test_a_cycle_that_zeros_hide_from_the_input_is_told_with_its_period(losing):
 @pytest.mark.parametrize("losing", [0.02, 1.5, 4.0])
 def test_a_mode_that_inputs_move_is_no_cycle(losing):
     model = output_error((0.15, 0.92), (0.05 + 0.02j, mode(losing)))
-    assert _modes(model, [record(model)]) == []
+    assert _modes(model, [record(model)], NOISE) == []
     # Two records of one plant, and a cycle that is small beside what the input does.
-    assert _modes(model, [record(model, cycle=0.05), record(model)]) == []
+    assert _modes(model, [record(model, cycle=0.05), record(model)], NOISE) == []
 
 
 def test_a_cycle_that_dies_out_within_the_record_is_not_one():
     model = output_error((0.15, 0.92), (1e-4, mode(6.0)))
-    assert _modes(model, [record(output_error((0.15, 0.92)), cycle=0.8)]) == []
+    assert _modes(model, [record(output_error((0.15, 0.92)), cycle=0.8)], NOISE) == []
 
 
 def test_plants_without_ringing_have_no_cycle():
     parts = [record(output_error((0.15, 0.92)), cycle=0.8)]
-    assert _modes(output_error((0.15, 0.92)), parts) == []
-    assert _modes(output_error((0.15, 0.92), (0.1, -0.999)), parts) == []
+    assert _modes(output_error((0.15, 0.92)), parts, NOISE) == []
+    assert _modes(output_error((0.15, 0.92), (0.1, -0.999)), parts, NOISE) == []
 
 
 @pytest.mark.parametrize("index", range(3))
@@ -97,3 +98,14 @@ def test_noise_alone_seldom_has_a_line():
         y = model.simulate(u, np.zeros(u.shape), 1.0)[0] + e
         found += bool(own_cycles(model, [(u, y)], 1e-3 * np.eye(2), np.eye(1)))
     assert found == 0
+
+
+def test_of_two_outputs_the_one_with_the_cycle_is_told():
+    lag, cycling = output_error((0.15, 0.92)), output_error((0.15, 0.92), (1e-4, mode()))
+    u, y = record(output_error((0.15, 0.92)), cycle=0.8)
+    still = lag.simulate(u - u.mean(), np.zeros(u.shape), 1.0)[0]
+    both = PolynomialModel(
+        (*lag.B, *cycling.B), (np.ones(1),), (*lag.F, *cycling.F), (np.ones(1),), (np.ones(1),), np.eye(2)
+    )
+    (found,) = _modes(both, [(u, np.concatenate([still, y], axis=1))], 1e-4 * np.eye(2))
+    assert found.output == 1
