@@ -22,11 +22,12 @@ def is_stable(monic: Array) -> NDArray[np.bool_]:
     """
     stable = np.ones(monic.shape[0], dtype=bool)
     p = monic
-    while p.shape[1] > 1:
-        last = p[:, -1:]
-        stable &= np.abs(last[:, 0]) < 1.0 - _ON_THE_CIRCLE
-        room = np.where(np.abs(last) < 1.0, 1.0 - last**2, 1.0)
-        p = ((p - last * p[:, ::-1]) / room)[:, :-1]
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond a coefficient that is too large already
+        while p.shape[1] > 1:
+            last = p[:, -1:]
+            stable &= np.abs(last[:, 0]) < 1.0 - _ON_THE_CIRCLE
+            room = np.where(np.abs(last) < 1.0, 1.0 - last**2, 1.0)
+            p = ((p - last * p[:, ::-1]) / room)[:, :-1]
     return stable
 
 

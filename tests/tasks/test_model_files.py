@@ -9,6 +9,7 @@ import yaml
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import identify as identify_model
+from inputdesign_cli.specification import is_prior
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_model
 from inputdesign_cli.tasks.result.estimates import model_text
@@ -135,3 +136,14 @@ def test_a_covariance_that_is_singular_to_rounding_is_no_prior(model, tmp_path):
         solve(parse_spec(STRUCTURE + ASKED.replace("\nexperiment: {samples: 200}\n", PRIOR), folder=tmp_path))
     (found,) = caught.value.diagnostics
     assert (found.code, found.key) == ("bad-model-file", "experiment.prior.information")
+
+
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1e6, 1e-9), (1e-7, 1e7)])
+def test_units_of_the_parameters_leave_a_covariance_a_prior(units):
+    """Its eigenvalues may differ by any power of ten; those of correlations do not."""
+    scale = np.array([units[1] / units[0], 1.0])
+    covariance = np.array([[1.0, 0.98], [0.98, 1.0]]) * np.outer(scale, scale)
+    assert is_prior({"b1": 1.0, "f1": 0.5}, covariance.tolist())
+    covariance[0, 1] = covariance[1, 0] = 1.02 * scale[0]
+    assert not is_prior({"b1": 1.0, "f1": 0.5}, covariance.tolist())
+    assert not is_prior({"b1": 1.0, "f1": 0.5}, [[1e-300, 1e300], [1e300, 1e-300]])

@@ -1,6 +1,7 @@
 """A log whose output wanders as a random walk does, beside the steps of its input."""
 
 import numpy as np
+import pytest
 
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks import explore, solve
@@ -29,3 +30,26 @@ def test_the_plant_is_told_and_the_next_experiment_heeds_the_walk(tmp_path):
     deviation = found["standard_deviation"]
     for name, truth in (("K", GAIN), ("T", LAG), ("L", LATE)):
         assert abs(found["theta"][name] - truth) < 4.0 * deviation[name], name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("period", "size", "held"), [(160, 0.8, 20), (240, 0.3, 20), (120, 0.8, 8), (96, 0.5, 8), (160, 0.5, 8)]
+)
+def test_a_daily_cycle_earns_no_trust_where_it_moves_the_gain(tmp_path, period, size, held):
+    """Beside a PRBS. Noise with poles on the circle explains it; modes of the plant, or a walk, do not."""
+    rng = np.random.default_rng(period)
+    u = np.repeat(rng.choice([-1.0, 1.0], 480 // held), held)
+    y = (
+        lagged(u)
+        + size * np.sin(2.0 * np.pi * np.arange(480) / period + 1.0)
+        + 0.05 * rng.standard_normal(480)
+    )
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([np.arange(480), u, y]), delimiter=",", header="time,u,y", comments="")
+    done = explore([log], Preparation())
+    theta = done.results.result["identification"]["theta"]
+    sums = {letter: sum(x for name, x in theta.items() if name[0] == letter) for letter in "baf"}
+    gain = theta.get("K", sums["b"] / (1.0 + sums["a"] + sums["f"]))
+    told = [reason for reason in done.reasons if "cycle" in reason or "wanders, and not" in reason]
+    assert told or abs(gain - GAIN) < 0.1 * GAIN

@@ -7,7 +7,7 @@ few parameters. Where they refute all, the noise of the simplest is filtered if 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.orders import Orders
@@ -131,6 +131,14 @@ class Chosen:
     def best_of(self, *, physical: bool) -> Candidate | None:
         """The best with parameters of that kind among those that are about as good as any."""
         return next((c for c in self.finalists if c.orders.physical == physical), None)
+
+    def with_filtered_noise(self, plain: Candidate, order: int) -> Candidate:
+        """The candidate with the plant of one whose noise is white, and a filter of that order; or itself."""
+        if plain.orders.coloured:
+            return plain
+        shape = plain.orders.with_coloured_noise()[order]
+        same = (c for c in self.candidates if replace(c.orders, delays=shape.delays) == shape)
+        return next(same, plain)
 
 
 def with_noise(plain: Sequence[Candidate]) -> list[Shape]:

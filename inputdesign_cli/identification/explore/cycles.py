@@ -2,7 +2,7 @@
 
 A model takes them for a mode of the plant: without damping, hardly moved by the inputs and set in motion by
 the unknown state at the start, it explains any sinusoid. A ringing of the plant, begun before the record,
-looks alike: the record does not tell. Or they are left, and move the parameters.
+looks alike, but for its damping, which the record tells. Or they are left, and move the parameters.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ _DECAYS, _LEAST_TURN = 3.0, np.pi
 # What a mode does from the start is that much of what the inputs make of it; its squares, in units of the
 # variance of the noise, are beyond chance.
 _OF_ITSELF, _SEEN = 0.5, 20.0
+# Its damping is told from none by so many deviations; of fewer turns no share tells anything.
+_DAMPED, _FEW_TURNS = 10.0, 2.0
+_STEP = 1e-6
 # Of a circle about poles, on which G is as smooth as it is far from others.
 _POINTS, _HALF = 64, 0.5
 _DEPENDENT = 1e-9
@@ -54,7 +57,7 @@ def own_cycles(model: Model, parts: Parts, factor: Array, noise: Array) -> list[
     Raises:
         TypeError: see `output_error_form`.
     """
-    modes = _modes(model, parts, noise)
+    modes = _modes(model, parts, factor, noise)
     taken = {one.output for one in modes}
     return modes + [one for one in _left(model, parts, factor, noise) if one.output not in taken]
 
@@ -111,24 +114,50 @@ def _windowed(x: Array) -> Array:
     return np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2
 
 
-def _modes(model: Model, parts: Parts, noise: Array) -> list[Cycle]:
-    """Modes that go on by themselves rather than by what the inputs do."""
+def _modes(model: Model, parts: Parts, factor: Array, noise: Array) -> list[Cycle]:
+    """Modes that go on by themselves rather than by what the inputs do, without a damping that is told."""
     plant = output_error_form(model)
-    # Poles of a stable plant on and above the real axis, those of a pair once.
-    upper = np.unique(np.exp(1j * plant.singularities.real - plant.singularities.imag))
+    upper = _poles(plant)
     longest = max(len(y) for _, y in parts)
-    turns, decays = np.angle(upper) * longest, -np.log(np.abs(upper)) * longest
+    turns, decays = np.angle(upper) * longest, _damping(upper) * longest
     told = []
     for pole in upper[(turns > _LEAST_TURN) & (np.angle(upper) < np.pi) & (decays < _DECAYS)]:
+        if _damping(pole) > _DAMPED * _deviation_of_damping(model, pole, factor):
+            continue
         moved, free = np.zeros((2, model.outputs))
         for u, y in parts:
             by_inputs, by_start = _of_mode(plant, pole, upper, u - u.mean(axis=0), y)
             moved += np.sum(by_inputs**2, axis=0)
             free += np.sum(by_start**2, axis=0)
         period = float(2.0 * np.pi / np.angle(pole))
-        going = np.flatnonzero(free > np.maximum(_OF_ITSELF**2 * moved, _SEEN * np.diag(noise)))
+        few = np.angle(pole) * longest < 2.0 * np.pi * _FEW_TURNS
+        share = np.where(few & (moved > _SEEN * np.diag(noise)), np.inf, free / np.maximum(moved, 1e-300))
+        going = np.flatnonzero((share > _OF_ITSELF**2) & (free > _SEEN * np.diag(noise)))
         told += [Cycle(int(i), period, is_mode=True) for i in going]
     return told
+
+
+def _poles(plant: Model) -> ComplexArray:
+    """Poles of a stable plant on and above the real axis, those of a pair once."""
+    return np.asarray(np.unique(np.exp(1j * plant.singularities.real - plant.singularities.imag)))
+
+
+def _damping(poles: ComplexArray) -> Array:
+    """Nepers per sample."""
+    return -np.log(np.abs(poles))
+
+
+def _deviation_of_damping(model: Model, pole: complex, factor: Array) -> float:
+    """The standard deviation of the damping of a mode, by differences; infinite where it has no slope."""
+    slope = np.zeros(model.theta.size)
+    for k, value in enumerate(model.theta):
+        away = _STEP * max(abs(float(value)), _STEP) * np.eye(slope.size)[k]
+        ends = []
+        for theta in (model.theta + away, model.theta - away):
+            poles = _poles(output_error_form(model.at(theta, model.covariance)))
+            ends.append(float(_damping(poles[np.argmin(np.abs(poles - pole))])))
+        slope[k] = (ends[0] - ends[1]) / (2.0 * away[k])
+    return float(np.linalg.norm(scipy.linalg.solve_triangular(factor, slope, lower=True)))
 
 
 def _of_mode(plant: Model, pole: complex, upper: ComplexArray, u: Array, y: Array) -> tuple[Array, Array]:

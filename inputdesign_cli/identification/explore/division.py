@@ -10,9 +10,23 @@ import numpy as np
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.plant.polynomial import Array
 
-Split = Literal["the first 60 % and the rest", "blocks in turn", "none"]
+Cut = Literal[
+    "the first 60 % and the rest",
+    "the first 50 % and the rest",
+    "the first 40 % and the rest",
+    "the first 70 % and the rest",
+    "the first 30 % and the rest",
+]
+Split = Cut | Literal["blocks in turn", "none"]
 
-_SHARE = 0.6
+# Where an input rests beyond one cut, another may leave steps on either side, with what comes after them.
+_CUTS: tuple[tuple[float, Cut], ...] = (
+    (0.6, "the first 60 % and the rest"),
+    (0.5, "the first 50 % and the rest"),
+    (0.4, "the first 40 % and the rest"),
+    (0.7, "the first 70 % and the rest"),
+    (0.3, "the first 30 % and the rest"),
+)
 # Where an input steps in blocks of one kind only, fewer or more of them may part its steps.
 _BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
 # An input whose rms about its level is less than this share of that in all records rests.
@@ -22,7 +36,8 @@ _STILL = 0.2
 def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
     """What estimates and what judges: beginning and end of the records.
 
-    Blocks in turn where an input rests in one of these; the whole twice where it does so in any blocks.
+    Blocks in turn where an input rests in one of these wherever they are parted; the whole twice where it
+    does so in any blocks.
     """
     for first, second, split in _divisions(parts):
         if _moves(first, parts) and _moves(second, parts):
@@ -32,16 +47,8 @@ def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
 
 def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, Split]]:
     total = sum(len(y) for _, y in parts)
-    first: list[tuple[Array, Array]] = []
-    second: list[tuple[Array, Array]] = []
-    left = int(_SHARE * total)
-    for u, y in parts:
-        at = min(max(left, 0), len(y))
-        left -= len(y)
-        for some, piece in ((first, slice(0, at)), (second, slice(at, None))):
-            if len(y[piece]):
-                some.append((u[piece], y[piece]))
-    yield first, second, "the first 60 % and the rest"
+    for share, cut in _CUTS:
+        yield *_cut(parts, int(share * total)), cut
     for count in _BLOCKS:
         length = max(total // count, 1)
         blocks = [
@@ -51,6 +58,19 @@ def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, Split]]:
             if len(y) - begin >= length // 2
         ]
         yield blocks[::2], blocks[1::2], "blocks in turn"
+
+
+def _cut(parts: Parts, left: int) -> tuple[Parts, Parts]:
+    """The first samples of the records, so many in all, and the others."""
+    first: list[tuple[Array, Array]] = []
+    second: list[tuple[Array, Array]] = []
+    for u, y in parts:
+        at = min(max(left, 0), len(y))
+        left -= len(y)
+        for some, piece in ((first, slice(0, at)), (second, slice(at, None))):
+            if len(y[piece]):
+                some.append((u[piece], y[piece]))
+    return first, second
 
 
 def _moves(some: Parts, whole: Parts) -> bool:

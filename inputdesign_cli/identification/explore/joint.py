@@ -26,6 +26,7 @@ from inputdesign_cli.identification.explore.fits import (
     percent,
 )
 from inputdesign_cli.identification.explore.integrated import integrating
+from inputdesign_cli.identification.explore.orders import NOISE_ORDERS
 from inputdesign_cli.identification.explore.search import explore_structure
 from inputdesign_cli.identification.explore.together import joined
 from inputdesign_cli.plant import Model
@@ -214,7 +215,8 @@ def _estimated(
         elif output_error_form(made[2]).radius < 1.0:
             edge.append(made)
     if steady:
-        return min(steady, key=lambda made: criterion(*made[:2]))
+        best = min(steady, key=lambda made: criterion(*made[:2]))
+        return best if feedback or any(wanders) else _with_noise(found, best, used, ramp)
     if edge:
         return edge[0]
     raise reason or bad_spec(
@@ -223,6 +225,30 @@ def _estimated(
         hint="record it in a loop, or remove the drift: --detrend linear",
         key="y",
     )
+
+
+def _with_noise(found: Sequence[Chosen], made: _Together, used: Parts, ramp: bool) -> _Together:
+    """The same plants with filtered noise where the whole record refuses the noise, and that is likelier.
+
+    A part of the record may be too short to tell the colour of the noise.
+    """
+    taken, estimate, model = made
+    refused = {test.output for test in estimate.failed if test.fault == "noise"}
+    tried = [made]
+    for order in range(len(NOISE_ORDERS)):
+        filtered = tuple(
+            chosen.with_filtered_noise(own, order) if i in refused else own
+            for i, (chosen, own) in enumerate(zip(found, taken, strict=True))
+        )
+        if all(one is own for one, own in zip(filtered, taken, strict=True)):
+            continue
+        try:
+            other = _together(filtered, used, False, ramp, (False,) * model.outputs)
+        except NOT_COMPUTED:
+            continue
+        if other[1].converged and is_steady(other[2], len(estimate.errors)):
+            tried.append(other)
+    return min(tried, key=lambda one: criterion(*one[:2]))
 
 
 def _together(

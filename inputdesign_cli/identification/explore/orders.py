@@ -14,6 +14,9 @@ from inputdesign_cli.identification.records import longest
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
+NOISE_ORDERS = (1, 2)
+"""Those of C and D that are tried."""
+
 
 @dataclass(frozen=True)
 class Orders:
@@ -79,7 +82,7 @@ class Orders:
 
     def with_coloured_noise(self) -> list[Orders]:
         """A plant of the same orders, Box and Jenkins's noise."""
-        return [Orders("BJ", self.delays, self.b, c=n, d=n, f=self.order) for n in (1, 2)]
+        return [Orders("BJ", self.delays, self.b, c=n, d=n, f=self.order) for n in NOISE_ORDERS]
 
     def model(self) -> PolynomialModel:
         """The structure, with numbers that mean nothing."""

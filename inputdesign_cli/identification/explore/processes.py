@@ -14,6 +14,7 @@ import numpy as np
 
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.explore.orders import NOISE_ORDERS
 from inputdesign_cli.identification.explore.regression import SharedDenominator, numerators
 from inputdesign_cli.plant import (
     Coloured,
@@ -152,7 +153,7 @@ class Process:
 
     def with_coloured_noise(self) -> list[Process]:
         """The same plant, the noise filtered."""
-        return [replace(self, noise=n) for n in (1, 2)]
+        return [replace(self, noise=n) for n in NOISE_ORDERS]
 
     def model(self) -> Reparametrised:
         """The structure, with numbers that mean nothing."""

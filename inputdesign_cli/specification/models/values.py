@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.specification.models.path_diagnostic import fail
 from inputdesign_cli.specification.models.polynomials import Polynomial, product
@@ -112,14 +113,22 @@ def semidefinite(rows: Matrix) -> Matrix:
 
 
 def positive_definite(rows: Matrix) -> Matrix:
-    """A covariance matrix has positive eigenvalues."""
-    if _smallest_eigenvalue(rows) <= 0.0:
+    """A covariance matrix has positive eigenvalues, in whatever units: so has that of correlations."""
+    values = np.array(rows)
+    variances = np.diag(values)
+    if np.any(variances <= 0.0) or not _has_positive_correlations(values, np.sqrt(variances)):
         raise fail(
             "not-positive-definite",
             "{key} is not a covariance matrix: it must be positive definite",
             "each variance must be positive, and each covariance below the geometric mean of its variances",
         )
     return rows
+
+
+def _has_positive_correlations(values: NDArray[np.float64], deviations: NDArray[np.float64]) -> bool:
+    with np.errstate(over="ignore"):
+        correlations = values / deviations / deviations[:, None]
+    return bool(np.all(np.isfinite(correlations)) and np.linalg.eigvalsh(correlations)[0] > 0.0)
 
 
 def _smallest_eigenvalue(rows: Matrix) -> float:

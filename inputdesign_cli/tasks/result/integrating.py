@@ -46,7 +46,7 @@ def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tup
                     gain = f"{size[0]:.3g} +- {deviations[0]:.1g}"
                     offer = _offer(_slope(G[at, i, j], w[at], step), step, unit)
                     besides = f", and {CONTROLLER}" if loop else ""
-                    if single and found.wanders[i] and _wanders_besides(found, offer):
+                    if single and not loop and _wanders_besides(found, offer):
                         besides = f", and {_WALK}"
                     told.append(_sentence(where, gain, offer, besides))
     return tuple(told)

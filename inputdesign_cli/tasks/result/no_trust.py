@@ -19,6 +19,7 @@ from inputdesign_cli.identification.explore import (
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.at_once import like_inverses
 from inputdesign_cli.tasks.result.integrating import CONTROLLER, clock_of, like_integrators
+from inputdesign_cli.tasks.result.refutations import chance
 from inputdesign_cli.tasks.result.unidentified import rivalled, unidentified
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing, late_inputs
 
@@ -33,6 +34,8 @@ _UNSTEADY = (
     "integrator, or from drift. Record in a loop or until the output settles, or remove the drift: --detrend "
     "linear"
 )
+# By chance so seldom, noise that wanders has another colour than that of its model.
+_ANOTHER_WALK = 1e-6
 _KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
@@ -60,7 +63,7 @@ def distrusted(
         *(_idle(found) or _unrelated(found)),
         *_refuted(found),
         *_interpolated(log),
-        *_cycling(found, log),
+        *(_cycling(found, log) or _wandering_otherwise(found)),
         *rising,
         *unseen,
         *rivalled(found),
@@ -163,6 +166,23 @@ def _cycling(found: Found, log: Log) -> tuple[str, ...]:
             "more input, or record while it rests"
         )
     return tuple(told)
+
+
+def _wandering_otherwise(found: Found) -> tuple[str, ...]:
+    """Outputs that wander, but not as random walks do: by the noise model slow moves count."""
+    otherwise = {
+        test.output: test.probability
+        for test in found.estimate.failed
+        if test.fault == "noise" and test.probability < _ANOTHER_WALK
+    }
+    return tuple(
+        f"{signal_name('y', i, found.model.outputs)} wanders, and not as a random walk does (residuals "
+        f"explain each other, probability {chance(otherwise[i])}): what slow moves tell of the gain rests on "
+        "that, so that it may be off by more than is said; log what else acts on the output, or record for "
+        "longer"
+        for i in np.flatnonzero(found.wanders).tolist()
+        if i in otherwise
+    )
 
 
 def _refuted(found: Found) -> tuple[str, ...]:

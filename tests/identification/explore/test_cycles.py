@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore.cycles import _modes, _residues, own_cycles
 from inputdesign_cli.plant import PolynomialModel
 
 SAMPLES, PERIOD = 400, 100.0
 NOISE = 1e-4 * np.eye(1)
+LITTLE = np.eye(6)  # so little is known that no damping is told from none
 
 
 def output_error(*terms):
@@ -36,7 +38,7 @@ def test_a_cycle_that_zeros_hide_from_the_input_is_told_with_its_period(losing):
     lag = (0.15, 0.92)
     parts = [record(output_error(lag), cycle=0.8)]
     # Nearly a common factor: from the input the mode has next to nothing.
-    (cycle,) = _modes(output_error(lag, (1e-4, mode(losing))), parts, NOISE)
+    (cycle,) = _modes(output_error(lag, (1e-4, mode(losing))), parts, LITTLE, NOISE)
     assert (cycle.output, cycle.is_mode) == (0, True)
     np.testing.assert_allclose(cycle.period, PERIOD, rtol=1e-3)
 
@@ -44,20 +46,20 @@ def test_a_cycle_that_zeros_hide_from_the_input_is_told_with_its_period(losing):
 @pytest.mark.parametrize("losing", [0.02, 1.5, 4.0])
 def test_a_mode_that_inputs_move_is_no_cycle(losing):
     model = output_error((0.15, 0.92), (0.05 + 0.02j, mode(losing)))
-    assert _modes(model, [record(model)], NOISE) == []
+    assert _modes(model, [record(model)], LITTLE, NOISE) == []
     # Two records of one plant, and a cycle that is small beside what the input does.
-    assert _modes(model, [record(model, cycle=0.05), record(model)], NOISE) == []
+    assert _modes(model, [record(model, cycle=0.05), record(model)], LITTLE, NOISE) == []
 
 
 def test_a_cycle_that_dies_out_within_the_record_is_not_one():
     model = output_error((0.15, 0.92), (1e-4, mode(6.0)))
-    assert _modes(model, [record(output_error((0.15, 0.92)), cycle=0.8)], NOISE) == []
+    assert _modes(model, [record(output_error((0.15, 0.92)), cycle=0.8)], LITTLE, NOISE) == []
 
 
 def test_plants_without_ringing_have_no_cycle():
     parts = [record(output_error((0.15, 0.92)), cycle=0.8)]
-    assert _modes(output_error((0.15, 0.92)), parts, NOISE) == []
-    assert _modes(output_error((0.15, 0.92), (0.1, -0.999)), parts, NOISE) == []
+    assert _modes(output_error((0.15, 0.92)), parts, LITTLE, NOISE) == []
+    assert _modes(output_error((0.15, 0.92), (0.1, -0.999)), parts, LITTLE, NOISE) == []
 
 
 @pytest.mark.parametrize("index", range(3))
@@ -107,5 +109,22 @@ def test_of_two_outputs_the_one_with_the_cycle_is_told():
     both = PolynomialModel(
         (*lag.B, *cycling.B), (np.ones(1),), (*lag.F, *cycling.F), (np.ones(1),), (np.ones(1),), np.eye(2)
     )
-    (found,) = _modes(both, [(u, np.concatenate([still, y], axis=1))], 1e-4 * np.eye(2))
+    (found,) = _modes(both, [(u, np.concatenate([still, y], axis=1))], np.eye(8), 1e-4 * np.eye(2))
     assert found.output == 1
+
+
+@pytest.mark.parametrize("damping", [0.002, 0.01])
+def test_a_plant_that_rings_from_before_the_record_is_told_by_its_damping(damping):
+    """The start makes more of the mode than the inputs do, and the record tells what it loses."""
+    w, samples = 0.3, 300
+    pole = np.exp(-damping * w + 1j * w)
+    F = np.real(np.poly([pole, np.conj(pole)]))
+    model = PolynomialModel.single([0.0, 0.5 * F.sum(), 0.5 * F.sum()], F=F)
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], samples // 5), 5)[:, None]
+    ringing = 20.0 * np.real(pole ** np.arange(samples))[:, None]
+    y = model.simulate(u, 0.1 * rng.standard_normal(u.shape), 1.0)[0] + ringing
+    y += 0.1 * rng.standard_normal(y.shape)
+    estimate = identify(model, u, y, rest=False)
+    found = model.at(estimate.theta, estimate.noise)
+    assert own_cycles(found, [(u, y)], estimate.factor, estimate.noise) == []
