@@ -37,7 +37,8 @@ accurate as asked, with a verdict on the data. Computing takes less than a minut
 long as heating takes.
 
 `python docs/make_tutorial.py` runs the commands below and writes this page; a test runs it. The log is real
-([its origin](data/README.md)). The two experiments are played: by an energy balance of the board
+([its origin](data/README.md)): `docs/data/tclab/two_heaters.txt`; run the commands in a folder with a
+copy of it. The two experiments are played: by an energy balance of the board
 (convection, radiation, the sensor's lag) that is fitted to the log, with the noise of the log. The tool
 sees the data only.
 

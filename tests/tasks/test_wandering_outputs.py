@@ -5,6 +5,7 @@ import pytest
 
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks import explore, solve
+from inputdesign_cli.tasks.build.exploration import _inside
 from inputdesign_cli.tasks.build.preparation import Preparation
 from tests.identification.explore.test_integrated import GAIN, LAG, LATE, lagged, steps, walk
 
@@ -53,3 +54,26 @@ def test_a_daily_cycle_earns_no_trust_where_it_moves_the_gain(tmp_path, period, 
     gain = theta.get("K", sums["b"] / (1.0 + sums["a"] + sums["f"]))
     told = [reason for reason in done.reasons if "cycle" in reason or "wanders, and not" in reason]
     assert told or abs(gain - GAIN) < 0.1 * GAIN
+    if not done.reasons:
+        spec = parse_spec(done.results.resolved_spec, overrides=["signal=null", "spectrum.order=5"])
+        assert solve(spec).result["status"] == "optimal"
+
+
+@pytest.mark.parametrize("radius", [1.0, 1.0 - 1e-9, 0.9995, 0.99, 0.5])
+def test_the_noise_of_the_next_experiment_fades_as_fast_as_the_record_tells(radius):
+    """Estimates may have poles of the noise on the circle: there, information has no end."""
+    D = np.real(np.poly([radius * np.exp(0.04j), radius * np.exp(-0.04j), 0.3])).tolist()
+    noise = {"C": [1.0, -0.2], "D": D, "variance": 2.0, "drift": False}
+    inside, drawn = _inside(noise, 200)
+    roots = np.abs(np.roots(inside["D"]))
+    assert roots.max() <= 1.0 - 1.0 / 200 + 1e-12
+    if radius < 0.995:
+        assert (inside, drawn) == (noise, [])
+    else:
+        assert drawn == ["D"]
+        assert {**inside, "D": D} == noise
+        # Frequencies stay; a root is moved by a two-hundredth at most.
+        np.testing.assert_allclose(np.angle(np.roots(inside["D"])[:2]), np.angle(np.roots(D)[:2]), atol=1e-9)
+        assert np.abs(np.sort(roots) - np.sort(np.abs(np.roots(D)))).max() <= 1.0 / 200 + 1e-12
+    several, _ = _inside({"C": [[1.0, -0.2], [1.0]], "D": [D, [1.0, -0.5]]}, 200)
+    assert several == {"C": [[1.0, -0.2], [1.0]], "D": [inside["D"], [1.0, -0.5]]}

@@ -13,6 +13,7 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
 from inputdesign_cli.identification.explore import Found, output_error_form
 from inputdesign_cli.plant import Model
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.log import Log
@@ -40,6 +41,7 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
     )
     single = len(power) == 1
     blocks = blocks_of(found.model)
+    blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
     structures = ", ".join(
         f"{'y' if found.model.outputs == 1 else f'y{i + 1}'}: {c.orders.family}"
         for i, c in enumerate(found.taken)
@@ -71,6 +73,11 @@ time_unit: {log.time_unit}
 # {names}
 """
     for key, block in blocks.items():
+        if key == "noise" and drawn:
+            text += (
+                f"# Roots of {' and '.join(drawn)} on the circle, drawn into it by one in {len(log.y)}:\n"
+                "# so many samples tell no more, and noise that never fades would count for any experiment.\n"
+            )
         text += "\n".join([f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())])
         text += "\n"
     text += f"""
@@ -90,6 +97,28 @@ spectrum: {{type: fir, order: 20}}
 signal: {{type: filtered_noise, seed: 1, offset: {json.dumps(offset)}}}
 """
     return text
+
+
+def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:
+    """The block with roots of C and D no nearer to the unit circle than a record of so many samples tells.
+
+    With it the letters of those that were nearer.
+    """
+    drawn = dict(noise)
+    for letter in {"C", "D"} & noise.keys():
+        rows = noise[letter]
+        several = isinstance(rows[0], list)
+        polynomials = [_contracted(row, 1.0 - 1.0 / samples) for row in (rows if several else [rows])]
+        drawn[letter] = polynomials if several else polynomials[0]
+    return drawn, sorted(letter for letter in noise if drawn[letter] != noise[letter])
+
+
+def _contracted(polynomial: Sequence[float], limit: float) -> list[float]:
+    """In q^-1, all roots scaled by one factor so that they are within a circle; as it is where they are."""
+    radius = float(np.abs(np.roots(polynomial)).max(initial=0.0))
+    if radius <= limit:
+        return list(polynomial)
+    return [float(c * (limit / radius) ** k) for k, c in enumerate(polynomial)]
 
 
 def _numbers(values: Sequence[float]) -> str:
