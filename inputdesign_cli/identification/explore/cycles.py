@@ -24,9 +24,10 @@ _DECAYS, _LEAST_TURN = 3.0, np.pi
 # What a mode does from the start is that much of what the inputs make of it; its squares, in units of the
 # variance of the noise, are beyond chance.
 _OF_ITSELF, _SEEN = 0.5, 20.0
-# Its damping is told from none by so many deviations; of fewer turns no share tells anything.
-_DAMPED, _FEW_TURNS = 10.0, 2.0
-_STEP = 1e-6
+# Its damping is told from none by so many deviations, and not below so many nepers over the record; of fewer
+# turns no share tells anything.
+_DAMPED, _UNDAMPED, _FEW_TURNS = 10.0, 0.01, 2.0
+_STEP = 1e-7
 # Of a circle about poles, on which G is as smooth as it is far from others.
 _POINTS, _HALF = 64, 0.5
 _DEPENDENT = 1e-9
@@ -122,7 +123,7 @@ def _modes(model: Model, parts: Parts, factor: Array, noise: Array) -> list[Cycl
     turns, decays = np.angle(upper) * longest, _damping(upper) * longest
     told = []
     for pole in upper[(turns > _LEAST_TURN) & (np.angle(upper) < np.pi) & (decays < _DECAYS)]:
-        if _damping(pole) > _DAMPED * _deviation_of_damping(model, pole, factor):
+        if _is_damped(model, pole, factor, longest):
             continue
         moved, free = np.zeros((2, model.outputs))
         for u, y in parts:
@@ -147,8 +148,11 @@ def _damping(poles: ComplexArray) -> Array:
     return -np.log(np.abs(poles))
 
 
-def _deviation_of_damping(model: Model, pole: complex, factor: Array) -> float:
-    """The standard deviation of the damping of a mode, by differences; infinite where it has no slope."""
+def _is_damped(model: Model, pole: complex, factor: Array, samples: int) -> bool:
+    """Whether the damping of a mode is told from none, its deviation by differences."""
+    damping = float(_damping(np.array(pole)))
+    if damping * samples < _UNDAMPED:  # the other side of the circle would be mirrored
+        return False
     slope = np.zeros(model.theta.size)
     for k, value in enumerate(model.theta):
         away = _STEP * max(abs(float(value)), _STEP) * np.eye(slope.size)[k]
@@ -157,7 +161,7 @@ def _deviation_of_damping(model: Model, pole: complex, factor: Array) -> float:
             poles = _poles(output_error_form(model.at(theta, model.covariance)))
             ends.append(float(_damping(poles[np.argmin(np.abs(poles - pole))])))
         slope[k] = (ends[0] - ends[1]) / (2.0 * away[k])
-    return float(np.linalg.norm(scipy.linalg.solve_triangular(factor, slope, lower=True)))
+    return damping > _DAMPED * float(np.linalg.norm(scipy.linalg.solve_triangular(factor, slope, lower=True)))
 
 
 def _of_mode(plant: Model, pole: complex, upper: ComplexArray, u: Array, y: Array) -> tuple[Array, Array]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore import Found
+from inputdesign_cli.identification.explore.fits import NOT_COMPUTED
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.system import build_model
@@ -20,7 +20,6 @@ _STATIC = 1e-6  # of the lowest frequency of a record: as good as zero
 _LATE = 0.1
 # Without it, what is fed back would be taken for what the model lacks.
 CONTROLLER = "the controller as it was, experiment: {controller: {numerator: [..], denominator: [..]}}"
-
 # What wanders beside an integrator would be taken for its own doing.
 _WALK = "noise: {variance: 1, C: [1, -0.1], drift: true}"
 
@@ -105,7 +104,7 @@ def _wanders_besides(found: Found, offer: tuple[str, str, str]) -> bool:
         model = build_model(parse_spec("\n".join(lines), design=False))
         try:
             estimate = identify(model, u, y, lengths=[len(part) for _, part in found.used], rest=False)
-        except SpecError:
+        except NOT_COMPUTED:
             criteria.append(np.inf)
             continue
         size = estimate.theta.size * np.log(len(y))
