@@ -11,7 +11,7 @@ import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LONGEST = 500
+_REMEMBERED = 64  # sets of expressions, as a search asks for one at many points
 _SHOWN = 60  # of what is made of expressions and longer
 CONSTANTS = {"pi": math.pi}
 
@@ -47,13 +48,6 @@ class ExpressionError(ValueError):
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
         self.message, self.hint = message, hint
-
-
-class _Dual(NamedTuple):
-    """A value and its slope (m,) in all parameters."""
-
-    value: float
-    slope: Array
 
 
 class Step(NamedTuple):
@@ -133,17 +127,66 @@ class Expression:
         Raises:
             KeyError: a name is not among the symbols.
         """
-        slopes, zero = np.eye(len(symbols)), np.zeros(len(symbols))
-        known = {symbol: _Dual(float(values[i]), slopes[i]) for i, symbol in enumerate(symbols)}
-        found: list[_Dual] = []
-        try:
-            # What leaves the range of numbers is seen in the result.
-            with np.errstate(all="ignore"):
-                for step in self.steps:
-                    found.append(_evaluated(step, [found[i] for i in step.operands], known, zero))
-        except (ArithmeticError, ValueError):
-            return math.nan, np.full(len(symbols), np.nan)
-        return found[-1].value, found[-1].slope
+        here = evaluated((self,), symbols, values)
+        return float(here.values[0]), here.gradients[0]
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """K expressions in m parameters at one point; not a number where one is not defined there."""
+
+    _steps: tuple[Step, ...]
+    _places: tuple[int, ...]
+    _found: tuple[_Local | None, ...]
+    _known: Mapping[str, int]
+
+    @cached_property
+    def values(self) -> Array:
+        """(K,)."""
+        ends = [self._found[place] for place in self._places]
+        return np.array([math.nan if end is None else end.value for end in ends])
+
+    @cached_property
+    def gradients(self) -> Array:
+        """(K, m)."""
+        unit, slopes = np.eye(len(self._known)), list[Array | None]()
+        # What leaves the range of numbers is seen in the result.
+        with np.errstate(all="ignore"):
+            for step, local in zip(self._steps, self._found, strict=True):
+                slopes.append(unit[self._known[str(step.value)]] if step.operation == "name" else None)
+                if local is not None:
+                    for partial, operand in zip(local.slopes, step.operands, strict=True):
+                        own = slopes[operand]
+                        if own is not None:
+                            sofar = slopes[-1]
+                            slopes[-1] = partial * own if sofar is None else sofar + partial * own
+        rows = []
+        for place in self._places:
+            own = np.zeros(len(unit)) if (found := slopes[place]) is None else found
+            rows.append(np.full(len(unit), np.nan) if self._found[place] is None else own)
+        return np.array(rows).reshape(len(rows), len(unit))
+
+
+def evaluated(expressions: tuple[Expression, ...], symbols: Sequence[str], values: Array) -> Evaluated:
+    """What expressions are worth where `symbols` have `values` (m,); what they share is worked out once.
+
+    Raises:
+        KeyError: a name is not among the symbols.
+    """
+    steps, places = _together(expressions)
+    known = {symbol: i for i, symbol in enumerate(symbols)}
+    found: list[_Local | None] = []
+    for step in steps:
+        found.append(_local(step, [found[i] for i in step.operands], known, values))
+    return Evaluated(steps, places, tuple(found), known)
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _together(expressions: tuple[Expression, ...]) -> tuple[tuple[Step, ...], tuple[int, ...]]:
+    """All steps of expressions, none of them twice, and where each ends."""
+    table = _Table()
+    places = tuple(table.include(one) for one in expressions)
+    return table.steps, places
 
 
 class _Table:
@@ -162,6 +205,11 @@ class _Table:
         for step in expression.steps:
             places.append(self.add(step._replace(operands=tuple(places[i] for i in step.operands))))
         return places[-1]
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """All of them, each after those that it works on."""
+        return tuple(self._places)
 
     def expression(self, place: int, text: str) -> Expression:
         """That whose last step stands at the place, without steps that it does not need."""
@@ -273,39 +321,54 @@ def _read(tree: ast.expr) -> tuple[Step, ...]:
 _SIGNS: dict[type[ast.AST], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 
 
-def _evaluated(step: Step, operands: Sequence[_Dual], known: Mapping[str, _Dual], zero: Array) -> _Dual:
-    match step.operation, operands:
-        case "number", _:
-            return _Dual(float(step.value), zero)
-        case "name", _:
-            return known[str(step.value)]
-        case "negative", [a]:
-            return _Dual(-a.value, -a.slope)
-        case name, [a]:
-            value, slope = FUNCTIONS[name]
+class _Local(NamedTuple):
+    """A value, its slopes in what it was made of, and whether it depends on a parameter."""
+
+    value: float
+    slopes: tuple[float, ...]
+    varies: bool
+
+
+def _local(
+    step: Step, operands: Sequence[_Local | None], known: Mapping[str, int], values: Array
+) -> _Local | None:
+    """What a step is worth; None where that is not defined, or what it works on is not."""
+    operation = step.operation
+    if operation == "number":
+        return _Local(float(step.value), (), False)
+    if operation == "name":
+        return _Local(float(values[known[str(step.value)]]), (), True)
+    if any(operand is None for operand in operands):
+        return None
+    first, *others = [operand for operand in operands if operand is not None]
+    try:
+        if others:
+            value, *slopes = _combined(operation, first, others[0])
+        elif operation == "negative":
+            value, *slopes = -first.value, -1.0
+        else:
+            function, slope = FUNCTIONS[operation]
             # A constant has no slope, also where the function has none: sqrt(0).
-            return _Dual(value(a.value), slope(a.value) * a.slope if np.any(a.slope) else zero)
-    return _combined(step.operation, *operands)
+            value, *slopes = function(first.value), slope(first.value) if first.varies else 0.0
+    except (ArithmeticError, ValueError):
+        return None
+    return _Local(value, tuple(slopes), any(operand.varies for operand in (first, *others)))
 
 
-def _combined(sign: str, a: _Dual, b: _Dual) -> _Dual:
-    match sign:
-        case "+":
-            return _Dual(a.value + b.value, a.slope + b.slope)
-        case "-":
-            return _Dual(a.value - b.value, a.slope - b.slope)
-        case "*":
-            return _Dual(a.value * b.value, b.value * a.slope + a.value * b.slope)
-        case "/":
-            ratio = a.value / b.value
-            return _Dual(ratio, (a.slope - ratio * b.slope) / b.value)
-    power = math.pow(a.value, b.value)
-    slope = np.zeros_like(a.slope)
-    if np.any(a.slope) and b.value:
-        slope = slope + b.value * math.pow(a.value, b.value - 1.0) * a.slope
-    if np.any(b.slope):
-        slope = slope + power * math.log(a.value) * b.slope
-    return _Dual(power, slope)
+def _combined(sign: str, first: _Local, second: _Local) -> tuple[float, float, float]:
+    """The value of a sum, difference, product, ratio or power, and its slopes in both."""
+    a, b = first.value, second.value
+    if sign == "+":
+        return a + b, 1.0, 1.0
+    if sign == "-":
+        return a - b, 1.0, -1.0
+    if sign == "*":
+        return a * b, b, a
+    if sign == "/":
+        return a / b, 1.0 / b, -(a / b) / b
+    power = math.pow(a, b)
+    in_base = b * math.pow(a, b - 1.0) if first.varies and b else 0.0
+    return power, in_base, power * math.log(a) if second.varies else 0.0
 
 
 def _degree(operation: str, degrees: Sequence[int]) -> int:

@@ -45,7 +45,8 @@ class Elimination(NamedTuple):
     directions: Array
 
 
-class _Basis(NamedTuple):
+@dataclass(frozen=True)
+class _Basis:
     """What one start of N samples can explain: orthonormal directions (N + n, m + n).
 
     Attributes:
@@ -65,10 +66,16 @@ class _Basis(NamedTuple):
 
     def slope(self, start: Start) -> float:
         """The derivative of the determinant, `start` being that of the start."""
-        Z = np.zeros(self.directions.shape)
-        Z[: start.noise.shape[1]] = np.concatenate([self.by.T @ start.free, start.noise]).T
-        own = 2.0 * float(np.sum(self.directions * (Z @ self.inverse)))
-        return own - 2.0 * float(np.sum(self.span * (start.disturbance.T @ self.by)))
+        free, noise, disturbance = self._gradient
+        found = np.sum(free * start.free) + np.sum(noise * start.noise)
+        return 2.0 * float(found - np.sum(disturbance * start.disturbance))
+
+    @cached_property
+    def _gradient(self) -> tuple[Array, Array, Array]:
+        """Half the gradient of the determinant in the blocks of a start; in the last, its negative."""
+        samples, known = self.span.shape
+        of_responses = (self.directions @ self.inverse.T)[:samples].T
+        return self.by @ of_responses[:known], of_responses[known:], self.by @ self.span.T
 
 
 class _Block(NamedTuple):
@@ -247,6 +254,9 @@ def _orthonormal(start: Start) -> _Basis:
     span, s, V = np.linalg.svd(start.disturbance.T / scale, full_matrices=False)
     kept = s > _DEPENDENT * np.max(s, initial=0.0)
     by, past = (V[kept].T / s[kept]) / scale[:, None], len(start.noise)
+    if start.is_white:
+        own = span[:, kept]
+        return _Basis(own, by, own, by, np.eye(by.shape[1]), 0.0, 0.0)
     Z = np.block([[(by.T @ start.free).T, start.noise.T], [np.zeros((past, by.shape[1])), np.eye(past)]])
     Q, R = np.linalg.qr(Z)
     inverse = np.linalg.inv(R)

@@ -138,5 +138,7 @@ def _start(row: OutputOrders, theta: Array, samples: int, *, free: bool) -> Star
         disturbance = np.concatenate(parts)
     else:
         disturbance = np.eye(row.a if row.c else 0, samples, dtype=theta.dtype)
+    if C.size == D.size == 1:
+        return Start.white(disturbance)
     zeros = density(C) if row.c else np.zeros(())
     return Start(filtered(D, C, disturbance), disturbance, noise_before(C, D, samples), zeros)

@@ -158,6 +158,11 @@ def _deviance(records: Records, point: Point) -> float:
     return float(records.samples * np.linalg.slogdet(products)[1]) + point.near.of_noise
 
 
+def _swamped(records: Records, late: int) -> bool:
+    """Whether unknown inputs that act for so many samples explain half of a record, whatever the model."""
+    return 2 * late * records.u.shape[1] > max(records.lengths)
+
+
 def from_rest_or_free(
     records: Records,
     deviations: Records,
@@ -182,7 +187,7 @@ def from_rest_or_free(
         tried = {late: (found := searched(deviations.begun_freely(late), known))}
         # The dead time may come out another than was thought when the unknown inputs were counted.
         while abs((now := later(found.point.theta)) - late) > _SPARE:
-            if now in tried or len(tried) > _MOST_COUNTS:
+            if now in tried or len(tried) > _MOST_COUNTS or _swamped(deviations, now):
                 found = tried[min(tried)]  # the fewest unknown inputs explain the least by chance
                 break
             late = now

@@ -41,6 +41,11 @@ class Start(NamedTuple):
         """Where the noise is white: it has no past."""
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
+    @property
+    def is_white(self) -> bool:
+        """Whether it is known to be that of white noise."""
+        return self.free is self.disturbance and not len(self.noise)
+
     def and_free(self, free: NDArray[np.float64], disturbance: NDArray[np.float64]) -> Start:
         """With further unknowns of which nothing is known, (m, N) each."""
         return self._replace(
@@ -50,6 +55,8 @@ class Start(NamedTuple):
 
     def cropped(self, samples: int) -> Start:
         """What it is of a shorter record."""
+        if self.is_white:
+            return Start.white(self.free[:, :samples])
         free, disturbance, noise = (block[:, :samples] for block in self[:3])
         return Start(free, disturbance, noise, self.zeros)
 

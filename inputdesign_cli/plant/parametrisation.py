@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.expressions import Expression
+from inputdesign_cli.expressions import Evaluated, Expression, evaluated
 from inputdesign_cli.plant.polynomial import Array
 
 # So many values of the parameters are kept with their coefficients.
@@ -74,12 +74,12 @@ class Parametrisation:
     @cached_property
     def coefficients(self) -> Array:
         """(K,): not a number where a term is not defined."""
-        return self._image[0]
+        return self._image.values
 
     @cached_property
     def jacobian(self) -> Array:
         """(K, k): of the coefficients in the free parameters."""
-        return self._image[1]
+        return self._image.gradients[:, self.free]
 
     @cached_property
     def moves(self) -> NDArray[np.bool_]:
@@ -94,7 +94,5 @@ class Parametrisation:
         return None if np.all(sound) else self.terms[int(np.argmin(sound))].text
 
     @cached_property
-    def _image(self) -> tuple[Array, Array]:
-        found = [term.at(self.symbols, self.values) for term in self.terms]
-        slopes = np.array([slope for _, slope in found]).reshape(len(found), len(self.labels))
-        return np.array([value for value, _ in found]), slopes[:, self.free]
+    def _image(self) -> Evaluated:
+        return evaluated(self.terms, self.symbols, self.values)

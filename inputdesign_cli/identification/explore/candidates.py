@@ -41,6 +41,7 @@ class Candidate:
         failed: tests of the residuals that refute it.
         steady: whether its plant is stable, as far as the record tells, and within what it shows.
         ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
+        latest: samples beyond which a dead time has run off to where nothing answers.
         by_prediction: whether prediction errors rank it: in a loop, and where the noise integrates.
     """
 
@@ -54,6 +55,7 @@ class Candidate:
     converged: bool
     steady: bool
     ranges: tuple[tuple[int, int], ...]
+    latest: int
     by_prediction: bool
 
     @property
@@ -74,6 +76,16 @@ class Candidate:
         ([ljung-1999], Section 8.4); in a loop it biases them all (Section 13.4).
         """
         return (self.orders.shared or self.by_prediction) and bool(self.failed)
+
+    def estimated(self, theta: Array, noise: Array) -> Candidate:
+        """The same from other data.
+
+        Raises:
+            ArithmeticError: a dead time has run off.
+        """
+        if max(self.orders.at(theta).delays) > self.latest:
+            raise ArithmeticError("a dead time has run off to where nothing answers")
+        return replace(self, model=self.model.at(theta, noise))
 
     @property
     def unknowns(self) -> int:

@@ -161,20 +161,26 @@ def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]
         SpecError: `too-few-samples`, `constant-input` or `constant-output`.
     """
     u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
+    _check_length(len(y), _FEWEST)
     still = tuple(int(j) for j in np.flatnonzero(np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0)))
     if len(still) == u.shape[1]:
         check_varying(_UNKNOWN, u, y)
     moving = [j for j in range(u.shape[1]) if j not in still]
     check_varying(_UNKNOWN, u[:, moving], y)
-    needed = _FEWEST * (len(moving) + 1) // 2
-    if len(y) < needed:
+    _check_length(len(y), _FEWEST * (len(moving) + 1) // 2)
+    return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
+
+
+def _check_length(samples: int, needed: int) -> None:
+    """Raises `SpecError` (`too-few-samples`) where there are fewer."""
+    if samples < needed:
+        are = "1 sample is" if samples == 1 else f"{samples} samples are"
         raise bad_spec(
             "too-few-samples",
-            f"{len(y)} samples are too few to choose a structure and to judge it: take {needed} at least",
+            f"{are} too few to choose a structure and to judge it: take {needed} at least",
             hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
             key="u",
         )
-    return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
 
 
 def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
@@ -272,11 +278,15 @@ def criterion(taken: Sequence[Candidate], estimate: Estimate, *, lines: int = 0)
 
 
 def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool, ramp: bool) -> Candidate:
-    """The structure of one output, estimated from the whole record without the others."""
+    """The structure of one output, estimated from the whole record without the others.
+
+    Raises:
+        ArithmeticError: a dead time has run off.
+    """
     own = [(u, y[:, output : output + 1]) for u, y in used]
     near = _near(candidate, used[0][0].shape[1])
     estimate = _identified(candidate.model, own, feedback, candidate.theta, near=near, ramp=ramp)
-    return replace(candidate, model=candidate.model.at(estimate.theta, estimate.noise))
+    return candidate.estimated(estimate.theta, estimate.noise)
 
 
 def _near(candidate: Candidate, inputs: int) -> bool:

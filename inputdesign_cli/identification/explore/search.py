@@ -60,6 +60,8 @@ _MOST_DELAY = 150
 # Where an answer comes later, delays are looked for until then and a share of it more.
 _BEYOND = 5
 _HIGHEST, _HIGHEST_ARX = 5, 8
+# So far beyond the longest delay that was looked for a dead time may settle.
+_RUN_OFF = 2
 # Plants up to this order are always tried.
 _ALWAYS = 3
 _ARX_KEPT = 2
@@ -75,7 +77,8 @@ _STEPS, _AGAIN = {False: 100, True: 30}, 4
 class _Parts:
     """What structures are estimated from, `first`, and judged by.
 
-    Of each record that is `judged` the first `late` samples are left out.
+    Of each record that is `judged` the first `late` samples are left out. Plants whose dead time has run off
+    beyond `latest` samples are left out as well.
     """
 
     first: Parts
@@ -85,6 +88,7 @@ class _Parts:
     quick: dict[int, SharedDenominator]
     resting: Mapping[int, Parts]
     late: int
+    latest: int
 
     @property
     def samples(self) -> int:
@@ -143,8 +147,8 @@ class _Parts:
         fitted = integrating(structure.at(found.point.theta, noise), (self.wanders,))
         on_first, on_second = (fits(fitted, part, self.late) for part in self.judged)
         settled = orders.at(found.point.theta)
-        if max(settled.delays) >= max(len(y) for _, y in self.judged[1]):
-            raise ArithmeticError("a delay is longer than all that the model is to be judged by")
+        if max(settled.delays) > self.latest:
+            raise ArithmeticError("a dead time has run off to where nothing answers")
         return Candidate(
             settled,
             fitted,
@@ -156,6 +160,7 @@ class _Parts:
             found.converged,
             is_steady(fitted, self.samples) and not orders.beyond(found.point.theta, self.samples),
             orders.ranges(found.point.theta, deviations),
+            self.latest,
             self.feedback or self.wanders,
         )
 
@@ -204,7 +209,9 @@ def explore_structure(
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
     late = max(max(found.delays) for found in quick.values())
-    parts = _Parts(first, levels, feedback, wanders, quick, resting, late)
+    # What is to judge a model must be longer than its delay.
+    latest = min(_RUN_OFF * most, max(len(y) for _, y in levels[1]) - 1)
+    parts = _Parts(first, levels, feedback, wanders, quick, resting, late, latest)
 
     families = dict[str, None]()
 

@@ -1,4 +1,4 @@
-"""Logs whose columns were written at different times: hardly any row has a number in every column."""
+"""Logs whose columns were written at different times: hardly any rows in a row have numbers everywhere."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.preparation import SHORTEST
 from inputdesign_cli.tasks.build.signals import Signals
 
-_FEW = 0.5
+# Of records that are too short for a stretch of rows: half of their rows are enough.
+_FEW, _SHORT = 0.5, 2 * SHORTEST
 
 
 def joined_rows(signals: Signals, *, resample: bool) -> tuple[Signals, list[str]]:
     """The rows of the output that was written most often, the other columns brought to its times.
 
     Inputs are what they were written last, outputs are interpolated linearly. Rows as they stand, where
-    enough of them are whole.
+    enough of them that follow each other are whole.
 
     Args:
         resample: whether that is asked for.
@@ -30,7 +31,8 @@ def joined_rows(signals: Signals, *, resample: bool) -> tuple[Signals, list[str]
     together = np.column_stack([signals.u, signals.y])
     there = ~np.isnan(together)
     whole = np.asarray(there.all(axis=1))
-    if whole.mean() >= _FEW or _longest_run(whole) >= SHORTEST:
+    short = len(whole) < _SHORT and whole.mean() >= _FEW
+    if short or _longest_run(whole) >= SHORTEST:
         return signals, []
     names = (*signals.inputs, *signals.outputs)
     counts = ", ".join(f"{name} in {n}" for name, n in zip(names, there.sum(axis=0), strict=True))
@@ -40,7 +42,8 @@ def joined_rows(signals: Signals, *, resample: bool) -> tuple[Signals, list[str]
         share = f"{few} of {len(whole)} rows" if few else "no row"
         message = (
             f"{share} of {sheet.path.name} {'have' if few > 1 else 'has'} a number in every column that is "
-            f"asked for ({counts} of {len(whole)}): the columns were written at different times"
+            f"asked for, and never {SHORTEST} that follow each other ({counts} of {len(whole)}): the columns "
+            "were written at different times"
         )
         hint = (
             "add --resample (inputs are held until they are written again, outputs interpolated), or join "

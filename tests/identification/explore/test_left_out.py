@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.identification.explore import by_chance, explore_structure, search
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification.explore import by_chance, explore_records, explore_structure, search
 
 
 @pytest.fixture(scope="module")
@@ -43,3 +44,24 @@ def test_a_delay_beyond_the_record_is_no_limit(parts):
     found = explore_structure(*parts, physical=False)
     told = [found.ranges(replace(found.best, ranges=((1, high),))) for high in (7, 120, 121, 1_000_001)]
     assert told == [((1, 7),), ((1, 120),), ((1, None),), ((1, None),)]
+
+
+def test_a_dead_time_that_has_run_off_to_where_nothing_answers_is_no_plant(parts):
+    """Unknown inputs before the record would explain all that comes until then, at the price of hours."""
+    found = explore_structure(*parts)
+    in_s = [c for c in found.candidates if c.orders.family == "FOPDT" and not c.orders.coloured]
+    assert in_s
+    assert all(max(c.orders.delays) <= c.latest < 80 for c in in_s)
+    K, T, L = in_s[0].theta
+    near = in_s[0].estimated(np.array([K, T, L + 1.0]), np.eye(1))
+    np.testing.assert_array_equal(near.theta, [K, T, L + 1.0])
+    with pytest.raises(ArithmeticError, match="run off"):
+        in_s[0].estimated(np.array([K, T, in_s[0].latest + 0.5]), np.eye(1))
+
+
+@pytest.mark.parametrize("samples", [1, 29])
+def test_records_that_are_too_short_are_told_so_whatever_stands_in_them(samples):
+    signal = np.ones((samples, 1))
+    with pytest.raises(SpecError) as caught:
+        explore_records([(signal, signal)], feedback=False, step=1.0, ramp=False)
+    assert caught.value.diagnostics[0].code == "too-few-samples"

@@ -244,6 +244,21 @@ def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_
     assert any("written at different times" in note for note in log.steps)
 
 
+@pytest.mark.parametrize(("every", "missing"), [(2, 1), (3, 2)])
+def test_an_output_that_was_written_more_seldom_than_the_input_sets_the_sample_time(tmp_path, every, missing):
+    """y at one of two or three rows: rows as they stand would be records of one sample each."""
+    path = tmp_path / "log.csv"
+    rows = [f"{k},{k // 6},{k * k if k % every == 0 else ''}" for k in range(120)]
+    path.write_text("\n".join(["time,u,y", *rows, ""]))
+    with pytest.raises(DataError, match=rf"{120 // every} of 120 rows of log\.csv have .* never 10"):
+        read_log(path, Preparation())
+    log = read_log(path, Preparation(resample=True))
+    k = np.arange(0, 120, every)
+    assert log.step == missing + 1.0
+    np.testing.assert_array_equal(log.u[:, 0], k // 6)
+    np.testing.assert_array_equal(log.y[:, 0], k**2)
+
+
 def _said_to_be_rounded(x):
     return any("rounded" in one for one in limits_of_sensor("y", x))
 
