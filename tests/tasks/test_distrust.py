@@ -43,6 +43,7 @@ def test_the_inverse_of_a_controller_is_no_plant(integral, tmp_path):
     assert told.endswith("move the reference of the loop, or add dither to the input, and record again")
 
 
+@pytest.mark.slow
 def test_the_plant_of_a_loop_whose_reference_hardly_moves_is_not_the_inverse_of_its_controller(tmp_path):
     """What moves the reference are eight steps; they look like spikes to a model of -1/C."""
     u, y = loop(2, LAWS["PI"], steps=0.3)
@@ -87,6 +88,7 @@ def lags(u, plants, rng, noise=0.05):
     return y
 
 
+@pytest.mark.slow
 def test_inputs_between_which_what_they_do_may_be_exchanged_earn_no_trust(tmp_path):
     """The second input is half of the first but for little: another minimum is about as likely."""
     rng = np.random.default_rng(0)
@@ -97,6 +99,7 @@ def test_inputs_between_which_what_they_do_may_be_exchanged_earn_no_trust(tmp_pa
     assert any("two sets of parameters" in reason for reason in found.reasons)
 
 
+@pytest.mark.slow
 def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
     rng = np.random.default_rng(2)
     u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 50), 8), np.repeat(rng.uniform(-1, 1, 40), 10)])
@@ -107,6 +110,7 @@ def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
     assert not any(told.startswith("no effect of u1") for told in said)
 
 
+@pytest.mark.slow
 def test_a_clipped_output_earns_no_trust_and_emptied_cells_bring_its_gain_back(tmp_path):
     """A lag of ten samples, gain one, cut at 0.5: a third of the gain is lost, and comes back."""
     rng = np.random.default_rng(1)
@@ -132,7 +136,9 @@ def test_a_model_far_from_what_the_data_say_without_one_earns_no_trust():
         assert len(contradicted(told)) == far
 
 
-@pytest.mark.parametrize(("delay", "held", "samples"), [(150, 4, 500), (120, 20, 600)])
+@pytest.mark.parametrize(
+    ("delay", "held", "samples"), [pytest.param(150, 4, 500, marks=pytest.mark.slow), (120, 20, 600)]
+)
 def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples):
     """Longer than delays are looked for where nothing says that one is there; also by few jumps."""
     rng = np.random.default_rng(3)

@@ -30,6 +30,7 @@ def test_a_line_that_is_taken_away_does_not_move_the_estimate(tmp_path, detrend)
     np.testing.assert_allclose(told[0], told[1], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_explore_tells_the_line_that_it_took_away(tmp_path):
     explored = tasks.explore([log(tmp_path / "log.csv", 0.02)], Preparation(sample_time=2.0, time_unit="min"))
     told = [note for note in explored.results.result["notes"] if note.startswith("y drifts")]

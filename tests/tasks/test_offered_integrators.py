@@ -12,6 +12,7 @@ from inputdesign_cli.tasks import explore, identify
 OFFER = r"in SPEC (.*?) and (plant: .*? sample: zoh\})(?:, and (noise: .*))?$"
 
 
+@pytest.mark.slow
 def test_an_integrator_in_a_loop_is_offered_with_its_controller(tmp_path):
     """y(t) = y(t-1) + 0.1 u(t-1), u = 1.5 (r - y): the spec offered, its controller filled in, is right."""
     rng = np.random.default_rng(1)
@@ -32,6 +33,7 @@ def test_an_integrator_in_a_loop_is_offered_with_its_controller(tmp_path):
     assert result["identification"]["failed"] == []
 
 
+@pytest.mark.slow
 def test_what_is_offered_is_a_spec_in_the_unit_of_the_log(tmp_path):
     """y(t) = y(t-1) + 0.1 u(t-1): the lines offered, as they stand, identify the slope in the same log."""
     rng = np.random.default_rng(2)

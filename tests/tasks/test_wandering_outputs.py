@@ -10,6 +10,7 @@ from inputdesign_cli.tasks.build.preparation import Preparation
 from tests.identification.explore.test_integrated import GAIN, LAG, LATE, lagged, steps, walk
 
 
+@pytest.mark.slow
 def test_the_plant_is_told_and_the_next_experiment_heeds_the_walk(tmp_path):
     rng = np.random.default_rng(1)
     u = steps()

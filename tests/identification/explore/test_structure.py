@@ -154,6 +154,7 @@ def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(pattern, n
     np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], expected, rtol=0.15)
 
 
+@pytest.mark.slow
 def test_a_plant_that_acts_at_once_in_a_loop_that_answers_late():
     """Rows that hold what was applied and what it led to: u answers the row before."""
     rng = np.random.default_rng(3)
