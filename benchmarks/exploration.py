@@ -6,6 +6,10 @@ ARX model of the first half, orders to 8 and delays to 8, that is chosen on that
 the same search reaches there where the first half alone chooses: by simulation of its last 40 %, by BIC, and
 the median of all. The column moves one input in each half, so that neither tells the other: blocks of its
 record estimate and judge in turn, for `explore` and for the search.
+
+`--structures` estimates OE and BJ models of orders two to five from the whole first half instead, and says
+how well each explains that half (fit, BIC) and the other: whether any structure that the one does not
+refute would do better on the other.
 """
 
 import argparse
@@ -18,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore import fits
 from inputdesign_cli.identification.explore.division import divided
 from inputdesign_cli.plant import PolynomialModel
@@ -181,6 +186,30 @@ def compared(name: str) -> None:
         print("|", " | ".join([*row, f"{fit - best.best:+.1f}", *others, f"{seconds:.0f}"]), "|", flush=True)
 
 
+def structures(name: str) -> None:
+    """Print what OE and BJ models of several orders, estimated from a first half, make of both halves."""
+    prepared = Preparation(columns=RECORDS[name][1])
+    with tempfile.TemporaryDirectory() as folder:
+        first, second = [
+            [(log.u, log.y[:, :1])]
+            for log in (read_log(path, prepared) for path in halves(name, Path(folder)))
+        ]
+    (u, y), one = first[0], np.ones(1)
+    for order, noise in itertools.product(range(2, 6), range(3)):
+        delay = max(5 - order, 1)
+        B, F = np.concatenate([np.zeros(delay), np.ones(order)]), np.concatenate([one, np.zeros(order)])
+        C = np.concatenate([one, np.zeros(noise)])
+        inputs = u.shape[1]
+        structure = PolynomialModel(((B,) * inputs,), (one,), ((F,) * inputs,), (C,), (C,), np.eye(1))
+        found = identify(structure, u, y, rest=False)
+        samples, size = len(y), structure.theta.size
+        bic = samples * float(np.log(found.noise[0, 0])) + size * np.log(samples)
+        model = structure.at(found.theta, found.noise)
+        on_both = [fits(model, part).simulation[0] for part in (first, second)]
+        row = [name, "BJ" if noise else "OE", f"{order}", f"{delay}", f"{noise}", f"{bic:.0f}"]
+        print("|", " | ".join([*row, *(f"{fit:.1f}" for fit in on_both)]), "|", flush=True)
+
+
 def long_record(rows: int) -> None:
     """Time and memory of a record of so many rows."""
     rng = np.random.default_rng(1)
@@ -204,7 +233,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("records", nargs="*", default=list(RECORDS), help=f"of {', '.join(RECORDS)}")
     parser.add_argument("--rows", type=int, default=0, help="also a simulated record of so many rows")
+    parser.add_argument("--structures", action="store_true", help="estimates of several orders instead")
     chosen = parser.parse_args()
+    if chosen.structures:
+        print("| record | family | order | delay | C, D | BIC | fit %, first half | second half |")
+        print("|---|---|---|---|---|---|---|---|")
+        for name in chosen.records:
+            structures(name)
+        return
     print(
         "| record | output | model | fit % | best ARX % | difference | by its rest | BIC | median | seconds |"
     )

@@ -54,6 +54,13 @@ def beyond_admissible(model: Model, estimate: Estimate, errors: Sequence[OnModel
     return _beyond(model, estimate, errors, lambda error, w: error.admissible.at(w), "the admissible error")
 
 
+def most_apart(estimate: Estimate, rival: Rival) -> list[int]:
+    """The parameters to name, in their order: the few that differ by the most of their deviations."""
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    most = np.argsort(-np.abs(rival.theta - estimate.theta) / deviations)[:_MOST_NAMES]
+    return sorted(most.tolist())
+
+
 def rival_notes(units: Units, estimate: Estimate, found: Sequence[Apart]) -> list[str]:
     """What to say of rivals that were found in data."""
     return [
@@ -131,6 +138,4 @@ def _furthest(
 
 
 def _parameters(estimate: Estimate, rival: Rival) -> str:
-    deviations = np.sqrt(np.diag(estimate.covariance))
-    most = np.argsort(-np.abs(rival.theta - estimate.theta) / deviations)[:_MOST_NAMES]
-    return ", ".join(f"{estimate.names[i]} = {rival.theta[i]:.4g}" for i in sorted(most))
+    return ", ".join(f"{estimate.names[i]} = {rival.theta[i]:.4g}" for i in most_apart(estimate, rival))

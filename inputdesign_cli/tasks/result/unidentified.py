@@ -8,6 +8,7 @@ from inputdesign_cli.identification.explore import Found, left_of_inputs, one_li
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.processes import LONGER
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.result.rivals import most_apart
 from inputdesign_cli.tasks.result.unrelated import chance_of_response
 
 # A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
@@ -120,11 +121,15 @@ def rivalled(found: Found) -> tuple[str, ...]:
         other = found.model.at(rival.theta, found.model.covariance).plant_at(w)
         apart = float(np.max(np.abs(other - G) / peaks))
         if rival.excess <= _AS_LIKELY and not apart <= _ELSEWHERE:
-            named = zip(found.estimate.names, found.estimate.theta, rival.theta, strict=True)
-            values = ", ".join(f"{name} {one:.3g} or {two:.3g}" for name, one, two in named)
+            estimate, most = found.estimate, most_apart(found.estimate, rival)
+            values = ", ".join(
+                f"{estimate.names[i]} {estimate.theta[i]:.3g} or {rival.theta[i]:.3g}" for i in most
+            )
+            more = ", .." if len(most) < len(estimate.names) else ""
+            share = f"{100.0 * apart:.3g} % of" if apart < 1.0 else f"{apart:.3g} times"
             return (
-                f"two sets of parameters explain the record about equally well ({values}; -2 log likelihood "
-                f"differs by {rival.excess:.2g}), and their G by {100.0 * apart:.3g} % of its peak: move the "
+                f"two sets of parameters explain the record about equally well ({values}{more}; -2 log "
+                f"likelihood differs by {rival.excess:.2g}), and their G by {share} its peak: move the "
                 "inputs independently of each other, and at more frequencies",
             )
     if found.rival is None:
