@@ -154,12 +154,10 @@ class Evaluated:
         with np.errstate(all="ignore"):
             for step, local in zip(self._steps, self._found, strict=True):
                 slopes.append(unit[self._known[str(step.value)]] if step.operation == "name" else None)
-                if local is not None:
-                    for partial, operand in zip(local.slopes, step.operands, strict=True):
-                        own = slopes[operand]
-                        if own is not None:
-                            sofar = slopes[-1]
-                            slopes[-1] = partial * own if sofar is None else sofar + partial * own
+                if local is not None and step.operands:
+                    below = zip(local.slopes, (slopes[i] for i in step.operands), strict=True)
+                    parts = [partial * own for partial, own in below if own is not None]
+                    slopes[-1] = sum(parts[1:], parts[0]) / local.over if parts else None
         rows = []
         for place in self._places:
             own = np.zeros(len(unit)) if (found := slopes[place]) is None else found
@@ -322,11 +320,16 @@ _SIGNS: dict[type[ast.AST], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", a
 
 
 class _Local(NamedTuple):
-    """A value, its slopes in what it was made of, and whether it depends on a parameter."""
+    """A value and its slopes in what it was made of, in units of one over `over`.
+
+    Attributes:
+        varies: whether any parameter moves it.
+    """
 
     value: float
     slopes: tuple[float, ...]
     varies: bool
+    over: float = 1.0
 
 
 def _local(
@@ -352,11 +355,16 @@ def _local(
             value, *slopes = function(first.value), slope(first.value) if first.varies else 0.0
     except (ArithmeticError, ValueError):
         return None
-    return _Local(value, tuple(slopes), any(operand.varies for operand in (first, *others)))
+    moved = zip(slopes, (first, *others), strict=True)
+    varies = any(slope != 0.0 and operand.varies for slope, operand in moved)
+    return _Local(value, tuple(slopes), varies, others[0].value if operation == "/" else 1.0)
 
 
 def _combined(sign: str, first: _Local, second: _Local) -> tuple[float, float, float]:
-    """The value of a sum, difference, product, ratio or power, and its slopes in both."""
+    """The value of a sum, difference, product, ratio or power, and its slopes in both.
+
+    Those of a ratio are to be divided by the second.
+    """
     a, b = first.value, second.value
     if sign == "+":
         return a + b, 1.0, 1.0
@@ -365,7 +373,7 @@ def _combined(sign: str, first: _Local, second: _Local) -> tuple[float, float, f
     if sign == "*":
         return a * b, b, a
     if sign == "/":
-        return a / b, 1.0 / b, -(a / b) / b
+        return a / b, 1.0, -(a / b)
     power = math.pow(a, b)
     in_base = b * math.pow(a, b - 1.0) if first.varies and b else 0.0
     return power, in_base, power * math.log(a) if second.varies else 0.0

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from inputdesign_cli.expressions import Expression, ExpressionError, is_name, product_of
+from inputdesign_cli.expressions import Expression, ExpressionError, evaluated, is_name, product_of
 
 NAMES = ("K", "T", "zeta")
 VALUES = np.array([2.1, 0.7, 0.3])
@@ -146,3 +146,29 @@ def test_products_of_many_factors_are_those_of_numpy(count):
 def test_what_leaves_the_range_of_numbers_is_not_finite_and_quiet(text):
     with np.errstate(all="raise"):
         assert not math.isfinite(Expression.of(text).at(NAMES, VALUES)[0])
+
+
+def test_together_they_are_worth_what_each_is_alone_and_one_undefined_spoils_no_other():
+    texts = ("K*exp(-h/T)", "log(h - h*2)", "K*exp(-h/T)/(1 - exp(-h/T))", "sqrt(0)*K", "K/(T - 2)", "3")
+    symbols, values = ("K", "T", "h"), np.array([1.5, 2.0, 0.3])
+    several = tuple(map(Expression.of, texts))
+    here = evaluated(several, symbols, values)
+    alone = [one.at(symbols, values) for one in several]
+    np.testing.assert_array_equal(here.values, [value for value, _ in alone])
+    np.testing.assert_array_equal(here.gradients, [gradient for _, gradient in alone])
+    defined = [True, False, True, True, False, True]
+    np.testing.assert_array_equal(np.isfinite(here.values), defined)
+    np.testing.assert_array_equal(np.isfinite(here.gradients).all(axis=1), defined)
+    q = np.exp(-0.15)
+    np.testing.assert_allclose(
+        here.values[[0, 2, 3, 5]], [1.5 * q, 1.5 * q / (1.0 - q), 0.0, 3.0], rtol=1e-14
+    )
+    np.testing.assert_allclose(here.gradients[0], [q, 1.5 * q * 0.075, -0.75 * q], rtol=1e-14)
+
+
+def test_slopes_of_ratios_of_huge_and_tiny_numbers_hold():
+    """One over the divisor, or its square, would leave the range of numbers."""
+    value, gradient = Expression.of("x/y").at(("x", "y"), np.array([1e-200, 1e-170]))
+    np.testing.assert_allclose([value, *gradient], [1e-30, 1e170, -1e140], rtol=1e-14)
+    value, gradient = Expression.of("x/y").at(("x", "y"), np.array([1e150, 1e160]))
+    np.testing.assert_allclose([value, *gradient], [1e-10, 1e-160, -1e-170], rtol=1e-14)
