@@ -223,7 +223,7 @@ def test_rows_of_which_none_is_whole_are_refused(header, tmp_path):
 
 
 def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_path):
-    """u when it changes, y every 5 s and y2 every 10 s: u is held, y2 lies between its neighbours."""
+    """u when it changes, y every 5 s and y2 every 10 s: u is its mean, y2 lies between its neighbours."""
     path = tmp_path / "log.csv"
     rows = ["time,u,y1,y2", "0,7,0,0"]
     for k in range(1, 60):
@@ -239,7 +239,10 @@ def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_
     log = read_log(path, Preparation(resample=True))
     k = np.arange(59)  # at the last y2 is no longer known
     assert log.step == 5.0
-    np.testing.assert_allclose(log.u[:, 0], np.where(k < 6, 7, k - k % 6))
+    held = np.where(k < 6, 7, k - k % 6)
+    # A second before every sixth sample it is written anew.
+    np.testing.assert_allclose(log.u[:, 0], np.where(k % 6 == 5, 0.8 * held + 0.2 * (k + 1), held))
+    assert any("inputs move between 9 of the 60 instants" in note for note in log.steps)
     np.testing.assert_allclose(log.y, np.column_stack([k**2, 3 * k]))
     assert any("written at different times" in note for note in log.steps)
 
@@ -250,13 +253,26 @@ def test_an_output_that_was_written_more_seldom_than_the_input_sets_the_sample_t
     path = tmp_path / "log.csv"
     rows = [f"{k},{k // 6},{k * k if k % every == 0 else ''}" for k in range(120)]
     path.write_text("\n".join(["time,u,y", *rows, ""]))
-    with pytest.raises(DataError, match=rf"{120 // every} of 120 rows of log\.csv have .* never 10"):
+    with pytest.raises(DataError, match=rf"{120 // every} of 120 rows of log\.csv have .* hardly ever 10"):
         read_log(path, Preparation())
     log = read_log(path, Preparation(resample=True))
     k = np.arange(0, 120, every)
     assert log.step == missing + 1.0
     np.testing.assert_array_equal(log.u[:, 0], k // 6)
     np.testing.assert_array_equal(log.y[:, 0], k**2)
+
+
+def test_an_output_that_misses_some_rows_is_interpolated_but_over_gaps(tmp_path):
+    path = tmp_path / "log.csv"
+    there = [k for k in range(200) if k % 3 != 2 and not 90 <= k < 110]
+    rows = [f"{k},{k % 7},{2 * k if k in there else ''}" for k in range(200)]
+    path.write_text("\n".join(["time,u,y", *rows, ""]))
+    log = read_log(path, Preparation(resample=True))
+    assert log.step == 1.0
+    assert log.lengths == (89, 89)
+    k = np.concatenate([np.arange(89), np.arange(111, 200)])
+    np.testing.assert_allclose(log.y[:, 0], 2.0 * k)
+    np.testing.assert_array_equal(log.u[:, 0], k % 7)
 
 
 def _said_to_be_rounded(x):
