@@ -60,6 +60,8 @@ _MOST_DELAY = 150
 # Where an answer comes later, delays are looked for until then and a share of it more.
 _BEYOND = 5
 _HIGHEST, _HIGHEST_ARX = 5, 8
+# A delay of this share of the longest that is tried is at the limit. So far longer ones are tried.
+_NEAR_LIMIT, _FURTHEST = 0.85, 400
 # So far beyond the longest delay that was looked for a dead time may settle.
 _RUN_OFF = 2
 # Plants up to this order are always tried.
@@ -198,15 +200,15 @@ def explore_structure(
     quick = _quick(clean, highest, most, tuple(map(max, least, later)), least)
     if not (by_prediction or any(later)):
         # What judges must be longer than the delay, too.
-        shorter = min(max(len(y) for _, y in some) for some in (first, second))
+        furthest = 2 * min(max(len(y) for _, y in some) for some in (first, second)) // 3
         nearest = min(quick.values(), key=lambda found: found.loss)
-        later = far_answers(first, nearest, most, 2 * shorter // 3)
+        later = far_answers(first, nearest, most, furthest)
         if any(later):
             most = _beyond(most, later)
             quick = _quick(clean, highest, most, later, least)
+        quick, most = _beyond_limit(clean, quick, most, min(furthest, _FURTHEST), least)
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
-    penalty = np.log(samples) / samples
-    near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
+    near = min(quick, key=lambda n: _criterion(quick, n, samples))
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
     late = max(max(found.delays) for found in quick.values())
     # What is to judge a model must be longer than its delay.
@@ -265,6 +267,32 @@ def _quick(
         quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)
         delays = quick[n].delays
     return quick
+
+
+def _criterion(quick: Mapping[int, SharedDenominator], n: int, samples: int) -> float:
+    """BIC over the samples, of an order."""
+    price = float(np.log(samples)) / samples
+    return float(np.log(max(quick[n].loss, 1e-300))) + (2 * n + 2) * price
+
+
+def _beyond_limit(
+    clean: Parts, quick: dict[int, SharedDenominator], most: int, furthest: int, least: tuple[int, ...]
+) -> tuple[dict[int, SharedDenominator], int]:
+    """The same with longer delays, while some are at the limit of those that were tried, if BIC says so.
+
+    High orders turn the phase as a longer delay does, as far as delays can be tried.
+    """
+    samples, longer = sum(len(y) for _, y in clean), most
+
+    def best(found: Mapping[int, SharedDenominator]) -> float:
+        return min(_criterion(found, n, samples) for n in found)
+
+    while longer < furthest and max(max(f.delays) for f in quick.values()) >= _NEAR_LIMIT * most:
+        longer = min(2 * longer, furthest)
+        tried = _quick(clean, max(quick), longer, (1,) * len(least), least)
+        if best(tried) < best(quick):
+            quick, most = tried, longer
+    return quick, most
 
 
 def _least_delays(parts: Parts, clean: Parts, most: int) -> tuple[int, ...]:

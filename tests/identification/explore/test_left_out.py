@@ -65,3 +65,17 @@ def test_records_that_are_too_short_are_told_so_whatever_stands_in_them(samples)
     with pytest.raises(SpecError) as caught:
         explore_records([(signal, signal)], feedback=False, step=1.0, ramp=False)
     assert caught.value.diagnostics[0].code == "too-few-samples"
+
+
+@pytest.mark.parametrize(("late", "most"), [(70, 80), (10, 40)])
+def test_delays_at_the_limit_of_those_that_are_tried_are_looked_for_beyond_it(late, most):
+    """High orders turn the phase as a longer delay does: by 40 samples at most they stood for 70."""
+    rng = np.random.default_rng(7)
+    u = np.stack([np.repeat(rng.choice([-1.0, 1.0], 60), 4), np.repeat(rng.choice([-1.0, 1.0], 20), 12)], 1)
+    y = scipy.signal.lfilter([0.0, 0.0, 0.0, 0.2], [1.0, -0.9], u[:, 0])
+    y += scipy.signal.lfilter(np.append(np.zeros(late + 1), 0.15), [1.0, -0.85], u[:, 1])
+    parts = [(u, (y + 0.1 * rng.standard_normal(240))[:, None])]
+    quick = search._quick(parts, 3, 40, (1, 1), (0, 0))
+    found, longest = search._beyond_limit(parts, quick, 40, 100, (0, 0))
+    assert longest == most
+    np.testing.assert_allclose(found[1].delays, (3, late + 1), atol=1)
