@@ -83,8 +83,7 @@ class Candidate:
         Raises:
             ArithmeticError: a dead time has run off.
         """
-        if max(self.orders.at(theta).delays) > self.latest:
-            raise ArithmeticError("a dead time has run off to where nothing answers")
+        settled_at(self.orders, theta, self.latest)
         return replace(self, model=self.model.at(theta, noise))
 
     @property
@@ -151,6 +150,18 @@ class Chosen:
         shape = plain.orders.with_coloured_noise()[order]
         same = (c for c in self.candidates if replace(c.orders, delays=shape.delays) == shape)
         return next(same, plain)
+
+
+def settled_at(orders: Shape, theta: Array, latest: int) -> Shape:
+    """The structure with the delays that parameters (k,) tell.
+
+    Raises:
+        ArithmeticError: a dead time has run off beyond the `latest` sample at which anything answers.
+    """
+    settled = orders.at(theta)
+    if max(settled.delays) > latest:
+        raise ArithmeticError("a dead time has run off to where nothing answers")
+    return settled
 
 
 def with_noise(plain: Sequence[Candidate]) -> list[Shape]:

@@ -26,6 +26,7 @@ from inputdesign_cli.identification.explore.candidates import (
     about_as_good,
     likeliest,
     noise_first,
+    settled_at,
     with_noise,
 )
 from inputdesign_cli.identification.explore.fits import (
@@ -139,6 +140,7 @@ class _Parts:
         found = search(
             records, points, starts=len(points), quick=_STEPS[orders.physical] * (_AGAIN if free else 1)
         )
+        settled = settled_at(orders, found.point.theta, self.latest)
         noise = noise_of(found.point, kind.own())
         factor = factor_at(kind.names, records, found.point, noise)
         deviations = np.linalg.norm(
@@ -148,9 +150,6 @@ class _Parts:
         tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
         fitted = integrating(structure.at(found.point.theta, noise), (self.wanders,))
         on_first, on_second = (fits(fitted, part, self.late) for part in self.judged)
-        settled = orders.at(found.point.theta)
-        if max(settled.delays) > self.latest:
-            raise ArithmeticError("a dead time has run off to where nothing answers")
         return Candidate(
             settled,
             fitted,
