@@ -57,6 +57,11 @@ def joined_rows(signals: Signals, *, resample: bool) -> tuple[Signals, list[str]
         )
         raise DataError(sheet.error("data-not-a-number", message, hint, 0))
     timed = ~np.isnan(signals.time)
+    untimed = np.flatnonzero(~np.any(there & timed[:, None], axis=0))
+    if untimed.size:
+        message = f"{names[untimed[0]]} has no number in any row of {signals.sheet.path.name} with a time"
+        hint = f"write the time ({signals.name}) into its rows, too"
+        raise DataError(signals.sheet.error("data-not-a-number", message, hint, 0))
     written = ~np.isnan(signals.y) & timed[:, None]
     rows = np.flatnonzero(written[:, int(np.argmax(written.sum(axis=0)))])
     if _misses_some(signals.time[timed], signals.time[rows]):

@@ -262,6 +262,16 @@ def test_an_output_that_was_written_more_seldom_than_the_input_sets_the_sample_t
     np.testing.assert_array_equal(log.y[:, 0], k**2)
 
 
+@pytest.mark.parametrize("channel", ["u", "y"])
+def test_a_channel_whose_rows_have_no_times_is_named(tmp_path, channel):
+    path = tmp_path / "log.csv"
+    cells = {"u": ("{k},", ",{k}"), "y": (",{k}", "{k},")}[channel]
+    rows = [f",{cells[0]}\n{{k}},{cells[1]}".format(k=k) for k in range(60)]
+    path.write_text("\n".join(["time,u,y", *rows, ""]))
+    with pytest.raises(DataError, match=rf"^{channel} has no number in any row of log\.csv with a time"):
+        read_log(path, Preparation(resample=True))
+
+
 def test_an_output_that_misses_some_rows_is_interpolated_but_over_gaps(tmp_path):
     path = tmp_path / "log.csv"
     there = [k for k in range(200) if k % 3 != 2 and not 90 <= k < 110]
