@@ -13,6 +13,7 @@ from inputdesign_cli.identification.estimators import (
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
     frequency_response as frequency_response,
+    response_delays as response_delays,
     silent_in as silent_in,
 )
 from inputdesign_cli.identification.frozen import (

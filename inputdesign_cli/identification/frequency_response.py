@@ -2,14 +2,16 @@
 
 From inputs that repeat, line by line: the mean of the periods, and their scatter ([pintelon-schoukens-2012],
 Section 2.5). From others by a local polynomial: around each frequency, responses and the leakage of start and
-end are parabolas, fitted to a few lines of the Fourier transforms (the same, Section 7.3). Signals x from
+end are parabolas, fitted to a few lines of the Fourier transforms (the same, Section 7.3). A parabola does
+not follow the phase of a long dead time: where one is known, inputs are delayed by it first. Signals x from
 outside, such as the reference of a loop, are instruments: G is the response to x of y over that of u.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Literal
 
 import numpy as np
@@ -24,6 +26,7 @@ from inputdesign_cli.identification.periodic_response import (
     periodic_response,
 )
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 CONFIDENCE = 0.95
@@ -32,6 +35,10 @@ _FREEDOM = 8
 _PARABOLA = 3
 _BEGINNING, _TRIED = 16, 20
 _DEPENDENT = 1e-7
+# Rad: a phase that turns further over the lines of a parabola is not followed by it.
+_TURN = 1.0
+# Of its largest value: where a response to a pulse begins.
+_BEGUN = 0.1
 
 REPEATS = 1e-9
 """Of the size of a signal that repeats, what one period may be off the next."""
@@ -61,13 +68,20 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    u: Array, y: Array, x: Array | None = None, *, lengths: Sequence[int] | None = None
+    u: Array,
+    y: Array,
+    x: Array | None = None,
+    *,
+    lengths: Sequence[int] | None = None,
+    delays: NDArray[np.int64] | None = None,
 ) -> FrequencyResponse | None:
     """From records that follow each other; None where they are too short or excite no frequency enough.
 
     Args:
         u, y: (N, r), (N, p).
         x: (N, r), what excites from outside; None: u itself, which then must not answer y.
+        delays: (p, r), samples by which inputs are thought to act late. They are tried where they turn the
+            phase fast, and kept where they leave less unexplained; not with signals from outside.
     """
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
@@ -76,7 +90,11 @@ def frequency_response(
         period = found_period(records[0][0][:, 0])
         if period:
             return _by_lines(outside, u, y, period)
-    return _local_polynomial(records)
+    found = _local_polynomial(records)
+    if x is not None or delays is None or not _turns(delays, records):
+        return found
+    behind = _behind(delays, records)
+    return found if behind is None or (found is not None and _leaves_less(found, behind)) else behind
 
 
 def found_period(x: Array) -> int:
@@ -91,6 +109,21 @@ def found_period(x: Array) -> int:
         if np.all(np.abs(x[period:] - x[:-period]) <= tolerance):
             return int(period)
     return 0
+
+
+def response_delays(model: Model, samples: int, step: float) -> NDArray[np.int64]:
+    """(p, r): samples until the response to a pulse first has a tenth of its largest value; else 0.
+
+    Args:
+        samples: of the record; later responses are not looked for.
+        step: time between samples of a plant in continuous time; others know theirs.
+    """
+    pulses = np.zeros((model.inputs, samples, model.inputs))
+    pulses[np.arange(model.inputs), 0, np.arange(model.inputs)] = 1.0
+    with np.errstate(over="ignore", invalid="ignore"):  # responses of an unstable plant
+        caused, _ = model.simulate(pulses, np.zeros((model.inputs, samples, model.outputs)), step)
+    size = np.abs(np.nan_to_num(caused, nan=0.0, posinf=0.0, neginf=0.0))
+    return np.asarray(np.argmax(size >= _BEGUN * size.max(axis=1, keepdims=True), axis=1).T)
 
 
 def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | None:
@@ -136,9 +169,7 @@ def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
 
 def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
     """(x, u, y) of every record, each (N, channels)."""
-    inputs = records[0][1].shape[1]
-    unknowns = _PARABOLA * (inputs + len(records))
-    window = -(-(unknowns + _FREEDOM) // len(records)) + 1
+    inputs, window = records[0][1].shape[1], _window(records)
     found = []
     longest = max(len(y) for *_, y in records)
     if min(len(y) for *_, y in records) < 2 * window + 4:
@@ -155,6 +186,56 @@ def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse
         return None
     w, G, radius, noise, coherence = (np.array(values) for values in zip(*found, strict=True))
     return FrequencyResponse(w, G, radius, noise, coherence, "local_polynomial")
+
+
+def _window(records: Sequence[tuple[Array, ...]]) -> int:
+    """How many lines of each record the parabolas are fitted to."""
+    unknowns = _PARABOLA * (records[0][1].shape[1] + len(records))
+    return -(-(unknowns + _FREEDOM) // len(records)) + 1
+
+
+def _turns(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> bool:
+    """Whether a parabola cannot follow the phase of these delays."""
+    longest = max(len(y) for *_, y in records)
+    return bool(2.0 * np.pi * delays.max() * _window(records) / longest > _TURN)
+
+
+def _behind(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
+    """The response, output by output, to inputs that are delayed first; what lies before them is left out."""
+    last, found = int(delays.max()), []
+    for i, late in enumerate(delays):
+        shifted = [
+            (np.stack([u[last - d : len(u) - d, j] for j, d in enumerate(late)], axis=1), y[last:, i : i + 1])
+            for _, u, y in records
+            if len(y) > last
+        ]
+        one = _local_polynomial([(u, u, y) for u, y in shifted]) if shifted else None
+        if one is None:
+            return None
+        turned = np.exp(-1j * np.outer(one.frequency, late))
+        found.append(replace(one, G=one.G * turned[:, None, :]))
+    common = reduce(np.intersect1d, [one.frequency for one in found])
+    if not common.size:
+        return None
+    at = [np.searchsorted(one.frequency, common) for one in found]
+
+    def joined(attribute: Callable[[FrequencyResponse], NDArray]) -> NDArray:
+        return np.concatenate([attribute(one)[here] for one, here in zip(found, at, strict=True)], axis=1)
+
+    return FrequencyResponse(
+        common,
+        joined(lambda one: one.G),
+        joined(lambda one: one.radius),
+        joined(lambda one: one.noise),
+        joined(lambda one: one.coherence),
+        "local_polynomial",
+    )
+
+
+def _leaves_less(one: FrequencyResponse, other: FrequencyResponse) -> bool:
+    """Whether what the inputs do not explain is less by the first."""
+    first, second = (np.mean(np.log(np.maximum(found.noise, 1e-300))) for found in (one, other))
+    return bool(first <= second)
 
 
 def _transforms(*signals: Array) -> tuple[NDArray, ...]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.errors import IdesignError, bad_spec
-from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.results import Json, Results, Table
@@ -197,7 +197,8 @@ def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Jso
 def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     """The results with the frequency response of the data alone beside the model, where it can be had."""
     data = found.data
-    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths)
+    late = response_delays(found.model, max(data.lengths), units.step)
+    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=late)
     if response is None:
         return judged
     table, curves, told = response_of_data(units, found.model, response, by_reference=data.r is not None)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
-from inputdesign_cli.identification import cross_correlations, frequency_response, silent_in
+from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.explore import Fits, Found, answers_output, explore_records, fits
 from inputdesign_cli.identification.silent_lines import SilentLines
@@ -138,7 +138,8 @@ def _without_model(units: Units, log: Log, found: Found, *, loop: bool) -> _Resp
         loop: whether inputs answer the outputs.
     """
     moving = log.u[:, found.moving]
-    response = frequency_response(moving, log.y, lengths=log.lengths)
+    late = response_delays(found.model, max(log.lengths), units.step)[:, list(found.moving)]
+    response = frequency_response(moving, log.y, lengths=log.lengths, delays=late)
     if response is None:
         return None
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
@@ -78,7 +78,8 @@ def measure(
     task, judged = question.task, None
     silent: dict[str, SilentLines] = {}
     if task is None:
-        found = frequency_response(data.u, data.y, data.r, lengths=data.lengths)
+        late = response_delays(question.model, max(data.lengths), units.step)
+        found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=late)
         if found is None:
             raise DataError.because(
                 "too-few-samples",

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification import frequency_response, response_delays
+from inputdesign_cli.plant import ContinuousModel, PolynomialModel
 
 B, F = [0, 1.0, 0.4], [1, -1.2, 0.6]
 
@@ -122,3 +123,68 @@ def test_short_records_have_a_response_or_none(samples):
     for signal in (u, np.sign(u), np.zeros_like(u), np.resize([[1.0], [-1.0]], u.shape)):
         found = frequency_response(signal, y)
         assert found is None or np.all(np.isfinite(found.G))
+
+
+LATE = [[90, 3], [0, 40]]
+
+
+def _late_record(seed, samples=800):
+    """Two noises into two outputs behind LATE, cut out of a longer record."""
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal((samples + 300, 2))
+    y = 0.3 * rng.standard_normal((samples + 300, 2))
+    for i, late in enumerate(LATE):
+        for j, d in enumerate(late):
+            y[d:, i] += scipy.signal.lfilter(B, F, u[: len(u) - d, j])
+    return u[300:], y[300:]
+
+
+def _held(found):
+    """The share of its entries, of all frequencies, whose discs hold the plant."""
+    late = np.exp(-1j * found.frequency[:, None, None] * np.array(LATE))
+    return np.mean(np.abs(found.G - plant(found.frequency)[:, None, None] * late) < found.radius)
+
+
+def test_behind_their_dead_times_the_discs_of_each_entry_hold_the_plant():
+    told, untold = [], []
+    for seed in range(12):
+        u, y = _late_record(seed)
+        told.append(frequency_response(u, y, delays=np.array(LATE)))
+        untold.append(frequency_response(u, y))
+    assert np.mean([_held(found) for found in told]) == pytest.approx(0.95, abs=0.02)
+    # A parabola over the phase of 90 samples is useless, though its discs grow with what a line is off it.
+    wide = np.median([found.radius[:, 0, 0] for found in untold])
+    assert np.median([found.radius[:, 0, 0] for found in told]) < 0.5 * wide
+
+
+def test_dead_times_that_the_plant_does_not_have_are_not_believed():
+    u, y = _late_record(0)
+    usual, false = frequency_response(u, y), frequency_response(u, y, delays=np.array([[0, 0], [90, 300]]))
+    np.testing.assert_array_equal(usual.G, false.G)
+    np.testing.assert_array_equal(usual.radius, false.radius)
+
+
+def test_a_dead_time_of_most_of_the_record_is_left_alone():
+    u, y = _late_record(0, samples=120)
+    usual, false = frequency_response(u, y), frequency_response(u, y, delays=np.full((2, 2), 119))
+    np.testing.assert_array_equal(usual.G, false.G)
+
+
+def test_delays_of_responses_are_where_they_begin():
+    one, none = np.ones(1), np.zeros(1)
+    model = PolynomialModel(
+        ((np.array([0, 0, 0, 1.0]), none), (np.array([0.4]), np.array([0, 1e-4, 0.5]))),
+        (one,) * 2,
+        ((np.array([1, -0.9]), one), (one, np.array([1, -0.5]))),
+        (one,) * 2,
+        (one,) * 2,
+        np.eye(2),
+    )
+    np.testing.assert_array_equal(response_delays(model, 40, 1.0), [[3, 0], [0, 2]])
+
+
+def test_between_samples_a_dead_time_counts_to_the_sample_where_the_response_begins():
+    model = ContinuousModel.monic(
+        ((np.array([2.0]),),), ((np.array([1.0, 20.0]),),), np.eye(1), delay=((np.array([9.3]),),)
+    )
+    assert response_delays(model, 200, 0.5) == pytest.approx(19, abs=2)
