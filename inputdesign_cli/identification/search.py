@@ -33,6 +33,10 @@ _SPARE = 2
 # How often they are counted anew; more than one unknown start for so many samples are many.
 _MOST_COUNTS = 4
 _MANY = 10
+# Errors to spare beside unknown starts: with fewer nothing is said against rest.
+_FEWEST = 8
+# Of exp, so that it stays finite.
+_LARGEST = 50.0
 
 
 @dataclass(frozen=True)
@@ -158,6 +162,18 @@ def _deviance(records: Records, point: Point) -> float:
     return float(records.samples * np.linalg.slogdet(products)[1]) + point.near.of_noise
 
 
+def _by_chance(records: Records, fell: float, more: int, unknowns: int) -> float:
+    """The probability that so many `more` unknowns, useless ones, let -2 log likelihood fall as far.
+
+    Many unknowns shrink what is left of noise that is estimated along, which chi-squared does not know.
+    """
+    left = records.y.size - records.size - unknowns
+    if records.weights is not None or left < 1:
+        return float(scipy.special.chdtrc(more, fell))
+    ratio = np.expm1(min(fell / records.y.size, _LARGEST))
+    return float(scipy.special.fdtrc(more, left, ratio * left / more))
+
+
 def _swamped(records: Records, late: int) -> bool:
     """Whether unknown inputs that act for so many samples explain half of a record, whatever the model."""
     return 2 * late * records.u.shape[1] > max(records.lengths)
@@ -172,8 +188,8 @@ def from_rest_or_free(
 ) -> Search:
     """The search from rest, unless unknown starts explain what it leaves better than chance.
 
-    The likelihood ratio of the two is chi-squared with as many degrees of freedom as there are more unknowns.
-    Noise never rests: what was before the record is unknown either way.
+    An F test of their likelihood ratio, with as many degrees of freedom as there are more unknowns. Noise
+    never rests: what was before the record is unknown either way.
 
     Args:
         records: from rest.
@@ -210,12 +226,12 @@ def from_rest_or_free(
 
     def more(point: Point) -> int:
         """Unknowns, beyond those from rest; none where too few errors are left to compare."""
-        few = records.y.size <= records.size + 2 * point.near.unknowns
+        few = records.y.size <= records.size + point.near.unknowns + _FEWEST
         return 0 if few else point.near.unknowns - at_rest.point.near.unknowns
 
     def probability(start: Records, point: Point, gain: float = 0.0) -> float:
-        statistic = max(from_rest - _deviance(start, point) + gain, 0.0)
-        return float(scipy.special.chdtrc(max(more(point), 1), statistic))
+        fell = max(from_rest - _deviance(start, point) + gain, 0.0)
+        return _by_chance(records, fell, max(more(point), 1), point.near.unknowns)
 
     def unless_by_chance(begun: Search) -> Search:
         refuted = more(begun.point) > 0 and probability(begun.records, begun.point) < _MISTAKEN

@@ -28,16 +28,20 @@ def model_of(words, delay, colour=""):
     return build_model(parse_spec(text, design=False))
 
 
-def cut_out(delay, seed, *, colour=0.0):
-    """u, y of a running experiment; the plant by its closed form behind a hold, the noise through 1/D."""
+def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
+    """u, y of a running experiment; the plant by its closed form behind a hold, the noise through 1/D.
+
+    Args:
+        before: samples that nobody recorded; 0: from rest.
+    """
     rng = np.random.default_rng(seed)
-    u = np.repeat(rng.choice([-1.0, 1.0], (N + BEFORE) // 5), 5)
+    u = np.repeat(rng.choice([-1.0, 1.0], (N + before) // 5), 5)
     whole, rest = divmod(delay, 1.0)
     pole, early = np.exp(-1.0 / LAG), 1.0 - np.exp(-(1.0 - rest) / LAG)
     B = np.concatenate([np.zeros(int(whole) + 1), GAIN * np.array([early, 1.0 - pole - early])])
-    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(N + BEFORE))
+    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(N + before))
     y = scipy.signal.lfilter(B, [1.0, -pole], u) + noise
-    return u[BEFORE:, None], y[BEFORE:, None]
+    return u[before:, None], y[before:, None]
 
 
 @pytest.mark.parametrize("words", [IN_S, IN_STATES], ids=["s", "states"])
@@ -52,6 +56,37 @@ def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, d
         variances.append(found.noise[0, 0])
     assert failed <= 1
     assert np.mean(variances) == pytest.approx(0.01, rel=0.1)
+    assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
+
+
+def _short_records(seed, *, at_rest):
+    """Twenty of 16 samples behind a dead time of 4.3: unknown starts are a third of what is measured."""
+    length, cut = 16, []
+    for part in range(20):
+        u, y = cut_out(4.3, 1000 * seed + part, before=0 if at_rest else BEFORE)
+        cut.append((u[:length], y[:length]))
+    u, y = (np.concatenate(signals) for signals in zip(*cut, strict=True))
+    return u, y, [length] * len(cut)
+
+
+def test_many_short_records_at_rest_are_believed_to_be():
+    """Unknown starts shrink what is left of the noise, so that chi-squared refuted 23 of 30."""
+    model = model_of(IN_S, 4.3)
+    refuted = 0
+    for seed in range(4):
+        u, y, lengths = _short_records(seed, at_rest=True)
+        refuted += identify(model, u, y, lengths=lengths, start=model.theta).rest_refuted
+    assert refuted <= 1
+
+
+def test_many_short_records_of_a_running_experiment_are_not_taken_for_rest():
+    """Where unknown starts explain half of the samples, rest was kept without a word."""
+    model, deviations = model_of(IN_S, 4.3), []
+    for seed in range(2):
+        u, y, lengths = _short_records(seed, at_rest=False)
+        found = identify(model, u, y, lengths=lengths, start=model.theta)
+        assert found.rest_refuted
+        deviations.append((found.theta - model.theta) / np.sqrt(np.diag(found.covariance)))
     assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
 
 

@@ -49,9 +49,9 @@ def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
     assert spec.sample_time == 5.0
     assert spec.noise.drift
     plant = spec.plant.continuous
-    assert plant.gain == pytest.approx(2.0, rel=0.05)
-    assert plant.time_constant == pytest.approx(180.0, rel=0.05)
-    assert plant.dead_time == pytest.approx(25.0, abs=1.0)
+    assert plant.numerator == pytest.approx((2.0,), rel=0.05)
+    assert plant.denominator == pytest.approx((180.0, 1.0), rel=0.05)
+    assert plant.delay == pytest.approx(25.0, abs=1.0)
 
 
 def _log(folder, samples=1200, *, beside=0.0):

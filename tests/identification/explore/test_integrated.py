@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.signal
+import scipy.stats
 from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.identification.explore import explore_records, fits
@@ -34,19 +35,25 @@ def polynomials(pole=0.9, c=-0.3):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2, 8))
-def test_the_gain_is_told_beside_a_random_walk(seed):
-    """Output-error models took the walk for slow modes of the plant, once with a gain of the wrong sign."""
-    rng = np.random.default_rng(seed)
-    u = steps()
-    y = lagged(u) + walk(rng, u.size, 0.06) + 0.04 * rng.standard_normal(u.size)
-    found = explore_records([(u[:, None], y[:, None])])
-    assert found.wanders == (True,)
-    assert not found.estimate.failed
-    w = np.array([1e-3, 0.05, 0.2])
-    G = found.model.plant_at(w)[:, 0, 0]
-    truth = GAIN / (1.0 + 1j * w * LAG) * np.exp(-1j * w * LATE)
-    np.testing.assert_allclose(np.abs(G), np.abs(truth), rtol=0.3)
+def test_gains_are_told_beside_random_walks():
+    """Output-error models took the walk for slow modes of the plant, once with a gain of the wrong sign.
+
+    By chance a level may be likelier than a walk, and one of many tests refuse a right model: once in six.
+    """
+    deviations, wander, refused = [], 0, 0
+    for seed in range(2, 8):
+        rng = np.random.default_rng(seed)
+        u = steps()
+        y = lagged(u) + walk(rng, u.size, 0.06) + 0.04 * rng.standard_normal(u.size)
+        found = explore_records([(u[:, None], y[:, None])])
+        wander += found.wanders == (True,)
+        refused += bool(found.estimate.failed)
+        slow = np.array([1e-6])
+        gain, slope = (f(slow)[0, ..., 0, 0].real for f in (found.model.plant_at, found.model.plant_gradient))
+        deviations.append((gain - GAIN) / np.sqrt(slope @ found.estimate.covariance @ slope))
+    assert wander >= 5
+    assert refused <= 1
+    assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, len(deviations))
 
 
 def test_walks_and_noise_about_levels_are_told_apart():
