@@ -127,7 +127,7 @@ def judge(
     broken = bool(faults(task.header.units, found.estimate, found.data))
     notes = [] if broken else objections(task.header.units, without)
     causes = {
-        "unsettled": unsettled(found.estimate),
+        "unsettled": unsettled(found.model, found.estimate),
         "contradicted": [
             *speaking_against(task, found),
             *differences(found.estimate, [name for name, _ in found.data.files]),

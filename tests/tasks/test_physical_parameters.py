@@ -4,12 +4,14 @@ import json
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from inputdesign_cli import parse_spec, simulate, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import identify
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks import assess
 from inputdesign_cli.tasks.build.system import build_model
 from inputdesign_cli.tasks.build.task import build_task
 from inputdesign_cli.tasks.result.blocks import blocks_of
@@ -208,3 +210,26 @@ def test_what_is_known_of_one_fixes_nothing_of_the_other(name, of_plant, of_nois
     assert found.names == tuple(name if one == "K" else one for one in other.names)
     np.testing.assert_array_equal(found.input_gradient(w), other.input_gradient(w))
     np.testing.assert_array_equal(found.noise_gradient(w), other.noise_gradient(w))
+
+
+@pytest.mark.parametrize(("end", "stopped"), [(22.0, True), (10.0, False)])
+def test_an_estimate_that_the_end_of_an_expression_stops_is_told_and_decides_nothing(end, stopped, tmp_path):
+    """The plant has T = 20; an expression that ends at 22 left an estimate there that met what was asked."""
+    rng = np.random.default_rng(3)
+    u, pole = np.repeat(rng.choice([-1.0, 1.0], 80), 5), np.exp(-5.0 / 20.0)
+    y = scipy.signal.lfilter([0.0, 0.0, 2.0 * (1.0 - pole)], [1.0, -pole], u) + 0.2 * rng.standard_normal(400)
+    np.savetxt(tmp_path / "log.csv", np.c_[u, y], delimiter=",", header="u,y", comments="")
+    spec = parse_spec(f"""
+sample_time: 5
+plant:
+  parameters: {{K: 2, T: 25}}
+  B: [0, 0, K*(1 - exp(-5/T))]
+  F: [1, "-exp(-5/T) + 0*log(T - {end})"]
+noise: {{variance: 0.04}}
+experiment: {{samples: 400}}
+accuracy: {{model_error: {{relative: 0.5}}}}
+""")
+    judged = assess(spec, [tmp_path / "log.csv"])
+    reasons = judged.results.result["assessment"].get("undecided", [])
+    assert any("stopped at T = 22" in reason for reason in reasons) == stopped
+    assert judged.verdict == ("undecided" if stopped else "met")

@@ -123,7 +123,7 @@ def identification_notes(
         for letter, polynomials in predictor.items()
         if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
     ]
-    notes += [*unsettled(estimate), *_free_start(estimate)]
+    notes += [*unsettled(model, estimate), *_free_start(estimate)]
     if at_the_edge:
         notes.append(
             f"{' and '.join(at_the_edge)} has a root on the unit circle, as far as {samples} "

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.identification import Alternative, Estimate, ScoreTest
 from inputdesign_cli.plant import Model
@@ -40,6 +41,8 @@ REMEDY = {
 # and may hide what they say, and the data with this one, and so seldom do they agree as closely.
 _ONE_SYSTEM, _PRIOR = 1e-3, 1e-2
 _LEAST = 1e-300
+# Of a standard deviation or of the number itself: nearer to where an expression ends, it was stopped there.
+_ASIDE = 0.001
 
 
 def chance(probability: float) -> str:
@@ -47,15 +50,39 @@ def chance(probability: float) -> str:
     return f"{probability:.1e}" if probability >= _LEAST else f"below {_LEAST:.0e}"
 
 
-def unsettled(estimate: Estimate) -> list[str]:
-    """What to say of a search that did not settle."""
-    if estimate.converged:
-        return []
-    begun = "its only start" if estimate.starts == 1 else f"the best of {estimate.starts} starts"
-    return [
-        f"the search did not settle after {estimate.steps} steps from {begun}: "
-        "the estimate may be far from the minimum; the orders may be too high for these data"
-    ]
+def unsettled(model: Model, estimate: Estimate) -> list[str]:
+    """What to say of a search that did not settle, or that the end of an expression stopped.
+
+    Args:
+        model: the estimate as a model.
+    """
+    found = []
+    if not estimate.converged:
+        begun = "its only start" if estimate.starts == 1 else f"the best of {estimate.starts} starts"
+        found.append(
+            f"the search did not settle after {estimate.steps} steps from {begun}: "
+            "the estimate may be far from the minimum; the orders may be too high for these data"
+        )
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    for k in np.flatnonzero(~model.dead_times).tolist():
+        step = _ASIDE * min(deviations[k], abs(model.theta[k]) or np.inf)
+        beside = [model.at(theta).flaw for theta in _beside(model.theta, k, step)]
+        flaw = next(filter(None, beside), None)
+        if flaw is not None:
+            found.append(
+                f"the search stopped at {model.names[k]} = {model.theta[k]:.6g}, beyond which {flaw}: the "
+                "likeliest parameters may lie there, and its deviation is not to be trusted; write the "
+                "expression so that it is defined wherever the plant may be"
+            )
+    return found
+
+
+def _beside(theta: NDArray[np.float64], index: int, step: float) -> Iterator[NDArray[np.float64]]:
+    """theta with one parameter a little less, and a little more."""
+    for sign in (-1.0, 1.0):
+        moved = theta.copy()
+        moved[index] += sign * step
+        yield moved
 
 
 def contradictions(estimate: Estimate, looks: int = 1) -> list[str]:
