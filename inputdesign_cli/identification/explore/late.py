@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
@@ -15,9 +17,8 @@ _ORDER = 20
 _CERTAIN = 1e-6
 # Inputs that move together, or again and again in the same way, are also answered late by half of the best.
 _CLEARLY = 2.0
-# What any order leaves of the output where no later answer is looked for; what a late lag must leave of that.
-_ENOUGH, _MUCH = 0.05, 0.5
-_TRIED = 80
+# How many late lags are tried, the samples that must be left behind them, and what they must gain in BIC.
+_TRIED, _FEWEST, _BETTER = 80, 20, 20.0
 
 
 def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
@@ -51,27 +52,57 @@ def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def far_answers(parts: Parts, near: SharedDenominator, most: int, furthest: int) -> tuple[int, ...]:
+def far_answers(parts: Parts, near: Sequence[SharedDenominator], most: int, furthest: int) -> tuple[int, ...]:
     """The same by the output error of a lag, which also tells few jumps in noise; zero where it tells none.
 
-    An input that is held jumps in few samples, and noise hides what is new in a slow output there.
+    An input that is held jumps in few samples, and noise hides what is new in a slow output there. What comes
+    before a first answer is left out, since nobody knows the inputs that cause it. By BIC the lag must
+    explain the rest better than plants with short delays do.
 
     Args:
         parts: records u (n, r), y (n, 1).
-        near: the best of all orders with delays to `most`.
+        near: the best of each order with delays to `most`.
         furthest: the lag up to which to look.
     """
-    varying = np.concatenate([y - y.mean() for _, y in parts])
-    if near.loss <= _ENOUGH * float(np.mean(varying**2)):
-        return (0,) * len(near.delays)
     beyond = range(most + 1, furthest, max((furthest - most) // _TRIED, 1))
-    found = []
-    for j in range(len(near.delays)):
-        before, after = near.delays[:j], near.delays[j + 1 :]
-        losses = {lag: output_error(parts, 1, 2, (*before, lag, *after)).loss for lag in beyond}
-        best = min(losses, key=lambda lag: losses[lag], default=0)
-        found.append(best if best and losses[best] <= _MUCH * near.loss else 0)
-    return tuple(found)
+    return tuple(_far_answer(parts, near, j, beyond) for j in range(len(near[0].delays)))
+
+
+def _far_answer(parts: Parts, near: Sequence[SharedDenominator], input: int, beyond: range) -> int:
+    """The lag of one input; zero where none is told."""
+    delays = min(near, key=lambda found: found.loss).delays
+    others = [0 if i == input else delay for i, delay in enumerate(delays)]
+    unexplained = {lag: _unexplained(_behind(parts, lag, (input,)), others) for lag in beyond}
+    best = min(unexplained, key=lambda lag: unexplained[lag], default=0)
+    if not (best and np.isfinite(unexplained[best])):
+        return 0
+    usual = min(_criterion(_behind(parts, best), one.F.size - 1, one.delays) for one in near)
+    late = _criterion(_behind(parts, best, (input,)), 1, others)
+    return best if late < usual - _BETTER else 0
+
+
+def _unexplained(parts: Parts, delays: Sequence[int]) -> float:
+    """What a plant of order one leaves of the variance of y."""
+    levels = [y - y.mean() for _, y in parts]
+    varying = float(np.mean(np.concatenate(levels) ** 2)) if levels else 0.0
+    return output_error(parts, 1, 2, delays).loss / varying if varying > 0.0 else np.inf
+
+
+def _criterion(parts: Parts, order: int, delays: Sequence[int]) -> float:
+    """BIC of the output-error model."""
+    samples, terms = sum(len(y) for _, y in parts), max(order, 2)
+    loss = output_error(parts, order, terms, delays).loss
+    return float(samples * np.log(max(loss, 1e-300)) + (order + terms * len(delays)) * np.log(samples))
+
+
+def _behind(parts: Parts, lag: int, late: Sequence[int] = ()) -> Parts:
+    """The records without their first samples; inputs (from zero) that are `late` are that much earlier."""
+    cut = []
+    for u, y in parts:
+        if len(y) > lag + _FEWEST:
+            columns = [x[: len(x) - lag] if j in late else x[lag:] for j, x in enumerate(u.T)]
+            cut.append((np.stack(columns, axis=1), y[lag:]))
+    return cut
 
 
 def _new(signals: list[Array], order: int) -> list[Array]:

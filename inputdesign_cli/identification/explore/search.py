@@ -200,10 +200,9 @@ def explore_structure(
     if not (by_prediction or any(later)):
         # What judges must be longer than the delay, too.
         furthest = 2 * min(max(len(y) for _, y in some) for some in (first, second)) // 3
-        nearest = min(quick.values(), key=lambda found: found.loss)
-        later = far_answers(first, nearest, most, furthest)
+        later = far_answers(first, list(quick.values()), most, furthest)
         if any(later):
-            most = _beyond(most, later)
+            most, least = _beyond(most, later), tuple(lag // 2 for lag in later)
             quick = _quick(clean, highest, most, later, least)
         quick, most = _beyond_limit(clean, quick, most, min(furthest, _FURTHEST), least)
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}

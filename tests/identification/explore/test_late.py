@@ -1,0 +1,65 @@
+"""Answers that come later than delays are looked for: told where they are, and nowhere else."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.identification.explore.late import far_answers
+from inputdesign_cli.identification.explore.regression import best_delays
+
+MOST, FURTHEST = 30, 80
+
+
+def record(seed, late, hold, samples=180, before=200):
+    """A lag behind `late` samples, in white noise of a seventh of the move; cut out of a longer record."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], (samples + before) // hold + 1), hold)[: samples + before]
+    y = scipy.signal.lfilter([0.0] * late + [0.1], [1.0, -0.9], u) + 0.15 * rng.standard_normal(u.size)
+    return u[before:, None], y[before:, None]
+
+
+def answers(*parts):
+    """With short delays of all orders up to five tried first, as the search does."""
+    near, delays = [], (0,) * parts[0][0].shape[1]
+    for n in range(1, 6):
+        near.append(best_delays(parts, n, max(n, 2), MOST, delays))
+        delays = near[-1].delays
+    return far_answers(parts, near, MOST, FURTHEST)
+
+
+@pytest.mark.parametrize("hold", [8, 12, 15])
+@pytest.mark.parametrize("late", [45, 60, 72])
+def test_late_answers_to_few_jumps_in_noise_are_told(hold, late):
+    """What comes before them, a quarter of the record and more, answers inputs that nobody knows.
+
+    The search that follows tells the delay to a sample.
+    """
+    for seed in range(3):
+        (found,) = answers(record(seed, late, hold))
+        assert found == pytest.approx(late, abs=5)
+
+
+@pytest.mark.parametrize("fault", ["none", "saturation", "walk", "load", "cycle", "input without effect"])
+def test_what_else_is_wrong_with_a_record_makes_no_late_answer(fault):
+    for seed in range(12):
+        rng, samples = np.random.default_rng(100 + seed), 180
+        u, y = record(seed, 3, (5, 15, 40)[seed % 3])
+        drift = {
+            "saturation": np.where(y[:, 0] > 0.3, 0.3 - y[:, 0], 0.0),
+            "walk": 0.1 * np.cumsum(rng.standard_normal(samples)),
+            "load": 0.8 * (np.arange(samples) > rng.integers(40, 140)),
+            "cycle": 0.5 * np.sin(np.arange(samples) / rng.uniform(10.0, 25.0)),
+            "input without effect": scipy.signal.lfilter([0.1], [1.0, -0.95], rng.standard_normal(samples))
+            - y[:, 0],
+        }.get(fault, np.zeros(samples))
+        assert answers((u, y + drift[:, None])) == (0,)
+
+
+def test_of_two_inputs_the_late_one_is_told():
+    (u, y), (other, more) = record(1, 60, 15), record(2, 3, 9)
+    assert answers((np.hstack([other, u]), y + more)) == (0, pytest.approx(60, abs=2))
+
+
+def test_records_too_short_for_a_lag_tell_none():
+    u, y = record(1, 3, 5)
+    assert answers(*[(u[at : at + 30], y[at : at + 30]) for at in range(0, 180, 30)]) == (0,)
