@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.explore.regression import LONG
 from inputdesign_cli.plant.polynomial import Array
 
 Cut = Literal[
@@ -33,44 +34,77 @@ _BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
 _STILL = 0.2
 
 
-def divided(parts: Parts) -> tuple[Parts, Parts, Split]:
+class Division(NamedTuple):
+    """The records that estimate, those that judge, and how they were parted.
+
+    Attributes:
+        before: of each record that judges what was recorded right before it, which may be nothing.
+    """
+
+    first: Parts
+    second: Parts
+    split: Split
+    before: Parts = ()
+
+
+def begun_before(second: Parts, before: Parts, late: int) -> list[tuple[Array, Array]]:
+    """The records that judge, to be left out of for so many samples.
+
+    Where that is much of them they begin as much earlier, in what was recorded right `before`: the inputs
+    that are answered so late are known there.
+    """
+    if not before or late * LONG <= max(len(y) for _, y in second):
+        return list(second)
+    return [
+        (np.concatenate([past_u[-late:], u]), np.concatenate([past_y[-late:], y]))
+        for (u, y), (past_u, past_y) in zip(second, before, strict=True)
+    ]
+
+
+def divided(parts: Parts) -> Division:
     """What estimates and what judges: beginning and end of the records.
 
     Blocks in turn where an input rests in one of these wherever they are parted; the whole twice where it
     does so in any blocks.
     """
-    for first, second, split in _divisions(parts):
-        if _moves(first, parts) and _moves(second, parts):
-            return first, second, split
-    return parts, parts, "none"
+    for division in _divisions(parts):
+        if _moves(division.first, parts) and _moves(division.second, parts):
+            return division
+    return Division(parts, parts, "none")
 
 
-def _divisions(parts: Parts) -> Iterator[tuple[Parts, Parts, Split]]:
+def _divisions(parts: Parts) -> Iterator[Division]:
     total = sum(len(y) for _, y in parts)
     for share, cut in _CUTS:
-        yield *_cut(parts, int(share * total)), cut
+        yield _cut(parts, int(share * total), cut)
     for count in _BLOCKS:
         length = max(total // count, 1)
         blocks = [
-            (u[begin : begin + length], y[begin : begin + length])
-            for u, y in parts
+            (k, begin)
+            for k, (_, y) in enumerate(parts)
             for begin in range(0, len(y), length)
             if len(y) - begin >= length // 2
         ]
-        yield blocks[::2], blocks[1::2], "blocks in turn"
+        first, second = (
+            [(parts[k][0][begin : begin + length], parts[k][1][begin : begin + length]) for k, begin in some]
+            for some in (blocks[::2], blocks[1::2])
+        )
+        before = [(parts[k][0][:begin], parts[k][1][:begin]) for k, begin in blocks[1::2]]
+        yield Division(first, second, "blocks in turn", before)
 
 
-def _cut(parts: Parts, left: int) -> tuple[Parts, Parts]:
+def _cut(parts: Parts, left: int, cut: Cut) -> Division:
     """The first samples of the records, so many in all, and the others."""
-    first: list[tuple[Array, Array]] = []
-    second: list[tuple[Array, Array]] = []
+    first, second, before = (list[tuple[Array, Array]]() for _ in range(3))
     for u, y in parts:
         at = min(max(left, 0), len(y))
         left -= len(y)
-        for some, piece in ((first, slice(0, at)), (second, slice(at, None))):
-            if len(y[piece]):
-                some.append((u[piece], y[piece]))
-    return first, second
+        if at:
+            first.append((u[:at], y[:at]))
+        if at < len(y):
+            second.append((u[at:], y[at:]))
+            before.append((u[:at], y[:at]))
+    return Division(first, second, cut, before)
 
 
 def _moves(some: Parts, whole: Parts) -> bool:

@@ -14,7 +14,8 @@ import numpy as np
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.explore.fits import Parts, output_error_form
 from inputdesign_cli.identification.explore.integrated import like_random_walks
-from inputdesign_cli.identification.explore.joint import Found, criterion, explored, moving_in
+from inputdesign_cli.identification.explore.joint import Found, criterion, explored
+from inputdesign_cli.identification.explore.moving import moving_in
 from inputdesign_cli.identification.explore.regression import best_delays, output_error
 from inputdesign_cli.plant.polynomial import Array
 

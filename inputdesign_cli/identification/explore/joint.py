@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.identification.checks import check_varying, signal_name
+from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.candidates import Candidate, Chosen, Ranges
-from inputdesign_cli.identification.explore.division import Split, divided
+from inputdesign_cli.identification.explore.division import Division, Split, begun_before, divided
 from inputdesign_cli.identification.explore.fits import (
     NOT_COMPUTED,
     Fits,
@@ -26,15 +26,14 @@ from inputdesign_cli.identification.explore.fits import (
     percent,
 )
 from inputdesign_cli.identification.explore.integrated import integrating
+from inputdesign_cli.identification.explore.moving import moving_in
 from inputdesign_cli.identification.explore.orders import NOISE_ORDERS
 from inputdesign_cli.identification.explore.search import explore_structure
 from inputdesign_cli.identification.explore.together import joined
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
-_FEWEST = 30
 _MOST_SAMPLES = 20_000
-_UNKNOWN = ("gain and dynamics",)
 _TOO_SIMPLE = "the input moves too little or too simply: apply steps of several lengths, or a PRBS"
 # Structures of the kind of the first output's best (in s or in q^-1), then of the other.
 _KINDS = (True, False)
@@ -102,12 +101,14 @@ def explored(
     """
     still, moved = moving_in(parts)
     moving = [j for j in range(parts[0][0].shape[1]) if j not in still]
-    first, second, split = divided(moved)
+    division = divided(moved)
     walks = (False,) * parts[0][1].shape[1] if wanders is None else tuple(wanders)
-    found = _structures(first, second, feedback, step, walks, physical=not still)
+    found = _structures(division, feedback, step, walks, physical=not still)
     used = busiest(moved, _MOST_SAMPLES)
     taken, estimate, model = _estimated(found, used, feedback, ramp, walks)
-    single = [[(u, y[:, i : i + 1]) for u, y in second] for i in range(len(taken))]
+    late = max(max(candidate.orders.delays) for candidate in taken)
+    second = begun_before(division.second, division.before, late)
+    single = [_output(second, i) for i in range(len(taken))]
     judged = [fits(c.model, own) for c, own in zip(taken, single, strict=True)]
     idle = [fits(c.model, [(0.0 * u, y) for u, y in own]) for c, own in zip(taken, single, strict=True)]
     whole = integrating(joined(taken, parts[0][0].shape[1], moving), walks)
@@ -122,25 +123,30 @@ def explored(
         _busiest_samples(moved),
         beside(judged),
         tuple(percent(own.errors, none.errors)[0] for own, none in zip(judged, idle, strict=True)),
-        split,
+        division.split,
         still,
         walks,
     )
 
 
 def _structures(
-    first: Parts, second: Parts, feedback: bool, step: float, wanders: Sequence[bool], *, physical: bool
+    division: Division, feedback: bool, step: float, wanders: Sequence[bool], *, physical: bool
 ) -> list[Chosen]:
     """What is found for each output.
 
     Raises:
         SpecError: `no-structure`.
     """
-    found, outputs = [], first[0][1].shape[1]
+    found, outputs = [], division.first[0][1].shape[1]
     for i in range(outputs):
-        own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
         chosen = explore_structure(
-            own[0], own[1], feedback=feedback, step=step, physical=physical, wanders=wanders[i]
+            _output(division.first, i),
+            _output(division.second, i),
+            feedback=feedback,
+            step=step,
+            physical=physical,
+            wanders=wanders[i],
+            before=_output(division.before, i),
         )
         if chosen is None:
             name = signal_name("y", i, outputs)
@@ -154,33 +160,8 @@ def _structures(
     return found
 
 
-def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]:
-    """The inputs that never move, and the records without them.
-
-    Raises:
-        SpecError: `too-few-samples`, `constant-input` or `constant-output`.
-    """
-    u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
-    _check_length(len(y), _FEWEST)
-    still = tuple(int(j) for j in np.flatnonzero(np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0)))
-    if len(still) == u.shape[1]:
-        check_varying(_UNKNOWN, u, y)
-    moving = [j for j in range(u.shape[1]) if j not in still]
-    check_varying(_UNKNOWN, u[:, moving], y)
-    _check_length(len(y), _FEWEST * (len(moving) + 1) // 2)
-    return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
-
-
-def _check_length(samples: int, needed: int) -> None:
-    """Raises `SpecError` (`too-few-samples`) where there are fewer."""
-    if samples < needed:
-        are = "1 sample is" if samples == 1 else f"{samples} samples are"
-        raise bad_spec(
-            "too-few-samples",
-            f"{are} too few to choose a structure and to judge it: take {needed} at least",
-            hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
-            key="u",
-        )
+def _output(parts: Parts, output: int) -> list[tuple[Array, Array]]:
+    return [(u, y[:, output : output + 1]) for u, y in parts]
 
 
 def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
@@ -283,7 +264,7 @@ def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool, ramp:
     Raises:
         ArithmeticError: a dead time has run off.
     """
-    own = [(u, y[:, output : output + 1]) for u, y in used]
+    own = _output(used, output)
     near = _near(candidate, used[0][0].shape[1])
     estimate = _identified(candidate.model, own, feedback, candidate.theta, near=near, ramp=ramp)
     return candidate.estimated(estimate.theta, estimate.noise)

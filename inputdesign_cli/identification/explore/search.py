@@ -29,6 +29,7 @@ from inputdesign_cli.identification.explore.candidates import (
     settled_at,
     with_noise,
 )
+from inputdesign_cli.identification.explore.division import begun_before
 from inputdesign_cli.identification.explore.fits import (
     NOT_COMPUTED,
     Parts,
@@ -174,6 +175,7 @@ def explore_structure(
     step: float = 1.0,
     physical: bool = True,
     wanders: bool = False,
+    before: Parts = (),
 ) -> Chosen | None:
     """The structures of one output, y (n, 1), from all inputs (n, r); None where nothing can be estimated.
 
@@ -183,9 +185,11 @@ def explore_structure(
         step: the sample time.
         physical: whether plants in s are tried.
         wanders: whether the noise integrates.
+        before: what was recorded right before each of those that judge; empty: nothing.
     """
-    levels = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
-    first, second = map(differenced, levels) if wanders else levels
+    levels, judging = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
+    first = differenced(levels) if wanders else levels
+    whole = all(len(u) == len(judged) for (u, _), (judged, _) in zip(second, judging, strict=True))
     by_prediction = feedback or wanders
     samples = sum(len(y) for _, y in first)
     r = first[0][0].shape[1]
@@ -198,8 +202,9 @@ def explore_structure(
     most = _beyond(most, later)
     quick = _quick(clean, highest, most, tuple(map(max, least, later)), least)
     if not (by_prediction or any(later)):
-        # What judges must be longer than the delay, too.
-        furthest = 2 * min(max(len(y) for _, y in some) for some in (first, second)) // 3
+        # What judges must be longer than the delay, too, unless the inputs before it are known.
+        shorter = (first,) if whole and before else (first, judging)
+        furthest = 2 * min(max(len(y) for _, y in some) for some in shorter) // 3
         later = far_answers(first, list(quick.values()), most, furthest)
         if any(later):
             most, least = _beyond(most, later), tuple(lag // 2 for lag in later)
@@ -209,9 +214,11 @@ def explore_structure(
     near = min(quick, key=lambda n: _criterion(quick, n, samples))
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
     late = max(max(found.delays) for found in quick.values())
+    if whole:
+        judging = begun_before(judging, before, late)
     # What is to judge a model must be longer than its delay.
-    latest = min(_RUN_OFF * most, max(len(y) for _, y in levels[1]) - 1)
-    parts = _Parts(first, levels, feedback, wanders, quick, resting, late, latest)
+    latest = min(_RUN_OFF * most, max(len(y) for _, y in judging) - 1)
+    parts = _Parts(first, (levels, judging), feedback, wanders, quick, resting, late, latest)
 
     families = dict[str, None]()
 
@@ -229,7 +236,7 @@ def explore_structure(
     else:
         begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(least))]
         known = [shape for n in orders for shape in plant_order(n, quick[n].delays)]
-        found = judged([gain, *known, *_best_arx(first, second, begun, samples, late), *in_s])
+        found = judged([gain, *known, *_best_arx(first, judging, begun, samples, late), *in_s])
         for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
             simulating = [c for c in found if c.orders.family in family]
             if simulating:

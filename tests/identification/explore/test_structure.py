@@ -229,7 +229,7 @@ def test_a_step_excites_as_many_delays_as_stand_before_it(at):
 def test_every_input_moves_in_both_parts():
     u = np.zeros((1000, 2))
     u[:500, 0], u[500:, 1] = held(np.random.default_rng(1), 500), held(np.random.default_rng(2), 500)
-    first, second, split = divided([(u, u)])
+    first, second, split, _ = divided([(u, u)])
     assert split == "blocks in turn"
     for part in (first, second):
         assert np.all(np.concatenate([x for x, _ in part]).std(axis=0) > 0)
@@ -247,7 +247,7 @@ def test_a_single_step_is_not_cut_in_two(ramp):
 @given(st.integers(20, 260), st.integers(40, 120))
 def test_a_step_and_the_step_back_are_parted(at, width):
     u = ((np.arange(400) >= at) & (np.arange(400) < at + width)).astype(float)[:, None]
-    first, second, split = divided([(u, u)])
+    first, second, split, _ = divided([(u, u)])
     assert split != "none"
     for part in (first, second):
         assert max(np.ptp(own) for own, _ in part) == 1.0
