@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past, untold
@@ -71,21 +72,23 @@ def far_answers(parts: Parts, near: Sequence[SharedDenominator], most: int, furt
 def _far_answer(parts: Parts, near: Sequence[SharedDenominator], input: int, beyond: range) -> int:
     """The lag of one input; zero where none is told."""
     delays = min(near, key=lambda found: found.loss).delays
-    others = [0 if i == input else delay for i, delay in enumerate(delays)]
-    unexplained = {lag: _unexplained(_behind(parts, lag, (input,)), others) for lag in beyond}
+    only = np.arange(len(delays)) == input
+    others = np.where(only, 0, delays)
+    unexplained = {lag: _unexplained(behind(parts, only * lag), others) for lag in beyond}
     best = min(unexplained, key=lambda lag: unexplained[lag], default=0)
     if not (best and np.isfinite(unexplained[best])):
         return 0
-    usual = min(_criterion(_behind(parts, best), one.F.size - 1, one.delays) for one in near)
-    late = _criterion(_behind(parts, best, (input,)), 1, others)
+    cut = [(u[best:], y[best:]) for u, y in parts if len(y) > best + _FEWEST]
+    usual = min(_criterion(cut, one.F.size - 1, one.delays) for one in near)
+    late = _criterion(behind(parts, only * best), 1, others.tolist())
     return best if late < usual - _BETTER else 0
 
 
-def _unexplained(parts: Parts, delays: Sequence[int]) -> float:
+def _unexplained(parts: Parts, delays: NDArray[np.int64]) -> float:
     """What a plant of order one leaves of the variance of y."""
     levels = [y - y.mean() for _, y in parts]
     varying = float(np.mean(np.concatenate(levels) ** 2)) if levels else 0.0
-    return output_error(parts, 1, 2, delays).loss / varying if varying > 0.0 else np.inf
+    return output_error(parts, 1, 2, delays.tolist()).loss / varying if varying > 0.0 else np.inf
 
 
 def _criterion(parts: Parts, order: int, delays: Sequence[int]) -> float:
@@ -95,14 +98,14 @@ def _criterion(parts: Parts, order: int, delays: Sequence[int]) -> float:
     return float(samples * np.log(max(loss, 1e-300)) + (order + terms * len(delays)) * np.log(samples))
 
 
-def _behind(parts: Parts, lag: int, late: Sequence[int] = ()) -> Parts:
-    """The records without their first samples; inputs (from zero) that are `late` are that much earlier."""
-    cut = []
-    for u, y in parts:
-        if len(y) > lag + _FEWEST:
-            columns = [x[: len(x) - lag] if j in late else x[lag:] for j, x in enumerate(u.T)]
-            cut.append((np.stack(columns, axis=1), y[lag:]))
-    return cut
+def behind(parts: Parts, late: NDArray[np.int64]) -> list[tuple[Array, Array]]:
+    """The records from where inputs that are `late` (r,) by so many samples are known, none of them late."""
+    begin = int(np.max(late))
+    return [
+        (np.stack([u[begin - d : len(u) - d, j] for j, d in enumerate(late)], axis=1), y[begin:])
+        for u, y in parts
+        if len(y) > begin + _FEWEST
+    ]
 
 
 def _new(signals: list[Array], order: int) -> list[Array]:

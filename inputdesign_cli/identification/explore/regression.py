@@ -83,7 +83,7 @@ def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[i
     yield held
     impulse = filtered([1.0], F, np.eye(1, samples)[0])
     yield from (_lagged(impulse, lag) for lag in range(n))
-    yield from (_lagged(held, delay) for delay in delays if samples // LONG < delay < samples)
+    yield from (_lagged(held, delay) for delay in _long(delays, samples))
 
 
 def _loss(
@@ -137,10 +137,22 @@ def numerators(parts: Parts, shared: SharedDenominator, b: int) -> Array:
 
 
 def from_rest(parts: Parts, shared: SharedDenominator, b: int) -> list[tuple[Array, Array]]:
-    """Records with inputs counted from their first values, and outputs (n, 1) without level and start."""
-    begun = _begun(parts)
+    """Records with inputs counted from their first values, and outputs (n, 1) without level and start.
+
+    While inputs from before the record still act through a long delay, the output is what the estimate makes
+    of the others: nobody knows what they were.
+    """
+    begun, rested = _begun(parts), []
     found, _ = _explained(begun, shared.F, shared.F.size - 1, b, shared.delays)
-    return [(u, (y - start)[:, None]) for (u, y), (_, start) in zip(begun, found, strict=True)]
+    for (u, y), (caused, start) in zip(begun, found, strict=True):
+        late = max(_long(shared.delays, len(y)), default=0)
+        rested.append((u, np.append(caused[:late], (y - start)[late:])[:, None]))
+    return rested
+
+
+def _long(delays: Sequence[int], samples: int) -> Iterator[int]:
+    """Those that are much of so many samples, not all of them."""
+    return (delay for delay in delays if samples // LONG < delay < samples)
 
 
 def _line(samples: int) -> Array:

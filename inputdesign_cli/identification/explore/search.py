@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -39,7 +39,7 @@ from inputdesign_cli.identification.explore.fits import (
     simulation_fit,
 )
 from inputdesign_cli.identification.explore.integrated import differenced, integrating
-from inputdesign_cli.identification.explore.late import far_answers, late_answers
+from inputdesign_cli.identification.explore.late import behind, far_answers, late_answers
 from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import processes
@@ -207,9 +207,9 @@ def explore_structure(
         furthest = 2 * min(max(len(y) for _, y in some) for some in shorter) // 3
         later = far_answers(first, list(quick.values()), most, furthest)
         if any(later):
-            most, least = _beyond(most, later), tuple(lag // 2 for lag in later)
-            quick = _quick(clean, highest, most, later, least)
-        quick, most = _beyond_limit(clean, quick, most, min(furthest, _FURTHEST), least)
+            quick, most = _far(first, highest, most, later)
+        else:
+            quick, most = _beyond_limit(clean, quick, most, min(furthest, _FURTHEST), least)
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
     near = min(quick, key=lambda n: _criterion(quick, n, samples))
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
@@ -272,6 +272,18 @@ def _quick(
         quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)
         delays = quick[n].delays
     return quick
+
+
+def _far(
+    first: Parts, highest: int, most: int, later: tuple[int, ...]
+) -> tuple[dict[int, SharedDenominator], int]:
+    """The same from what comes after inputs that are answered so late, and the longest delay looked at."""
+    spare = max(most, _beyond(0, later) - max(later))
+    shifts = np.maximum(np.array(later) - spare, 0)
+    begun = tuple(map(int, np.maximum(np.array(later) - shifts, 0)))
+    found = _quick(behind(first, shifts), highest, 2 * spare, begun, (0,) * len(later))
+    settled = {n: replace(one, delays=tuple(map(int, one.delays + shifts))) for n, one in found.items()}
+    return settled, int(np.max(shifts)) + 2 * spare
 
 
 def _criterion(quick: Mapping[int, SharedDenominator], n: int, samples: int) -> float:

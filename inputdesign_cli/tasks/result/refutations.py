@@ -41,7 +41,7 @@ REMEDY = {
 # and may hide what they say, and the data with this one, and so seldom do they agree as closely.
 _ONE_SYSTEM, _PRIOR = 1e-3, 1e-2
 _LEAST = 1e-300
-# Of a standard deviation or of the number itself: nearer to where an expression ends, it was stopped there.
+# Of a standard deviation: nearer to where an expression ends, an estimate was stopped there.
 _ASIDE = 0.001
 
 
@@ -65,8 +65,7 @@ def unsettled(model: Model, estimate: Estimate) -> list[str]:
         )
     deviations = np.sqrt(np.diag(estimate.covariance))
     for k in np.flatnonzero(~model.dead_times).tolist():
-        step = _ASIDE * min(deviations[k], abs(model.theta[k]) or np.inf)
-        beside = [model.at(theta).flaw for theta in _beside(model.theta, k, step)]
+        beside = [model.at(theta).flaw for theta in _beside(model.theta, k, _ASIDE * deviations[k])]
         flaw = next(filter(None, beside), None)
         if flaw is not None:
             found.append(
