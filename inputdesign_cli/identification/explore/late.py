@@ -19,7 +19,7 @@ _CERTAIN = 1e-6
 # Inputs that move together, or again and again in the same way, are also answered late by half of the best.
 _CLEARLY = 2.0
 # How many late lags are tried, the samples that must be left behind them, and what they must gain in BIC.
-_TRIED, _FEWEST, _BETTER = 80, 20, 20.0
+_TRIED, _FEWEST, _BETTER = 80, 20, 15.0
 
 
 def late_answers(parts: Parts, most: int) -> tuple[int, ...]:
@@ -71,24 +71,28 @@ def far_answers(parts: Parts, near: Sequence[SharedDenominator], most: int, furt
 
 def _far_answer(parts: Parts, near: Sequence[SharedDenominator], input: int, beyond: range) -> int:
     """The lag of one input; zero where none is told."""
-    delays = min(near, key=lambda found: found.loss).delays
-    only = np.arange(len(delays)) == input
-    others = np.where(only, 0, delays)
-    unexplained = {lag: _unexplained(behind(parts, only * lag), others) for lag in beyond}
-    best = min(unexplained, key=lambda lag: unexplained[lag], default=0)
-    if not (best and np.isfinite(unexplained[best])):
+    only = np.arange(len(near[0].delays)) == input
+    # Beside a wrong delay of this input those of the others may be wrong, too, in most orders.
+    others = {tuple(np.where(only, 0, one.delays).tolist()) for one in near}
+    unexplained = {
+        (lag, delays): _unexplained(behind(parts, only * lag), delays) for delays in others for lag in beyond
+    }
+    if not unexplained:
+        return 0
+    best, delays = min(unexplained, key=lambda tried: unexplained[tried])
+    if not np.isfinite(unexplained[best, delays]):
         return 0
     cut = [(u[best:], y[best:]) for u, y in parts if len(y) > best + _FEWEST]
     usual = min(_criterion(cut, one.F.size - 1, one.delays) for one in near)
-    late = _criterion(behind(parts, only * best), 1, others.tolist())
+    late = _criterion(behind(parts, only * best), 1, delays)
     return best if late < usual - _BETTER else 0
 
 
-def _unexplained(parts: Parts, delays: NDArray[np.int64]) -> float:
+def _unexplained(parts: Parts, delays: Sequence[int]) -> float:
     """What a plant of order one leaves of the variance of y."""
     levels = [y - y.mean() for _, y in parts]
     varying = float(np.mean(np.concatenate(levels) ** 2)) if levels else 0.0
-    return output_error(parts, 1, 2, delays.tolist()).loss / varying if varying > 0.0 else np.inf
+    return output_error(parts, 1, 2, delays).loss / varying if varying > 0.0 else np.inf
 
 
 def _criterion(parts: Parts, order: int, delays: Sequence[int]) -> float:
