@@ -203,9 +203,10 @@ def explore_structure(
     quick = _quick(clean, highest, most, tuple(map(max, least, later)), least)
     if not (by_prediction or any(later)):
         # What judges must be longer than the delay, too, unless the inputs before it are known.
-        shorter = (first,) if whole and before else (first, judging)
-        furthest = 2 * min(max(len(y) for _, y in some) for some in shorter) // 3
-        later = far_answers(first, list(quick.values()), most, furthest)
+        longest, judged_by = (max(len(y) for _, y in some) for some in (first, judging))
+        furthest = 2 * min(longest, judged_by) // 3
+        far = 2 * longest // 3 if whole and before else furthest
+        later = far_answers(first, list(quick.values()), most, far)
         if any(later):
             quick, most = _far(first, highest, most, later)
         else:
@@ -214,7 +215,8 @@ def explore_structure(
     near = min(quick, key=lambda n: _criterion(quick, n, samples))
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
     late = max(max(found.delays) for found in quick.values())
-    if whole:
+    # Delays that some orders take for others are no reason to judge by other samples.
+    if whole and any(later):
         judging = begun_before(judging, before, late)
     # What is to judge a model must be longer than its delay.
     latest = min(_RUN_OFF * most, max(len(y) for _, y in judging) - 1)
