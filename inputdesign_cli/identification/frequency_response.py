@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.late_inputs import behind
 from inputdesign_cli.identification.period_drift import line_of_periods
 from inputdesign_cli.identification.periodic_response import (
     PeriodicResponse,
@@ -73,15 +74,16 @@ def frequency_response(
     x: Array | None = None,
     *,
     lengths: Sequence[int] | None = None,
-    delays: NDArray[np.int64] | None = None,
+    delays: Callable[[int], NDArray[np.int64]] | None = None,
 ) -> FrequencyResponse | None:
     """From records that follow each other; None where they are too short or excite no frequency enough.
 
     Args:
         u, y: (N, r), (N, p).
         x: (N, r), what excites from outside; None: u itself, which then must not answer y.
-        delays: (p, r), samples by which inputs are thought to act late. They are tried where they turn the
-            phase fast, and kept where they leave less unexplained; not with signals from outside.
+        delays: of records of so many samples, those by which inputs are thought to act late, (p, r). They
+            are tried where they turn the phase fast, and kept where they leave less unexplained; not with
+            signals from outside.
     """
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
@@ -91,10 +93,11 @@ def frequency_response(
         if period:
             return _by_lines(outside, u, y, period)
     found = _local_polynomial(records)
-    if x is not None or delays is None or not _turns(delays, records):
+    if x is not None or delays is None:
         return found
-    behind = _behind(delays, records)
-    return found if behind is None or (found is not None and _leaves_less(found, behind)) else behind
+    late = delays(max(len(y) for *_, y in records))
+    other = _delayed(late, records) if _turns(late, records) else None
+    return found if other is None or (found is not None and _leaves_less(found, other)) else other
 
 
 def found_period(x: Array) -> int:
@@ -111,7 +114,7 @@ def found_period(x: Array) -> int:
     return 0
 
 
-def response_delays(model: Model, samples: int, step: float) -> NDArray[np.int64]:
+def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.int64]:
     """(p, r): samples until the response to a pulse first has a tenth of its largest value; else 0.
 
     Args:
@@ -200,15 +203,11 @@ def _turns(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> b
     return bool(2.0 * np.pi * delays.max() * _window(records) / longest > _TURN)
 
 
-def _behind(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
+def _delayed(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
     """The response, output by output, to inputs that are delayed first; what lies before them is left out."""
-    last, found = int(delays.max()), []
+    found = []
     for i, late in enumerate(delays):
-        shifted = [
-            (np.stack([u[last - d : len(u) - d, j] for j, d in enumerate(late)], axis=1), y[last:, i : i + 1])
-            for _, u, y in records
-            if len(y) > last
-        ]
+        shifted = behind([(u, y[:, i : i + 1]) for _, u, y in records], late, int(delays.max()))
         one = _local_polynomial([(u, u, y) for u, y in shifted]) if shifted else None
         if one is None:
             return None

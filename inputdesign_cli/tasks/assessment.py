@@ -197,8 +197,8 @@ def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Jso
 def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     """The results with the frequency response of the data alone beside the model, where it can be had."""
     data = found.data
-    late = response_delays(found.model, max(data.lengths), units.step)
-    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=late)
+    delays = partial(response_delays, found.model, step=units.step)
+    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
     if response is None:
         return judged
     table, curves, told = response_of_data(units, found.model, response, by_reference=data.r is not None)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
@@ -138,8 +139,11 @@ def _without_model(units: Units, log: Log, found: Found, *, loop: bool) -> _Resp
         loop: whether inputs answer the outputs.
     """
     moving = log.u[:, found.moving]
-    late = response_delays(found.model, max(log.lengths), units.step)[:, list(found.moving)]
-    response = frequency_response(moving, log.y, lengths=log.lengths, delays=late)
+
+    def delays(samples: int) -> NDArray[np.int64]:
+        return response_delays(found.model, samples, step=units.step)[:, found.moving]
+
+    response = frequency_response(moving, log.y, lengths=log.lengths, delays=delays)
     if response is None:
         return None
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}

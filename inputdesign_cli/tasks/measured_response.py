@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -78,8 +79,8 @@ def measure(
     task, judged = question.task, None
     silent: dict[str, SilentLines] = {}
     if task is None:
-        late = response_delays(question.model, max(data.lengths), units.step)
-        found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=late)
+        delays = partial(response_delays, question.model, step=units.step)
+        found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
         if found is None:
             raise DataError.because(
                 "too-few-samples",

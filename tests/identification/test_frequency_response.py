@@ -149,7 +149,7 @@ def test_behind_their_dead_times_the_discs_of_each_entry_hold_the_plant():
     told, untold = [], []
     for seed in range(12):
         u, y = _late_record(seed)
-        told.append(frequency_response(u, y, delays=np.array(LATE)))
+        told.append(frequency_response(u, y, delays=lambda _: np.array(LATE)))
         untold.append(frequency_response(u, y))
     assert np.mean([_held(found) for found in told]) == pytest.approx(0.95, abs=0.02)
     # A parabola over the phase of 90 samples is useless, though its discs grow with what a line is off it.
@@ -159,14 +159,17 @@ def test_behind_their_dead_times_the_discs_of_each_entry_hold_the_plant():
 
 def test_dead_times_that_the_plant_does_not_have_are_not_believed():
     u, y = _late_record(0)
-    usual, false = frequency_response(u, y), frequency_response(u, y, delays=np.array([[0, 0], [90, 300]]))
+    usual, false = (
+        frequency_response(u, y),
+        frequency_response(u, y, delays=lambda _: np.array([[0, 0], [90, 300]])),
+    )
     np.testing.assert_array_equal(usual.G, false.G)
     np.testing.assert_array_equal(usual.radius, false.radius)
 
 
 def test_a_dead_time_of_most_of_the_record_is_left_alone():
     u, y = _late_record(0, samples=120)
-    usual, false = frequency_response(u, y), frequency_response(u, y, delays=np.full((2, 2), 119))
+    usual, false = frequency_response(u, y), frequency_response(u, y, delays=lambda _: np.full((2, 2), 119))
     np.testing.assert_array_equal(usual.G, false.G)
 
 
@@ -180,11 +183,11 @@ def test_delays_of_responses_are_where_they_begin():
         (one,) * 2,
         np.eye(2),
     )
-    np.testing.assert_array_equal(response_delays(model, 40, 1.0), [[3, 0], [0, 2]])
+    np.testing.assert_array_equal(response_delays(model, 40, step=1.0), [[3, 0], [0, 2]])
 
 
 def test_between_samples_a_dead_time_counts_to_the_sample_where_the_response_begins():
     model = ContinuousModel.monic(
         ((np.array([2.0]),),), ((np.array([1.0, 20.0]),),), np.eye(1), delay=((np.array([9.3]),),)
     )
-    assert response_delays(model, 200, 0.5) == pytest.approx(19, abs=2)
+    assert response_delays(model, 200, step=0.5) == pytest.approx(19, abs=2)

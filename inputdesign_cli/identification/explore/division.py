@@ -47,18 +47,12 @@ class Division(NamedTuple):
     before: Parts = ()
 
 
-def begun_before(second: Parts, before: Parts, late: int) -> list[tuple[Array, Array]]:
-    """The records that judge, to be left out of for so many samples.
+def known_before(second: Parts, before: Parts, late: int) -> Parts:
+    """`before`, what was recorded right before those that judge, where delays would leave out much of these.
 
-    Where that is much of them they begin as much earlier, in what was recorded right `before`: the inputs
-    that are answered so late are known there.
+    The inputs that are answered so late are known there.
     """
-    if not before or late * LONG <= max(len(y) for _, y in second):
-        return list(second)
-    return [
-        (np.concatenate([past_u[-late:], u]), np.concatenate([past_y[-late:], y]))
-        for (u, y), (past_u, past_y) in zip(second, before, strict=True)
-    ]
+    return before if late * LONG > max(len(y) for _, y in second) else ()
 
 
 def divided(parts: Parts) -> Division:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
+from itertools import zip_longest
 
 import numpy as np
 import scipy
@@ -47,24 +48,39 @@ class Fits:
     counted: NDArray[np.bool_]
 
 
-def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
+def fits(model: Model, parts: Parts, late: int | None = None, before: Parts = ()) -> Fits:
     """The fits of a sampled model to records u (n, r), y (n, p).
 
     Args:
         late: of each record so many samples are left out. What delays of the model hold back beyond that
             counts as not explained, so that models can be compared. None: what its own delays hold back.
+        before: of each record what was recorded right before it, and is left out first; empty: nothing.
 
     Raises:
         TypeError: see `output_error_form`.
     """
-    simulation, simulated, counted, varying, unexplained = _simulated(model, parts, late)
+    begun = [_begun_before(model, part, past, late) for part, past in zip_longest(parts, before)]
+    simulation, simulated, counted, varying, unexplained = _simulated(model, begun, late)
+    own = np.concatenate([np.arange(len(y)) >= earlier for _, y, earlier in begun])
     kind = estimator(model, 1.0).kind
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-        records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
+        records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y, _ in begun]
         free = [record.begun_freely(record.lateness(model.theta)) for record in records]
         errors = np.concatenate([record.at(model.theta).errors for record in free])
         errors[unexplained] = varying[unexplained[counted]]
-    return Fits(simulation, percent(errors[counted], varying), simulated, errors, counted)
+    return Fits(simulation, percent(errors[counted], varying), simulated[own], errors[own], counted[own])
+
+
+def _begun_before(
+    model: Model, part: tuple[Array, Array], past: tuple[Array, Array] | None, late: int | None
+) -> tuple[Array, Array, int]:
+    """A record, begun by so many samples earlier as are left out of it, if it can be; how many these are."""
+    if past is None:
+        return *part, 0
+    needed = _lateness(model, *part) if late is None else late
+    earlier = min(needed, len(past[1]))
+    u, y = (np.concatenate([x[len(x) - earlier :], own]) for x, own in zip(past, part, strict=True))
+    return u, y, earlier
 
 
 def beside(found: Sequence[Fits]) -> Fits:
@@ -78,17 +94,18 @@ def beside(found: Sequence[Fits]) -> Fits:
     )
 
 
-def simulation_fit(model: Model, parts: Parts, late: int | None = None) -> tuple[float, ...]:
+def simulation_fit(model: Model, parts: Parts, late: int, before: Parts = ()) -> tuple[float, ...]:
     """The first of them alone."""
-    return _simulated(model, parts, late)[0]
+    begun = [_begun_before(model, part, past, late) for part, past in zip_longest(parts, before)]
+    return _simulated(model, begun, late)[0]
 
 
 def _simulated(
-    model: Model, parts: Parts, late: int | None
+    model: Model, begun: Sequence[tuple[Array, Array, int]], late: int | None
 ) -> tuple[tuple[float, ...], Array, NDArray[np.bool_], Array, NDArray[np.bool_]]:
     """The fits, the simulations (N, p), samples (N,) that count, what varies there, and what delays miss."""
     simulated, left, counted, varying, unexplained = [], [], [], [], []
-    for u, y in parts:
+    for u, y, _ in begun:
         own, delay = simulate_free(model, u - u.mean(axis=0), y)
         samples = np.arange(len(y))
         kept = samples >= (delay if late is None else late)
@@ -139,6 +156,12 @@ def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
         for i, start in enumerate(starts):
             caused[:, i] += begun(start.free, y[:, i] - caused[:, i])
     return caused, late
+
+
+def _lateness(model: Model, u: Array, y: Array) -> int:
+    """The number of samples on which inputs from before a record act through a delay."""
+    error_form = output_error_form(model)
+    return estimator(error_form, 1.0).kind.record(u, y).lateness(error_form.theta)
 
 
 def begun(responses: NDArray[np.float64], left: Array) -> Array:

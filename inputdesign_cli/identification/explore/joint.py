@@ -14,7 +14,7 @@ from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.candidates import Candidate, Chosen, Ranges
-from inputdesign_cli.identification.explore.division import Division, Split, begun_before, divided
+from inputdesign_cli.identification.explore.division import Division, Split, divided, known_before
 from inputdesign_cli.identification.explore.fits import (
     NOT_COMPUTED,
     Fits,
@@ -107,10 +107,13 @@ def explored(
     used = busiest(moved, _MOST_SAMPLES)
     taken, estimate, model = _estimated(found, used, feedback, ramp, walks)
     late = max(max(candidate.orders.delays) for candidate in taken)
-    second = begun_before(division.second, division.before, late)
-    single = [_output(second, i) for i in range(len(taken))]
-    judged = [fits(c.model, own) for c, own in zip(taken, single, strict=True)]
-    idle = [fits(c.model, [(0.0 * u, y) for u, y in own]) for c, own in zip(taken, single, strict=True)]
+    before = known_before(division.second, division.before, late)
+    own = [(_output(division.second, i), _output(before, i)) for i in range(len(taken))]
+    judged = [fits(c.model, second, before=past) for c, (second, past) in zip(taken, own, strict=True)]
+    idle = [
+        fits(c.model, _without_inputs(second), before=_without_inputs(past))
+        for c, (second, past) in zip(taken, own, strict=True)
+    ]
     whole = integrating(joined(taken, parts[0][0].shape[1], moving), walks)
     whole = whole.at(model.theta, model.covariance)
     return Found(
@@ -162,6 +165,10 @@ def _structures(
 
 def _output(parts: Parts, output: int) -> list[tuple[Array, Array]]:
     return [(u, y[:, output : output + 1]) for u, y in parts]
+
+
+def _without_inputs(parts: Parts) -> list[tuple[Array, Array]]:
+    return [(0.0 * u, y) for u, y in parts]
 
 
 def _busiest_samples(parts: Parts) -> NDArray[np.int64]:

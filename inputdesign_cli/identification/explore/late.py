@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.identification.explore.regression import SharedDenominator, output_error
+from inputdesign_cli.identification.late_inputs import behind
 from inputdesign_cli.plant.polynomial import Array
 
 _ORDER = 20
@@ -74,24 +74,22 @@ def _far_answer(parts: Parts, near: Sequence[SharedDenominator], input: int, bey
     only = np.arange(len(near[0].delays)) == input
     # Beside a wrong delay of this input those of the others may be wrong, too, in most orders.
     others = {tuple(np.where(only, 0, one.delays).tolist()) for one in near}
+    left = {lag: behind(parts, only * lag, lag, _FEWEST) for lag in beyond}
     unexplained = {
-        (lag, delays): _unexplained(behind(parts, only * lag), delays) for delays in others for lag in beyond
+        (lag, delays): _unexplained(left[lag], delays) for delays in others for lag in beyond if left[lag]
     }
     if not unexplained:
         return 0
     best, delays = min(unexplained, key=lambda tried: unexplained[tried])
-    if not np.isfinite(unexplained[best, delays]):
-        return 0
-    cut = [(u[best:], y[best:]) for u, y in parts if len(y) > best + _FEWEST]
+    cut = behind(parts, only * 0, best, _FEWEST)
     usual = min(_criterion(cut, one.F.size - 1, one.delays) for one in near)
-    late = _criterion(behind(parts, only * best), 1, delays)
+    late = _criterion(left[best], 1, delays)
     return best if late < usual - _BETTER else 0
 
 
 def _unexplained(parts: Parts, delays: Sequence[int]) -> float:
     """What a plant of order one leaves of the variance of y."""
-    levels = [y - y.mean() for _, y in parts]
-    varying = float(np.mean(np.concatenate(levels) ** 2)) if levels else 0.0
+    varying = float(np.mean(np.concatenate([y - y.mean() for _, y in parts]) ** 2))
     return output_error(parts, 1, 2, delays).loss / varying if varying > 0.0 else np.inf
 
 
@@ -100,16 +98,6 @@ def _criterion(parts: Parts, order: int, delays: Sequence[int]) -> float:
     samples, terms = sum(len(y) for _, y in parts), max(order, 2)
     loss = output_error(parts, order, terms, delays).loss
     return float(samples * np.log(max(loss, 1e-300)) + (order + terms * len(delays)) * np.log(samples))
-
-
-def behind(parts: Parts, late: NDArray[np.int64]) -> list[tuple[Array, Array]]:
-    """The records from where inputs that are `late` (r,) by so many samples are known, none of them late."""
-    begin = int(np.max(late))
-    return [
-        (np.stack([u[begin - d : len(u) - d, j] for j, d in enumerate(late)], axis=1), y[begin:])
-        for u, y in parts
-        if len(y) > begin + _FEWEST
-    ]
 
 
 def _new(signals: list[Array], order: int) -> list[Array]:

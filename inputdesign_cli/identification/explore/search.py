@@ -7,9 +7,10 @@ says which one to take.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -29,7 +30,8 @@ from inputdesign_cli.identification.explore.candidates import (
     settled_at,
     with_noise,
 )
-from inputdesign_cli.identification.explore.division import begun_before
+from inputdesign_cli.identification.explore.delays import criterion, delays_of
+from inputdesign_cli.identification.explore.division import known_before
 from inputdesign_cli.identification.explore.fits import (
     NOT_COMPUTED,
     Parts,
@@ -39,17 +41,13 @@ from inputdesign_cli.identification.explore.fits import (
     simulation_fit,
 )
 from inputdesign_cli.identification.explore.integrated import differenced, integrating
-from inputdesign_cli.identification.explore.late import behind, far_answers, late_answers
-from inputdesign_cli.identification.explore.loops import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import processes
 from inputdesign_cli.identification.explore.regression import (
-    LONG,
     SharedDenominator,
     arx_grid,
     best_delays,
     from_rest,
-    numerators,
     whitened,
 )
 from inputdesign_cli.identification.records import Records, centred
@@ -58,12 +56,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
 _MOST_SAMPLES = 4000
-_MOST_DELAY = 150
-# Where an answer comes later, delays are looked for until then and a share of it more.
-_BEYOND = 5
 _HIGHEST, _HIGHEST_ARX = 5, 8
-# A delay of this share of the longest that is tried is at the limit. So far longer ones are tried.
-_NEAR_LIMIT, _FURTHEST = 0.85, 400
 # So far beyond the longest delay that was looked for a dead time may settle.
 _RUN_OFF = 2
 # Plants up to this order are always tried.
@@ -79,14 +72,16 @@ _STEPS, _AGAIN = {False: 100, True: 30}, 4
 
 @dataclass(frozen=True)
 class _Parts:
-    """What structures are estimated from, `first`, and judged by.
+    """What structures are estimated from, `first`, and judged by: `levels`, the same, and `judging`.
 
-    Of each record that is `judged` the first `late` samples are left out. Plants whose dead time has run off
-    beyond `latest` samples are left out as well.
+    Of each record that judges the first `late` samples are left out, those recorded `before` it among them.
+    Plants whose dead time has run off beyond `latest` samples are left out as well.
     """
 
     first: Parts
-    judged: tuple[Parts, Parts]
+    levels: Parts
+    judging: Parts
+    before: Parts
     feedback: bool
     wanders: bool
     quick: dict[int, SharedDenominator]
@@ -150,7 +145,8 @@ class _Parts:
         echoes = kind.echoes(found.point.theta, records.lengths)
         tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
         fitted = integrating(structure.at(found.point.theta, noise), (self.wanders,))
-        on_first, on_second = (fits(fitted, part, self.late) for part in self.judged)
+        on_first = fits(fitted, self.levels, self.late)
+        on_second = fits(fitted, self.judging, self.late, self.before)
         return Candidate(
             settled,
             fitted,
@@ -189,38 +185,24 @@ def explore_structure(
     """
     levels, judging = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
     first = differenced(levels) if wanders else levels
-    whole = all(len(u) == len(judged) for (u, _), (judged, _) in zip(second, judging, strict=True))
+    if any(len(y) != len(own) for (_, y), (_, own) in zip(second, judging, strict=True)):
+        before = ()
     by_prediction = feedback or wanders
     samples = sum(len(y) for _, y in first)
-    r = first[0][0].shape[1]
-    most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // LONG), 1)
+    r, longest = first[0][0].shape[1], max(len(y) for _, y in judging)
     highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
     # In a loop an input answers the noise; what is left of it must be white to tell the plant.
     clean = whitened(first) if by_prediction else first
-    least = _least_delays(first, clean, most) if feedback else (0,) * r
-    later = late_answers(first, most)
-    most = _beyond(most, later)
-    quick = _quick(clean, highest, most, tuple(map(max, least, later)), least)
-    if not (by_prediction or any(later)):
-        # What judges must be longer than the delay, too, unless the inputs before it are known.
-        longest, judged_by = (max(len(y) for _, y in some) for some in (first, judging))
-        furthest = 2 * min(longest, judged_by) // 3
-        far = 2 * longest // 3 if whole and before else furthest
-        later = far_answers(first, list(quick.values()), most, far)
-        if any(later):
-            quick, most = _far(first, highest, most, later)
-        else:
-            quick, most = _beyond_limit(clean, quick, most, min(furthest, _FURTHEST), least)
+    delays = delays_of(first, clean, highest, longest, feedback=feedback, known=bool(before))
+    quick, late = delays.quick, delays.latest
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
-    near = min(quick, key=lambda n: _criterion(quick, n, samples))
+    near = min(quick, key=lambda n: criterion(quick[n], samples))
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
-    late = max(max(found.delays) for found in quick.values())
     # Delays that some orders take for others are no reason to judge by other samples.
-    if whole and any(later):
-        judging = begun_before(judging, before, late)
+    before = known_before(judging, before, late) if any(delays.told) else ()
     # What is to judge a model must be longer than its delay.
-    latest = min(_RUN_OFF * most, max(len(y) for _, y in judging) - 1)
-    parts = _Parts(first, (levels, judging), feedback, wanders, quick, resting, late, latest)
+    latest = min(_RUN_OFF * delays.most, longest + (late if before else 0) - 1)
+    parts = _Parts(first, levels, judging, before, feedback, wanders, quick, resting, late, latest)
 
     families = dict[str, None]()
 
@@ -230,15 +212,16 @@ def explore_structure(
         return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
 
     orders = sorted({*range(1, min(highest, _ALWAYS) + 1), near})
-    gain = static_gain(best_delays(clean, 0, 1, most, quick[1].delays, least).delays)
+    gain = static_gain(best_delays(clean, 0, 1, delays.most, quick[1].delays, delays.least).delays)
     in_s = [process for n in quick if physical for process in processes(n, quick[n].delays, step)]
     if wanders:
         plain: list[Shape] = [gain, *(plant_order(n, quick[n].delays)[-1] for n in orders), *in_s]
         found = judged(shape.with_coloured_noise()[0] for shape in plain)
     else:
-        begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(least))]
+        begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(delays.least))]
         known = [shape for n in orders for shape in plant_order(n, quick[n].delays)]
-        found = judged([gain, *known, *_best_arx(first, judging, begun, samples, late), *in_s])
+        judge = partial(simulation_fit, parts=judging, late=late, before=before)
+        found = judged([gain, *known, *_best_arx(first, judge, begun, samples), *in_s])
         for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
             simulating = [c for c in found if c.orders.family in family]
             if simulating:
@@ -257,68 +240,7 @@ def explore_structure(
     rest = sorted((c for c in every.values() if c.orders != best.orders), key=likeliest)
     estimated = {c.orders.family for c in found}
     dropped = tuple(family for family in families if family not in estimated)
-    return Chosen((best, *rest), by_order, tuple(good), first, least, most, dropped)
-
-
-def _beyond(most: int, later: Sequence[int]) -> int:
-    """The delay up to which to look where answers come so late."""
-    return max(most, *(lag + lag // _BEYOND for lag in later))
-
-
-def _quick(
-    clean: Parts, highest: int, most: int, delays: tuple[int, ...], least: tuple[int, ...]
-) -> dict[int, SharedDenominator]:
-    """The output-error estimates of all orders, each with the delays that suit it."""
-    quick = dict[int, SharedDenominator]()
-    for n in range(1, highest + 1):
-        quick[n] = best_delays(clean, n, max(n, 2), most, delays, least)
-        delays = quick[n].delays
-    return quick
-
-
-def _far(
-    first: Parts, highest: int, most: int, later: tuple[int, ...]
-) -> tuple[dict[int, SharedDenominator], int]:
-    """The same from what comes after inputs that are answered so late, and the longest delay looked at."""
-    spare = max(most, _beyond(0, later) - max(later))
-    shifts = np.maximum(np.array(later) - spare, 0)
-    begun = tuple(map(int, np.maximum(np.array(later) - shifts, 0)))
-    found = _quick(behind(first, shifts), highest, 2 * spare, begun, (0,) * len(later))
-    settled = {n: replace(one, delays=tuple(map(int, one.delays + shifts))) for n, one in found.items()}
-    return settled, int(np.max(shifts)) + 2 * spare
-
-
-def _criterion(quick: Mapping[int, SharedDenominator], n: int, samples: int) -> float:
-    """BIC over the samples, of an order."""
-    price = float(np.log(samples)) / samples
-    return float(np.log(max(quick[n].loss, 1e-300))) + (2 * n + 2) * price
-
-
-def _beyond_limit(
-    clean: Parts, quick: dict[int, SharedDenominator], most: int, furthest: int, least: tuple[int, ...]
-) -> tuple[dict[int, SharedDenominator], int]:
-    """The same with longer delays, while some are at the limit of those that were tried, if BIC says so.
-
-    High orders turn the phase as a longer delay does, as far as delays can be tried.
-    """
-    samples, longer = sum(len(y) for _, y in clean), most
-
-    def best(found: Mapping[int, SharedDenominator]) -> float:
-        return min(_criterion(found, n, samples) for n in found)
-
-    while longer < furthest and max(max(f.delays) for f in quick.values()) >= _NEAR_LIMIT * most:
-        longer = min(2 * longer, furthest)
-        tried = _quick(clean, max(quick), longer, (1,) * len(least), least)
-        if best(tried) < best(quick):
-            quick, most = tried, longer
-    return quick, most
-
-
-def _least_delays(parts: Parts, clean: Parts, most: int) -> tuple[int, ...]:
-    """Of each input in a loop the shortest delay to look for, `clean` being the records with white noise."""
-    one = (1,) * parts[0][0].shape[1]
-    found = best_delays(clean, 1, 2, most, one, one)
-    return tuple(int(late) for late in acts_late(parts, numerators(clean, found, 2).sum(axis=1)))
+    return Chosen((best, *rest), by_order, tuple(good), first, delays.least, delays.most, dropped)
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
@@ -335,9 +257,9 @@ def _leading(found: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _best_arx(
-    first: Parts, second: Parts, begun: Sequence[tuple[int, ...]], samples: int, late: int
+    first: Parts, judge: Callable[[Model], tuple[float, ...]], begun: Sequence[tuple[int, ...]], samples: int
 ) -> Iterator[Orders]:
-    """The ARX models that simulate the second part best, of sets of delays."""
+    """The ARX models that `judge` says simulate best, of sets of delays."""
     r = len(begun[0])
     highest = max(min(_HIGHEST_ARX, samples // (6 * (r + 1))), 1)
     ranked = []
@@ -347,6 +269,6 @@ def _best_arx(
             model = orders.model().at(theta)
             with suppress(*NOT_COMPUTED):
                 if all(model.stable_outputs):
-                    ranked.append((simulation_fit(model, second, late)[0], orders))
+                    ranked.append((judge(model)[0], orders))
     ranked.sort(key=lambda pair: -pair[0])
     return (orders for _, orders in ranked[:_ARX_KEPT])

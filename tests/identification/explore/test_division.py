@@ -5,7 +5,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.identification.explore import explore_records
-from inputdesign_cli.identification.explore.division import begun_before, divided
+from inputdesign_cli.identification.explore.division import divided, known_before
 
 
 def record(u):
@@ -61,23 +61,16 @@ def test_a_bump_up_and_down_tells_gain_and_time_constant(seed):
     assert np.abs(found.model.plant_at(w)[:, 0, 0] / truth - 1.0).max() < 0.05
 
 
-@pytest.mark.parametrize("late", [3, 50, 500])
-def test_records_that_judge_begin_in_what_was_recorded_before_them(late):
-    """Where a delay would leave much of them out; never before the beginning of a record."""
+def test_what_judges_knows_what_was_recorded_right_before_it():
+    """Used where a delay would leave out much of what judges; blocks know those before them."""
     u = np.random.default_rng(2).choice([-1.0, 1.0], 200)
     _, second, _, before = divided([record(u)])
-    ((inputs, outputs),) = begun_before(second, before, late)
-    begin = {3: 120, 50: 70, 500: 0}[late]
-    np.testing.assert_array_equal(outputs[:, 0], np.arange(begin, 200))
-    np.testing.assert_array_equal(inputs[:, 0], u[begin:])
-    # What nothing was recorded before stays as it is.
-    assert begun_before(second, (), late)[0][1].size == 80
-
-
-def test_blocks_that_judge_begin_in_those_before_them():
+    np.testing.assert_array_equal(before[0][1][:, 0], np.arange(120))
+    assert known_before(second, before, 10) == ()
+    assert known_before(second, before, 20) is before
     both = np.column_stack(
         [np.r_[moves := np.tile([1.0, -1.0], 75), np.zeros(150)], np.r_[np.zeros(150), moves]]
     )
     _, second, _, before = divided([record(both)])
-    for (_, y), (_, begun) in zip(second, begun_before(second, before, 12), strict=True):
-        np.testing.assert_array_equal(begun[:, 0], np.arange(y[0, 0] - 12, y[-1, 0] + 1))
+    for (_, y), (_, past) in zip(second, before, strict=True):
+        np.testing.assert_array_equal(past[:, 0], np.arange(y[0, 0]))

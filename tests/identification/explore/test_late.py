@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.identification.explore import explore_records
+from inputdesign_cli.identification.explore import explore_records, fits
 from inputdesign_cli.identification.explore.late import far_answers
 from inputdesign_cli.identification.explore.regression import best_delays
+from inputdesign_cli.plant import PolynomialModel
 
 MOST, FURTHEST = 30, 80
 
@@ -64,6 +65,28 @@ def test_of_two_inputs_the_late_one_is_told():
 def test_records_too_short_for_a_lag_tell_none():
     u, y = record(1, 3, 5)
     assert answers(*[(u[at : at + 30], y[at : at + 30]) for at in range(0, 180, 30)]) == (0,)
+
+
+@pytest.mark.parametrize("late", [3, 60])
+def test_behind_known_inputs_all_that_was_not_seen_is_counted_and_nothing_else(late):
+    """Without them the first samples, which the delay holds back, are left out."""
+    u = np.repeat(np.random.default_rng(6).choice([-1.0, 1.0], 20), 10)[:, None]
+    one = (np.ones(1),)
+    B, F = np.append(np.zeros(late), 0.1), np.array([1.0, -0.9])
+    model = PolynomialModel(((B,),), one, ((F,),), one, one, np.eye(1))
+    y = scipy.signal.lfilter(B, F, u[:, 0])[:, None]
+    seen, unseen = [(u[:120], y[:120])], [(u[120:], y[120:] + 1.0)]
+    alone, known = fits(model, unseen), fits(model, unseen, before=seen)
+    assert known.simulated.shape == known.errors.shape == (80, 1)
+    assert known.counted.sum() == 80
+    assert alone.counted.sum() == 80 - (late - 1)
+    # The level that unseen samples are moved by is estimated from these, not from what was seen.
+    np.testing.assert_allclose(known.simulated[late:], y[120 + late :] + 1.0, atol=0.1)
+    assert alone.simulation[0] == pytest.approx(100.0)
+    # So many of each are left out for a comparison, those before among them.
+    assert fits(model, unseen, 100, seen).counted.sum() == 80
+    assert fits(model, unseen, 100).counted.sum() == 0
+    assert fits(model, unseen, 150, seen).counted.sum() == 50
 
 
 def test_a_dead_time_of_most_of_what_judges_leaves_it_enough():
