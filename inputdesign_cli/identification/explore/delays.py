@@ -27,13 +27,13 @@ class Delays:
     Attributes:
         quick: by order.
         least, most: what delays were looked at, of each input from the one to the other.
-        told: (r,), lags beyond the usual ones at which the output answers; zero where none is told.
+        told: whether answers beyond the usual delays are, not only taken by some order for its own.
     """
 
     quick: dict[int, SharedDenominator]
     least: tuple[int, ...]
     most: int
-    told: tuple[int, ...]
+    told: bool
 
     @property
     def latest(self) -> int:
@@ -54,20 +54,20 @@ def delays_of(
         known: whether inputs are known before those.
     """
     longest, inputs = max(len(y) for _, y in first), first[0][0].shape[1]
-    most = max(min(_MOST_DELAY, longest // LONG), 1)
-    least = _least_delays(first, clean, most) if feedback else (0,) * inputs
-    told = late_answers(first, most)
-    most = _beyond(most, told)
+    usual = max(min(_MOST_DELAY, longest // LONG), 1)
+    least = _least_delays(first, clean, usual) if feedback else (0,) * inputs
+    told = late_answers(first, usual)
+    most = _beyond(usual, told)
     quick = _quick(clean, highest, most, tuple(map(max, least, told)), least)
     if clean is first and not any(told):
-        # What judges must be longer than the delay, too, unless the inputs before it are known.
+        # What judges must be longer than the delay, too, unless it is told and the inputs before it are known.
         furthest = 2 * min(longest, judging) // 3
         told = far_answers(first, list(quick.values()), most, 2 * longest // 3 if known else furthest)
         if any(told):
             quick, most = _far(first, highest, most, told)
         else:
             quick, most = _beyond_limit(clean, quick, most, min(furthest, _FURTHEST), least)
-    return Delays(quick, least, most, told)
+    return Delays(quick, least, most, any(told))
 
 
 def criterion(found: SharedDenominator, samples: int) -> float:

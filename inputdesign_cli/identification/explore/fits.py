@@ -94,7 +94,9 @@ def beside(found: Sequence[Fits]) -> Fits:
     )
 
 
-def simulation_fit(model: Model, parts: Parts, late: int, before: Parts = ()) -> tuple[float, ...]:
+def simulation_fit(
+    model: Model, parts: Parts, late: int | None = None, before: Parts = ()
+) -> tuple[float, ...]:
     """The first of them alone."""
     begun = [_begun_before(model, part, past, late) for part, past in zip_longest(parts, before)]
     return _simulated(model, begun, late)[0]

@@ -199,7 +199,7 @@ def explore_structure(
     near = min(quick, key=lambda n: criterion(quick[n], samples))
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
     # Delays that some orders take for others are no reason to judge by other samples.
-    before = known_before(judging, before, late) if any(delays.told) else ()
+    before = known_before(judging, before, late) if delays.told else ()
     # What is to judge a model must be longer than its delay.
     latest = min(_RUN_OFF * delays.most, longest + (late if before else 0) - 1)
     parts = _Parts(first, levels, judging, before, feedback, wanders, quick, resting, late, latest)

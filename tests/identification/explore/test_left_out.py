@@ -7,7 +7,13 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.explore import by_chance, explore_records, explore_structure, search
+from inputdesign_cli.identification.explore import (
+    by_chance,
+    delays,
+    explore_records,
+    explore_structure,
+    search,
+)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +81,7 @@ def test_delays_at_the_limit_of_those_that_are_tried_are_looked_for_beyond_it(la
     y = scipy.signal.lfilter([0.0, 0.0, 0.0, 0.2], [1.0, -0.9], u[:, 0])
     y += scipy.signal.lfilter(np.append(np.zeros(late + 1), 0.15), [1.0, -0.85], u[:, 1])
     parts = [(u, (y + 0.1 * rng.standard_normal(240))[:, None])]
-    quick = search._quick(parts, 3, 40, (1, 1), (0, 0))
-    found, longest = search._beyond_limit(parts, quick, 40, 100, (0, 0))
+    quick = delays._quick(parts, 3, 40, (1, 1), (0, 0))
+    found, longest = delays._beyond_limit(parts, quick, 40, 100, (0, 0))
     assert longest == most
     np.testing.assert_allclose(found[1].delays, (3, late + 1), atol=1)
