@@ -60,7 +60,8 @@ def delays_of(
     most = _beyond(usual, told)
     quick = _quick(clean, highest, most, tuple(map(max, least, told)), least)
     if clean is first and not any(told):
-        # What judges must be longer than the delay, too, unless it is told and the inputs before it are known.
+        # What judges must be longer than the delay, too; than one that is told only where inputs before it
+        # are unknown.
         furthest = 2 * min(longest, judging) // 3
         told = far_answers(first, list(quick.values()), most, 2 * longest // 3 if known else furthest)
         if any(told):
