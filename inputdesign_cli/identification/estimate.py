@@ -26,6 +26,8 @@ from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.information.coordinates import triangular_factor
 from inputdesign_cli.plant.polynomial import Array
 
+# Samples that residual tests need.
+_FEWEST_TESTED = 20
 # Parameters this share apart are the same to rounding.
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
@@ -127,6 +129,17 @@ class BatchEstimate:
     steps: NDArray[np.int64]
 
 
+def _not_explained(records: Records) -> tuple[NDArray[np.bool_], tuple[int, ...]]:
+    """(N,): the samples that unknown inputs before each record do not explain whatever they are, and lengths.
+
+    All of them, where too few are left to be tested.
+    """
+    left = np.concatenate([np.arange(n) >= records.late for n in records.lengths])
+    if np.count_nonzero(left) < _FEWEST_TESTED:
+        return np.ones_like(left), records.lengths
+    return left, tuple(n - records.late for n in records.lengths if n > records.late)
+
+
 def concluded(
     names: tuple[str, ...],
     found: Search,
@@ -170,6 +183,7 @@ def concluded(
         noise = np.asarray(np.linalg.inv(records.weights), dtype=float)
     lengths, earlier = records.lengths, records.earlier
     factor = factor_at(names, records, point, noise)
+    left, kept = _not_explained(records)
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
@@ -190,9 +204,9 @@ def concluded(
         agreement=None if earlier is None else earlier.agreement(point.theta, factor),
         likeness=None if earlier is None else earlier.likeness(point.theta, factor),
         lengths=lengths,
-        whiteness=whiteness(point.errors, fitted=in_noise, lengths=lengths),
+        whiteness=whiteness(point.errors[left], fitted=in_noise, lengths=kept),
         independence=cross_correlations(
-            point.errors, records.u, fitted=in_plant, feedback=feedback, lengths=lengths
+            point.errors[left], records.u[left], fitted=in_plant, feedback=feedback, lengths=kept
         ),
         tests=score_tests(records, point, recent=recent, feedback=feedback, echoes=echoes),
         directed=directed_tests(records, point, alternatives, echoes),

@@ -86,8 +86,22 @@ def test_many_short_records_of_a_running_experiment_are_not_taken_for_rest():
         u, y, lengths = _short_records(seed, at_rest=False)
         found = identify(model, u, y, lengths=lengths, start=model.theta)
         assert found.rest_refuted
+        assert min(found.whiteness.probability, found.independence.probability) > 0.01
         deviations.append((found.theta - model.theta) / np.sqrt(np.diag(found.covariance)))
     assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
+
+
+def test_residuals_that_unknown_inputs_make_zero_are_not_tested():
+    """The statistic of [ljung-box-1978] over the rest; with them it was a third too large, and more."""
+    model = model_of(IN_S, 60.3)
+    u, y = (signal[:200] for signal in cut_out(60.3, 0))
+    found = identify(model, u, y, start=model.theta)
+    assert np.all(np.abs(found.errors[:60]) < 1e-6 * found.errors.std())
+    left = found.errors[61:, 0]
+    n, lags = left.size, found.whiteness.lags.astype(int)
+    correlations = np.array([left[k:] @ left[:-k] for k in lags]) / (left @ left)
+    expected = n * (n + 2) * np.sum(correlations**2 / (n - lags))
+    assert found.whiteness.statistic == pytest.approx(expected, rel=0.02)
 
 
 def test_a_start_that_no_output_shows_changes_nothing():
