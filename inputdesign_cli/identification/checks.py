@@ -110,7 +110,7 @@ def check_apart(covariance: Array) -> None:
     )
 
 
-def factor_of_data(names: Sequence[str], rows: Array, again: Array) -> Array:
+def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array) -> Array:
     """L (k, k), lower triangular, with M = L L^T the information of the data.
 
     Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
@@ -118,6 +118,7 @@ def factor_of_data(names: Sequence[str], rows: Array, again: Array) -> Array:
     gradients themselves are rounding.
 
     Args:
+        theta: (k,), where the search ended.
         rows: gradients in white units, (samples, k).
         again: the same with other rounding.
 
@@ -132,10 +133,13 @@ def factor_of_data(names: Sequence[str], rows: Array, again: Array) -> Array:
         sizes = np.linalg.norm(factor, axis=1)[:, None]
         untold = sizes * scipy.linalg.solve_triangular(factor, uncertain, lower=True, trans="T")
     if untold.size:
+        ended = [f"{name} = {value:.4g}" for name, value in zip(names, theta, strict=True)]
         raise bad_spec(
             "not-exciting",
-            f"the data cannot tell these parameters apart: {taking_part(names, untold)}",
-            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high",
+            "the data cannot tell these parameters apart where the search ended: "
+            f"{taking_part(ended, untold)}",
+            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; if "
+            "the values make no sense, start elsewhere, beyond poles of expressions too",
             key="u",
         )
     return factor

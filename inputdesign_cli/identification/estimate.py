@@ -230,7 +230,7 @@ def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Arr
     Raises:
         SpecError: `not-exciting`.
     """
-    return factor_of_data(names, *_gradients(records, point, noise))
+    return factor_of_data(names, point.theta, *_gradients(records, point, noise))
 
 
 def _over_minima(names: tuple[str, ...], found: Search, factor: Array, noise: Array) -> Array:

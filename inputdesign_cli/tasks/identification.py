@@ -30,7 +30,7 @@ from inputdesign_cli.tasks.result.estimates import (
     prior_notes,
 )
 from inputdesign_cli.tasks.result.faults import faults, loop_faults
-from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions
+from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions, stopped_at_ends
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
 from inputdesign_cli.tasks.result.unrelated import answering, hardly_explained, idle
 
@@ -174,7 +174,8 @@ def speaking_against(task: Identification, found: Identified) -> list[str]:
     data, estimate = found.data, found.estimate
     units = task.header.units
     return mismeasured(task, found) or [
-        *idle(units, task.nominal, found.model, estimate),
+        # Where an expression ends G may vanish, whatever the inputs do.
+        *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
         *refutations(found.model, estimate),
         *([] if found.loop_told else answering(units, estimate, data)),
         *(repetitions(estimate, data.files) or data.repeated),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli import parse_spec, simulate, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli import identify as estimated, parse_spec, simulate, solve
+from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.identification import identify
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Spec
@@ -233,3 +233,42 @@ accuracy: {{model_error: {{relative: 0.5}}}}
     reasons = judged.results.result["assessment"].get("undecided", [])
     assert any("stopped at T = 22" in reason for reason in reasons) == stopped
     assert judged.verdict == ("undecided" if stopped else "met")
+
+
+def _held(gain, seed):
+    """Samples of gain/(6 s + 1), held for 3 to 12 samples of one second, with noise."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), rng.integers(3, 12, 60))[:300]
+    pole = np.exp(-1.0 / 6.0)
+    y = scipy.signal.lfilter([0.0, gain * (1.0 - pole)], [1.0, -pole], u)
+    return np.c_[u, y + 0.1 * rng.standard_normal(300)]
+
+
+_LAG = """
+sample_time: 1
+plant: {parameters: {T: 6, p: %g}, continuous: {numerator: ["%s"], denominator: [T, 1]}, sample: zoh}
+noise: {variance: 0.02}
+experiment: {samples: 300}
+"""
+
+
+def test_a_gain_whose_sign_an_expression_forbids_blames_no_columns(tmp_path):
+    """sqrt(p) of a plant with gain -1 ends at zero, where no input explains anything."""
+    np.savetxt(tmp_path / "log.csv", _held(-1.0, 4), delimiter=",", header="u,y", comments="")
+    found = estimated(parse_spec(_LAG % (1.0, "sqrt(p)"), design=False), tmp_path / "log.csv")
+    notes = " ".join(found.result["notes"])
+    assert "the search stopped at p = " in notes
+    assert "is not defined" in notes
+    assert "columns" not in notes
+
+
+def test_a_gain_behind_a_pole_of_its_expression_is_told_with_where_the_search_ended(tmp_path):
+    """1/(p - 1) from p = 3 does not get to p = 0.5: p runs off to where it changes nothing."""
+    np.savetxt(tmp_path / "log.csv", _held(-2.0, 4), delimiter=",", header="u,y", comments="")
+    with pytest.raises(DataError) as caught:
+        estimated(parse_spec(_LAG % (3.0, "1/(p - 1)"), design=False), tmp_path / "log.csv")
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "not-exciting"
+    assert "p = " in diagnostic.message
+    assert float(diagnostic.message.rpartition("p = ")[2]) > 1e6
+    assert "start elsewhere" in diagnostic.hint

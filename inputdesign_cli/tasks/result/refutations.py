@@ -63,6 +63,12 @@ def unsettled(model: Model, estimate: Estimate) -> list[str]:
             f"the search did not settle after {estimate.steps} steps from {begun}: "
             "the estimate may be far from the minimum; the orders may be too high for these data"
         )
+    return found + stopped_at_ends(model, estimate)
+
+
+def stopped_at_ends(model: Model, estimate: Estimate) -> list[str]:
+    """What to say of parameters that the search left where an expression ends."""
+    found = []
     deviations = np.sqrt(np.diag(estimate.covariance))
     for k in np.flatnonzero(~model.dead_times).tolist():
         beside = [model.at(theta).flaw for theta in _beside(model.theta, k, _ASIDE * deviations[k])]
