@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,13 +33,14 @@ from inputdesign_cli.cli.options import (
     SpecFile,
     TimeUnit,
     VerdictOutput,
+    Without,
 )
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 
 if TYPE_CHECKING:
-    from inputdesign_cli.tasks.build.preparation import Preparation
+    from inputdesign_cli.tasks.build.preparation import Preparation, Run
 
 _CHANNEL = re.compile(r"[uy]([1-9]\d*)?|time", re.ASCII)
 
@@ -63,6 +65,7 @@ def identify(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
+    without: Without = "",
     frequency_response: Annotated[
         bool,
         typer.Option(
@@ -99,7 +102,9 @@ def identify(
             data,
             remove_means=remove_means,
             operating_point=levels(operating_point),
-            preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
+            preparation=preparation(
+                columns, sample_time, time_unit, resample, detrend, skip, span, without, data
+            ),
             frequency_response=frequency_response,
         )
     keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
@@ -122,6 +127,7 @@ def assess(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
+    without: Without = "",
     figures: Figures = True,
     figure_format: FigureFormat = "png",
     json_output: Json = False,
@@ -147,7 +153,9 @@ def assess(
             data,
             remove_means=remove_means,
             operating_point=levels(operating_point),
-            preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
+            preparation=preparation(
+                columns, sample_time, time_unit, resample, detrend, skip, span, without, data
+            ),
         )
     keep(
         assessment.results,
@@ -208,8 +216,10 @@ def preparation(
     detrend: str,
     skip: int,
     span: str,
+    without: str,
+    data: Sequence[Path],
 ) -> Preparation:
-    """What the options about data say.
+    """What the options about `data` say.
 
     Raises:
         typer.BadParameter: One of them cannot be read.
@@ -229,7 +239,27 @@ def preparation(
         detrend=DETRENDS[detrend],
         skip=skip,
         span=_limits(span) if span else None,
+        without=tuple(_run(part, data) for part in filter(None, map(str.strip, without.split(",")))),
     )
+
+
+def _run(text: str, data: Sequence[Path]) -> Run:
+    """Rows as in 183-240 or 310, of several files with the name of one before."""
+    name, _, numbers = text.rpartition(":")
+    first, _, last = numbers.partition("-")
+    names = sorted({path.name for path in data})
+    rows = first.strip().isdecimal() and (last or first).strip().isdecimal()
+    if not rows or (name.isdecimal() and name not in names):
+        message = f"{text!r} names no rows: write 183-240, or 310 for one"
+        raise typer.BadParameter(message, param_hint="--without")
+    if name not in names and (name or len(data) > 1):
+        message = f"which file {text!r} is of is not clear: write {names[0]}:{numbers.strip()}"
+        raise typer.BadParameter(message, param_hint="--without")
+    begin, end = int(first), int(last or first)
+    if end < begin:
+        message = f"{text!r} ends before it begins: write {end}-{begin}?"
+        raise typer.BadParameter(message, param_hint="--without")
+    return name, begin, end
 
 
 def _limits(span: str) -> tuple[float, float]:

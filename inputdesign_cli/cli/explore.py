@@ -25,6 +25,7 @@ from inputdesign_cli.cli.options import (
     Skip,
     Span,
     TimeUnit,
+    Without,
 )
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
@@ -44,6 +45,7 @@ def explore(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
+    without: Without = "",
     output: ExplorationOutput = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
@@ -64,7 +66,7 @@ def explore(
     with computing(data[0], quiet=quiet):
         from inputdesign_cli import tasks
 
-        prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span)
+        prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span, without, data)
         model = None if validate is None else read_spec(validate, None, None, design=False)
         place = place.checked(model)
         found = tasks.explore(data, prepared, model=model)

@@ -24,8 +24,9 @@ from inputdesign_cli.identification.records import Records, shifted
 from inputdesign_cli.identification.white import DEPENDENT, Echoes, White
 from inputdesign_cli.plant.polynomial import Array
 
-# A right model fails some test of many signals, and some of one parameter, with at most these probabilities.
-LEVEL, DIRECTED_LEVEL = 0.005, 0.015
+# A right model fails some test of many signals, some of one parameter, and that of level shifts, with at most
+# these probabilities.
+LEVEL, DIRECTED_LEVEL, SHIFT_LEVEL = 0.005, 0.015, 0.001
 _LAGS = 25
 _FEW = 4
 _GROWTH = 1.35
@@ -34,7 +35,7 @@ _TRENDS, _WAVES = 3, 4
 # Of each residual at most one direction in so many is tried.
 _SAMPLES_A_DIRECTION = 8
 
-Fault = Literal["plant", "noise", "drift", "change", "nonlinear"]
+Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear"]
 
 
 @dataclass(frozen=True)
@@ -72,17 +73,23 @@ class _Signals:
 
 
 def score_tests(
-    records: Records, point: Point, *, recent: int, feedback: bool = False, echoes: Echoes | None = None
+    records: Records,
+    point: Point,
+    white: White,
+    *,
+    recent: int,
+    feedback: bool = False,
+    echoes: Echoes | None = None,
 ) -> tuple[ScoreTest, ...]:
     """The tests of an estimate.
 
     Args:
+        white: the estimate in the units of its noise.
         echoes: what past errors add to the gradients of parameters, where they add anything; None where that
             is not known: then scores are compared with zero.
         recent: the lag up to which the structure looks at the inputs.
         feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
     """
-    white = White.of(records, point, echoes)
     tests = []
     for signals in _tried(records, point, recent, int(feedback)):
         columns = white.columns(_of_outputs(signals.columns))
@@ -116,14 +123,17 @@ def score_tests(
 
 
 def failed(
-    tests: Sequence[ScoreTest], directed: Sequence[ScoreTest] = (), looks: int = 1
+    tests: Sequence[ScoreTest],
+    directed: Sequence[ScoreTest] = (),
+    shifts: Sequence[ScoreTest] = (),
+    looks: int = 1,
 ) -> tuple[ScoreTest, ...]:
     """Those that refute the model, each at its share of the level of its group (Bonferroni).
 
     Args:
         looks: how often they are asked as data come in; the looks share the level as well.
     """
-    groups = ((directed, DIRECTED_LEVEL / looks), (tests, LEVEL / looks))
+    groups = ((directed, DIRECTED_LEVEL / looks), (tests, LEVEL / looks), (shifts, SHIFT_LEVEL / looks))
     return tuple(test for group, level in groups for test in group if test.probability * len(group) < level)
 
 

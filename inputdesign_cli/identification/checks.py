@@ -136,10 +136,10 @@ def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array
         ended = [f"{name} = {value:.4g}" for name, value in zip(names, theta, strict=True)]
         raise bad_spec(
             "not-exciting",
-            "the data cannot tell these parameters apart where the search ended: "
-            f"{taking_part(ended, untold)}",
-            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; if "
-            "the values make no sense, start elsewhere, beyond poles of expressions too",
+            f"the data cannot tell these parameters apart: {taking_part(names, untold)}",
+            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; or "
+            f"the search went astray ({taking_part(ended, untold)}): start elsewhere, beyond poles of "
+            "expressions too",
             key="u",
         )
     return factor

@@ -122,10 +122,13 @@ class _Tried:
 
 
 def directed_tests(
-    records: Records, point: Point, alternatives: Sequence[Alternative], echoes: Echoes | None = None
+    records: Records,
+    point: Point,
+    white: White,
+    alternatives: Sequence[Alternative],
+    echoes: Echoes | None = None,
 ) -> tuple[Directed, ...]:
     """The test of every alternative; those that these data cannot tell apart share one."""
-    white = White.of(records, point, echoes)
     groups: list[list[_Tried]] = []
     for alternative in alternatives:
         column = white.columns(alternative.column(records)[None])[:, 0]

@@ -14,6 +14,7 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
+from inputdesign_cli.identification.level_shifts import LevelShift, level_shift, taken_off
 from inputdesign_cli.identification.one_system import of_one_system
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
@@ -22,7 +23,7 @@ from inputdesign_cli.identification.repeated import Repetition, repetition
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
 from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
-from inputdesign_cli.identification.white import Echoes
+from inputdesign_cli.identification.white import Echoes, White
 from inputdesign_cli.information.coordinates import triangular_factor
 from inputdesign_cli.plant.polynomial import Array
 
@@ -58,6 +59,8 @@ class Estimate:
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
         tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
+        shift: where an output most likely shifts, whatever the inputs do; None in too short records.
+        beside_shift: where that refutes the structure, `tests` once it is taken off.
     """
 
     names: tuple[str, ...]
@@ -80,6 +83,8 @@ class Estimate:
     independence: ResidualTest
     tests: tuple[ScoreTest, ...]
     directed: tuple[Directed, ...]
+    shift: LevelShift | None
+    beside_shift: tuple[ScoreTest, ...]
     alike: tuple[float, ...]
     rivals: tuple[Rival, ...]
     repeated: Repetition | None
@@ -97,17 +102,37 @@ class Estimate:
 
     @property
     def all_tests(self) -> tuple[ScoreTest, ...]:
-        """Those of many signals, then those of one parameter more."""
-        return (*self.tests, *(one.test for one in self.directed))
+        """Those of many signals, those of one parameter more, and that of level shifts."""
+        shifts = () if self.shift is None else (self.shift.test,)
+        return (*self.tests, *(one.test for one in self.directed), *shifts)
 
     @property
     def failed(self) -> tuple[ScoreTest, ...]:
         """The tests that refute the structure."""
         return self.failed_within(1)
 
+    @property
+    def shifted(self) -> LevelShift | None:
+        """Where an output shifts, if nothing else that is left then speaks more against the structure."""
+        if self.shift is None or self.shift.test not in self.failed:
+            return None
+        # Likelihood ratios are compared with one, scores with the other.
+        ratios = (*self.beside_shift, *(one.test for one in self.directed if one.of_structure))
+        scores = [one.test for one in self.directed if not one.of_structure]
+        compared = ((self.shift.test.probability, ratios), (self.shift.by_score, scores))
+        prevails = all(own < test.probability for own, tests in compared for test in tests)
+        return self.shift if prevails else None
+
+    @property
+    def failed_besides(self) -> tuple[ScoreTest, ...]:
+        """The tests that refute the structure but for a shift of an output."""
+        directed = tuple(one.test for one in self.directed)
+        return failed(self.tests if self.shifted is None else self.beside_shift, directed)
+
     def failed_within(self, looks: int) -> tuple[ScoreTest, ...]:
         """Those where data come in and are looked at so often: a right model seldom fails at any look."""
-        return failed(self.tests, tuple(one.test for one in self.directed), looks)
+        shifts = () if self.shift is None or not self.shift.alone else (self.shift.test,)
+        return failed(self.tests, tuple(one.test for one in self.directed), shifts, looks)
 
 
 @dataclass(frozen=True)
@@ -184,6 +209,13 @@ def concluded(
     lengths, earlier = records.lengths, records.earlier
     factor = factor_at(names, records, point, noise)
     left, kept = _not_explained(records)
+    white = White.of(records, point, echoes)
+
+    def tested(point: Point, white: White) -> tuple[ScoreTest, ...]:
+        return score_tests(records, point, white, recent=recent, feedback=feedback, echoes=echoes)
+
+    shift = level_shift(records, point, white)
+    refuting = shift is not None and shift.alone and failed((), shifts=(shift.test,))
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
@@ -208,8 +240,10 @@ def concluded(
         independence=cross_correlations(
             point.errors[left], records.u[left], fitted=in_plant, feedback=feedback, lengths=kept
         ),
-        tests=score_tests(records, point, recent=recent, feedback=feedback, echoes=echoes),
-        directed=directed_tests(records, point, alternatives, echoes),
+        tests=tested(point, white),
+        directed=directed_tests(records, point, white, alternatives, echoes),
+        shift=shift,
+        beside_shift=tested(*taken_off(records, point, white, shift)) if shift and refuting else (),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
         repeated=repetition(point.errors, records.u, feedback=feedback),

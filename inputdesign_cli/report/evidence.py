@@ -134,23 +134,34 @@ def verdict(result: Result) -> Iterator[str]:
         yield f"these data meet the accuracy: {_reached(worst)} of what is admitted"
         return
     yield f"these data miss the accuracy: {_reached(worst)} times what is admitted"
+    right = f"{_RIGHT}{_from_rest(result)}"
     if "experiments" in assessment:
         number = assessment["experiments"]
         repeat = "" if number is None else f"apply it {number} times, "
         yield (
             "the experiment below is the best within the limits for the model of these data, and after it "
-            f"the error is still {assessment['left']:.4g} times what is admitted{_RIGHT}: {repeat}widen "
+            f"the error is still {assessment['left']:.4g} times what is admitted{right}: {repeat}widen "
             "the limits, or loosen the target"
         )
     elif "left" in assessment:
         yield (
             "the experiment below is what the model of these data still needs: after both the error is "
-            f"{assessment['left']:.4g} of what is admitted{_RIGHT}; assess both records together"
+            f"{assessment['left']:.4g} of what is admitted{right}; assess both records together"
         )
     if "left" in assessment:
         yield from _open_structure(assessment)
     elif "no_top_up" in assessment:
         yield f"no experiment is designed: {assessment['no_top_up']}"
+
+
+def _from_rest(result: Result) -> str:
+    """What else an experiment counts on, if its record relies on a start from rest."""
+    signal = result.get("signal", {})
+    if "begun_anywhere" not in signal:
+        return ""
+    growth = signal["begun_anywhere"]
+    else_ = "nothing is promised" if growth is None else f"{growth:.3g} times as much"
+    return f" and the record begins at rest, its levels known (--operating-point; else {else_})"
 
 
 def _open_structure(assessment: Result) -> Iterator[str]:

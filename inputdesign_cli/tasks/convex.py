@@ -43,7 +43,7 @@ from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.robust import Plants, delivered_samples, without_dearest
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
-from inputdesign_cli.tasks.unknown_start import start_notes
+from inputdesign_cli.tasks.unknown_start import begun_anywhere
 from inputdesign_cli.tasks.worst_case import with_worst_plants
 
 
@@ -161,7 +161,9 @@ class ConvexTask:
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
                 asked, step = done.problem.requirements, self.record.step
-                notes += start_notes(done.experiment, record.samples, step, asked)
+                start = begun_anywhere(done.experiment, record.samples, step, asked)
+                result["signal"] |= start.entry
+                notes += start.notes
             if record is not None and self.foresight is not None:
                 foreseen = self.foresight.foreseen(record.samples, done.problem.requirements, result)
                 result |= {"foreseen": foreseen.entry} if foreseen.entry else {}

@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
-from inputdesign_cli.identification.explore import Fits, Found, answers_output, explore_records, fits
+from inputdesign_cli.identification.explore import Fits, Found, answers_output, fits
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.curves import ResponseCurves
 from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
-from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
+from inputdesign_cli.tasks.build.exploration import build_explored, spec_text, warned
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.log import Log, read_logs, with_channels
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
+from inputdesign_cli.tasks.level_shifts import explored_beside_shifts
 from inputdesign_cli.tasks.result.exploration import (
     exploration_entry,
     exploration_notes,
@@ -64,7 +65,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     undriven = undriven_inputs(log)
     with blaming_columns(paths[0]):
         try:
-            found = explore_records(log.parts, feedback=bool(loops), step=log.step, ramp=log.lined)
+            log, found = explored_beside_shifts(log, loop=bool(loops))
         except SpecError as error:
             if not undriven:
                 raise
@@ -74,8 +75,16 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
-    times = np.concatenate([log.step * np.arange(length) for length in lengths])
-    data = Data(u, y, None, times, lengths, (), (), recorded=log.recorded.at(found.samples))
+    data = Data(
+        u,
+        y,
+        None,
+        log.time[found.samples],
+        lengths,
+        log.files_of(found.samples),
+        (),
+        recorded=log.recorded.at(found.samples),
+    )
     response = _without_model(task.header.units, log, found, loop=bool(loops))
     doubts = (
         *biasing(task.header.units, found.estimate, data, found.validation.simulation),
@@ -98,7 +107,10 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         "validation": validation_entry(found.validation),
     }
     complete = replace(
-        results, result=result, resolved_spec=text, curves={**results.curves, **structure_curves(found)}
+        results,
+        result=result,
+        resolved_spec=warned(text, reasons, loop=bool(loops)),
+        curves={**results.curves, **structure_curves(found)},
     )
     against = tuple(refutations(found.model, found.estimate))
     return Exploration(complete if response is None else response.beside(complete), reasons, against)

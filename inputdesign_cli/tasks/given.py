@@ -37,7 +37,7 @@ from inputdesign_cli.tasks.result.signal import other_files, signal_curves, sign
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
 from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates, Simulator
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
-from inputdesign_cli.tasks.unknown_start import start_notes
+from inputdesign_cli.tasks.unknown_start import begun_anywhere
 
 _TOO_FAINT = 1e-12
 _ROUNDING = 1e-9
@@ -188,7 +188,9 @@ class GivenTask:
         notes += broken_limits(self.limits, experiment.samples, excitation.power, signal)
         notes += record_notes(self.record, experiment.samples, record, {}) if record is None else []
         if record is not None and np.isfinite(record.worst_ratio):
-            notes += start_notes(experiment, record.samples, self.record.step, requirements)
+            start = begun_anywhere(experiment, record.samples, self.record.step, requirements)
+            result["signal"] |= start.entry
+            notes += start.notes
         if record is not None and self.foresight is not None:
             foreseen = self.foresight.foreseen(record.samples, requirements, result)
             result |= {"foreseen": foreseen.entry} if foreseen.entry else {}

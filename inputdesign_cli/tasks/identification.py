@@ -30,6 +30,7 @@ from inputdesign_cli.tasks.result.estimates import (
     prior_notes,
 )
 from inputdesign_cli.tasks.result.faults import faults, loop_faults
+from inputdesign_cli.tasks.result.level_shifts import shifted_levels
 from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions, stopped_at_ends
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
 from inputdesign_cli.tasks.result.unrelated import answering, hardly_explained, idle
@@ -176,6 +177,7 @@ def speaking_against(task: Identification, found: Identified) -> list[str]:
     return mismeasured(task, found) or [
         # Where an expression ends G may vanish, whatever the inputs do.
         *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
+        *shifted_levels(units, estimate, data),
         *refutations(found.model, estimate),
         *([] if found.loop_told else answering(units, estimate, data)),
         *(repetitions(estimate, data.files) or data.repeated),

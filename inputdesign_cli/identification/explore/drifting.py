@@ -48,7 +48,14 @@ class Lines:
         return replace(self, slopes=np.where(np.abs(self.slopes) * longest > least, self.slopes, 0.0))
 
 
-def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, ramp: bool = False) -> Found:
+def explore_records(
+    parts: Parts,
+    *,
+    feedback: bool = False,
+    step: float = 1.0,
+    ramp: bool = False,
+    unless_shifted: bool = False,
+) -> Found:
     """The model that records u (n, r), y (n, p) speak for, samples `step` apart.
 
     Where tests say that what is left drifts, lines are taken away from the outputs, if that helps. Where it
@@ -57,11 +64,15 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
     Args:
         feedback: whether u(t) may answer y(t).
         ramp: whether the outputs are known to drift along lines.
+        unless_shifted: whether to look for neither where an output shifts and stays: a model about levels
+            tells where.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
     """
-    level = _about_levels(parts, feedback=feedback, step=step, ramp=ramp)
+    level = _about_levels(parts, feedback=feedback, step=step, ramp=ramp, unless_shifted=unless_shifted)
+    if unless_shifted and level.estimate.shifted is not None:
+        return level
     # In a loop the noise is estimated with every structure.
     which = [] if feedback else _may_wander(level)
     if not any(which):
@@ -78,7 +89,7 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
     return replace(walk, rival=level.model if more > 0.0 and not _hardly_decays(level) else None)
 
 
-def _about_levels(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
+def _about_levels(parts: Parts, *, feedback: bool, step: float, ramp: bool, unless_shifted: bool) -> Found:
     """The same, noise about levels and lines being the only one."""
     _, moved = moving_in(parts)
     longest, samples = max(len(y) for _, y in moved), sum(len(y) for _, y in moved)
@@ -93,7 +104,8 @@ def _about_levels(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> F
                 if not any(_drifting(even)):
                     return even
     level = explored(parts, feedback=feedback, step=step, ramp=False)
-    if not (any(_drifting(level)) or _hardly_decays(level)):
+    shifted = unless_shifted and level.estimate.shifted is not None
+    if shifted or not (any(_drifting(level)) or _hardly_decays(level)):
         return level
     lines = lines_of(moved).beyond(np.sqrt(np.diag(level.estimate.noise)), longest)
     if not np.any(lines.slopes):

@@ -52,6 +52,7 @@ from inputdesign_cli.identification.explore.regression import (
 )
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
+from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
@@ -143,7 +144,10 @@ class _Parts:
             scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True), axis=0
         )
         echoes = kind.echoes(found.point.theta, records.lengths)
-        tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
+        white = White.of(records, found.point, echoes)
+        tests = score_tests(
+            records, found.point, white, recent=kind.recent, feedback=self.feedback, echoes=echoes
+        )
         fitted = integrating(structure.at(found.point.theta, noise), (self.wanders,))
         on_first = fits(fitted, self.levels, self.late)
         on_second = fits(fitted, self.judging, self.late, self.before)

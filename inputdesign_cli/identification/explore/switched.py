@@ -23,7 +23,7 @@ from inputdesign_cli.plant.polynomial import Array
 _LAGS = 20
 # Of longer records the stretch in which the inputs move most is enough.
 _MOST_SAMPLES = 4000
-_CERTAIN = 1e-4
+_CERTAIN, _LITTLE = 1e-4, 0.01
 # A sample before a relay switches the noise has not made it do so: at this level that is seen as well.
 _ALSO = 0.003
 # A jump is at least this share of the largest one; fewer than so many tell nothing, and an input that jumps
@@ -63,7 +63,8 @@ def early_answers(parts: Parts) -> list[Early]:
         for i in range(outputs):
             answers = _answers(parts, j, i)
             probability = inputs * outputs * answers.ahead
-            if probability < _CERTAIN <= answers.against:
+            # What is said of one side shows a little on the other at other lags.
+            if probability < min(_CERTAIN, _LITTLE * answers.against):
                 found.append(Early(j, i, answers.lead, probability))
     return found
 

@@ -162,23 +162,26 @@ def prepared(
     """
     sheet, rows, told = signals.sheet, signals.sheet.lines, list(signals.told)
     time = signals.time if signals.name else signals.time * step
-    for name, x in zip(signals.inputs, signals.u.T, strict=True):
-        there = ~np.isnan(x)
-        told += outliers(name, x[there], rows[there])
-    for name, x in zip(signals.outputs, signals.y.T, strict=True):
-        there = ~np.isnan(x)
-        told += strange_values(name, x[there], signals.u[there], rows[there])
-        told += limits_of_sensor(name, x[there])
-    if np.isnan(np.column_stack([time, signals.u, signals.y])).any(axis=1).all():
+    whole = ~np.isnan(np.column_stack([time, signals.u, signals.y])).any(axis=1)
+    if not np.any(whole & ~signals.without):
         message = f"no row of {sheet.path.name} has a number in every column that is asked for"
         hint = (
             "inputs, outputs and times of a sample stand in one row: where a logger writes them in turn, "
             "join the rows; or name other columns (--columns)"
         )
+        if np.any(whole):
+            message, hint = f"--without leaves no row of {sheet.path.name}", "leave fewer rows out"
         raise DataError(sheet.error("data-not-a-number", message, hint, 0))
+    for name, x in zip(signals.inputs, signals.u.T, strict=True):
+        there = ~np.isnan(x) & ~signals.without
+        told += outliers(name, x[there], rows[there])
+    for name, x in zip(signals.outputs, signals.y.T, strict=True):
+        there = ~np.isnan(x) & ~signals.without
+        told += strange_values(name, x[there], signals.u[there], rows[there])
+        told += limits_of_sensor(name, x[there])
     apart, lines = passed_over(sheet, timed=bool(signals.name))
     segments, cuts = whole_segments(
-        time, signals.u, signals.y, step, apart, rows, resample=preparation.resample
+        time, signals.u, signals.y, step, apart, rows, signals.without, resample=preparation.resample
     )
     told = [*lines, *cuts, *told]
     off = jitter(segments, step)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -23,6 +24,8 @@ from inputdesign_cli.tasks.result.blocks import blocks_of
 
 _MOST_SAMPLES = 100_000
 _DIGITS = 6
+# Before a title, in the quotes of a string.
+_DOUBTED = '"On a model that deserves no trust: '
 
 
 def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
@@ -97,6 +100,25 @@ spectrum: {{type: fir, order: 20}}
 signal: {{type: filtered_noise, seed: 1, offset: {json.dumps(offset)}}}
 """
     return text
+
+
+def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
+    """A spec that says at its head, and in its title, why its model deserves no trust, and of a loop.
+
+    Args:
+        loop: whether inputs seem to answer the outputs.
+    """
+    told = [f"No model of this record deserves trust, and no design on this one: {one}" for one in reasons]
+    if loop:
+        told.append(
+            "The inputs seem to answer the outputs, as in a loop. Then identify and assess need its "
+            "controller, experiment: {controller: {numerator: [..], denominator: [..]}}; solve then designs "
+            "in the loop."
+        )
+    lines = [textwrap.fill(one, 110, initial_indent="# ", subsequent_indent="#   ") for one in told]
+    head, title, rest = text.partition("title: ")
+    doubted = f"{title}{_DOUBTED}{rest[1:]}" if reasons else title + rest
+    return head + "".join(f"{line}\n" for line in lines) + doubted
 
 
 def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:

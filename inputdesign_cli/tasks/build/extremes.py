@@ -26,7 +26,7 @@ def check_range(sheet: Sheet, name: str, x: Array) -> None:
     size = abs(float(x[row]))
     if lost is not None:
         message = f"beside {x[lost]:.6g} in column {name} all other values are lost in rounding"
-        faulty = "if it is a fault of measurement, empty the cell, which cuts the record there"
+        faulty = f"if it is a fault of measurement, --without {sheet.lines[lost]} leaves its row out"
         hint = "write the value that was meant" if sheet.key else faulty
         raise DataError(sheet.error("beyond-precision", message, hint, lost))
     if size and not 1.0 / _EXTREME < size < _EXTREME:

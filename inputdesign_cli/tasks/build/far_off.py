@@ -42,8 +42,8 @@ def strange_values(name: str, y: Array, u: Array, lines: NDArray[np.int64]) -> l
         return told
     return [
         f"{name} has {alone.sum()} values ({per_cent(alone.mean(), 2)}) far from their neighbours "
-        f"({rows.told(lines[alone])}): spikes? Look at the record, and empty the cells that are faults of "
-        "measurement"
+        f"({rows.told(lines[alone])}): spikes? Look at the record, and leave rows out that are faults of "
+        "measurement (--without)"
     ]
 
 

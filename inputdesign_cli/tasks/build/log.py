@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
@@ -16,7 +17,7 @@ from inputdesign_cli.tasks.build.columns import counted_unit, time_unit_in, with
 from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.preparation import SHORTEST, Preparation
 from inputdesign_cli.tasks.build.signals import check_stated, signals_of, stated_step, typical_step
 from inputdesign_cli.tasks.build.tables import may_be_times, no_column
 from inputdesign_cli.tasks.build.written_apart import joined_rows
@@ -35,7 +36,9 @@ class Log:
 
     Attributes:
         u, y: (N, r), (N, p) as logged, without gaps.
+        time: (N,), counted from zero in a file that has none.
         lengths: the samples of each segment.
+        files: the name of each file and its samples.
         names: of the columns, by channel.
         step, time_unit: the sample time.
         steps: what was done to the record, and what was seen in it.
@@ -45,7 +48,9 @@ class Log:
 
     u: Array
     y: Array
+    time: Array
     lengths: tuple[int, ...]
+    files: tuple[tuple[str, int], ...]
     names: dict[str, str]
     step: float
     time_unit: str
@@ -58,6 +63,33 @@ class Log:
         """The segments."""
         at = np.cumsum(self.lengths)[:-1]
         return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
+
+    def files_of(self, samples: NDArray[np.int64]) -> tuple[tuple[str, int], ...]:
+        """The name of each file, and how many of these samples it has."""
+        ends = np.cumsum([count for _, count in self.files])
+        counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends))
+        return tuple((name, int(count)) for (name, _), count in zip(self.files, counts, strict=True))
+
+    def without(self, begin: int, end: int) -> Log:
+        """The same without the samples from `begin` until before `end`, and what is too short beside them.
+
+        Args:
+            begin, end: counted through all segments.
+        """
+        left = np.concatenate([np.arange(begin), np.arange(end, len(self.y))])
+        apart = (np.diff(left) > 1) | np.isin(left[1:], np.cumsum(self.lengths))
+        runs = np.split(left, np.flatnonzero(apart) + 1)
+        kept = [run for run in runs if len(run) >= SHORTEST] or [max(runs, key=len)]
+        samples = np.concatenate(kept)
+        return replace(
+            self,
+            u=self.u[samples],
+            y=self.y[samples],
+            time=self.time[samples],
+            lengths=tuple(map(len, kept)),
+            files=self.files_of(samples),
+            recorded=self.recorded.at(samples),
+        )
 
 
 def read_log(path: Path, preparation: Preparation) -> Log:
@@ -102,7 +134,9 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     return Log(
         np.concatenate([part.u for part in segments]),
         np.concatenate([part.y for part in segments]),
+        np.concatenate([part.time for part in segments]),
         tuple(len(part.y) for part in segments),
+        ((path.name, sum(len(part.y) for part in segments)),),
         {channel: column for channel, column in given.columns.items() if channel != "time" or signals.name},
         step,
         unit,
@@ -186,7 +220,9 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
     return Log(
         np.concatenate([log.u for log in logs]),
         np.concatenate([log.y for log in logs]),
+        np.concatenate([log.time for log in logs]),
         tuple(length for log in logs for length in log.lengths),
+        tuple(file for log in logs for file in log.files),
         first.names,
         first.step,
         first.time_unit,

@@ -13,6 +13,8 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build import rows
 
 Detrend = Literal["none", "constant", "linear", "auto"]
+Run = tuple[str, int, int]
+"""Rows of a file, the first and the last; no name: of the only file."""
 DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
 
 # Times may be off by this share of the sample time without a word, and by the second with one.
@@ -42,6 +44,7 @@ class Preparation:
         detrend: what is taken away from the signals of every segment; `auto` a line where it explains much.
         skip: rows to leave out at the beginning.
         span: of times, in the unit of the file, to keep.
+        without: rows to leave out, as notes number them; the record is cut there.
         operating_point: by channel, what is taken away where no trend is.
     """
 
@@ -52,6 +55,7 @@ class Preparation:
     detrend: Detrend = "none"
     skip: int = 0
     span: tuple[float, float] | None = None
+    without: tuple[Run, ...] = ()
     operating_point: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -89,6 +93,7 @@ def whole_segments(
     step: float,
     apart: NDArray[np.bool_],
     lines: NDArray[np.int64],
+    without: NDArray[np.bool_],
     *,
     resample: bool,
 ) -> tuple[list[Segment], list[str]]:
@@ -102,10 +107,12 @@ def whole_segments(
         step: the sample time.
         apart: (n,), whether a stretch ends before a row, whatever its time.
         lines: (n,), the number of each row in the file.
+        without: (n,), rows that are to be left out.
     """
-    told = []
+    told = [f"{rows.told(lines[without])} left out, as --without says"] if np.any(without) else []
     whole = ~np.isnan(np.column_stack([time, u, y])).any(axis=1)
-    missing = lines[~whole]
+    missing = lines[~whole & ~without]
+    whole &= ~without
     kept = np.flatnonzero(whole)
     cut = (np.diff(kept) > 1) | apart[kept[1:]]
     long = np.diff(time[kept]) > (_LONG_GAP if resample else _GAP) * step

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.plant.polynomial import Array
@@ -25,6 +26,7 @@ from inputdesign_cli.tasks.build.files.sheet import elsewhere
 from inputdesign_cli.tasks.build.other_times import shifted_times
 from inputdesign_cli.tasks.build.preparation import MOST_JITTER, Preparation
 from inputdesign_cli.tasks.build.tables import column_named, columns_of
+from inputdesign_cli.tasks.build.without import left_out
 
 # Steps of time differ from a round number by less than this share of it by rounding alone.
 _ROUND = 1e-4
@@ -42,6 +44,7 @@ class Signals:
         time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
         dated: whether the times stand as dates; they are counted in seconds then.
         inputs, outputs: what notes call the columns of u and y.
+        without: (n,), rows that are to be left out.
         told: what was done to read them.
     """
 
@@ -53,6 +56,7 @@ class Signals:
     y: Array
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    without: NDArray[np.bool_]
     told: tuple[str, ...] = ()
 
 
@@ -89,8 +93,9 @@ def signals_of(
     kept = replace(
         sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
     )
+    without = left_out(sheet, preparation.without)[rows]
     for role, numbers in found.items():
-        own = numbers[rows]
+        own = np.where(without & (role != "time"), np.nan, numbers[rows])
         if not np.isnan(own).all():
             # Clocks count from long ago.
             check_range(kept, wanted[role], own - np.nanmin(own) if role == "time" else own)
@@ -108,7 +113,9 @@ def signals_of(
         _check_rising(kept, time, wanted, dated=dated)
         told += shifted_times(sheet, name)
     told.append(elsewhere(sheet.path, sheet.others).lstrip("; "))
-    return Signals(kept, time, name, dated, u, y, driving, _labels("y", outputs), tuple(filter(None, told)))
+    return Signals(
+        kept, time, name, dated, u, y, driving, _labels("y", outputs), without, tuple(filter(None, told))
+    )
 
 
 def _nothing_left(sheet: Sheet, preparation: Preparation, time: Array) -> DataError:

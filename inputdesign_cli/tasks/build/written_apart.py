@@ -83,7 +83,8 @@ def joined_rows(signals: Signals, *, resample: bool) -> tuple[Signals, list[str]
             "means from one to the next: what is faster than that cannot be told"
         )
     u = np.column_stack([means for means, _ in inputs])
-    return replace(signals, sheet=kept, time=time, u=u, y=np.column_stack(outputs)), told
+    y, without = np.column_stack(outputs), signals.without[rows]
+    return replace(signals, sheet=kept, time=time, u=u, y=y, without=without), told
 
 
 def _misses_some(every: Array, own: Array) -> bool:

@@ -114,6 +114,7 @@ def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]
     for i, (chosen, taken, ranges) in enumerate(zip(found.outputs, found.taken, found.ranges, strict=True)):
         name = "y" if single else f"y{i + 1}"
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
+        orders += f"; times in {log.time_unit}" if taken.orders.physical else ""
         delays = " and ".join(
             f"{delay} from {'u' if alone else f'u{j + 1}'} (95 %: {_between(low, high)})"
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)

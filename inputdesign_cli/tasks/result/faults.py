@@ -12,6 +12,8 @@ from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import Data
 
 _SHOWN = 5
+# Rows that an option lists.
+_LISTED = 12
 # Of so many samples in a hundred a sensor that stands still biases a model; spikes where it explains less.
 _BIASING, _HALF = 0.02, 50.0
 
@@ -32,22 +34,23 @@ def biasing(units: Units, estimate: Estimate, data: Data, fitted: Sequence[float
         share = sum(one.length for one in runs) / len(data.y)
         if share >= _BIASING:
             told.append(
-                f"{_named(units, output)} stands still at {100.0 * share:.2g} % of the samples while the "
-                "input moves: a model of what a sensor does not follow has another gain, and other dynamics, "
-                "than the plant; empty these cells, which cuts the record there, and try again"
+                f"{output_named(units, output)} stands still at {100.0 * share:.2g} % of the samples while "
+                "the input moves: a model of what a sensor does not follow has another gain, and other "
+                "dynamics, than the plant; leave these rows out (--without), which cuts the record there"
             )
     told += [
         f"a few samples hold {100.0 * one.share:.3g} % of the squares of the residuals of "
-        f"{_named(units, one.output)}, and the simulation explains {fitted[one.output]:.1f} % of it: spikes, "
-        "or events that the model does not know, decide what it is; empty the cells that are faults of "
-        "measurement, and try again"
+        f"{output_named(units, one.output)}, and the simulation explains {fitted[one.output]:.1f} % of it: "
+        "spikes, or events that the model does not know, decide what it is; leave rows out that are faults "
+        "of measurement (--without)"
         for one in spikes(estimate.errors)
         if fitted[one.output] < _HALF
     ]
     return told
 
 
-def _named(units: Units, output: int) -> str:
+def output_named(units: Units, output: int) -> str:
+    """How messages call an output."""
     return f"y{output + 1}" if units.outputs > 1 else "y"
 
 
@@ -76,11 +79,12 @@ def _frozen(units: Units, estimate: Estimate, data: Data) -> list[str]:
             for first, last in [data.recorded.rows[[one.first, one.first + one.length - 1]]]
         ]
         told.append(
-            f"{_named(units, output)} stands still while the input moves, for "
+            f"{output_named(units, output)} stands still while the input moves, for "
             f"{sum(one.length for one in runs)} of {len(data.y)} samples ({', '.join(places)}"
             f"{', ..' * (len(runs) > _SHOWN)}), and rounding does "
-            "not explain it: the sensor is frozen or saturated, or the logger repeats its last value; empty "
-            "these cells, which cuts the record there, and try again"
+            "not explain it: the sensor is frozen or saturated, or the logger repeats its last value; leave "
+            "these rows out, which cuts the record there: "
+            f"{_without_samples(data, [(one.first, one.first + one.length - 1) for one in runs])}"
         )
     return told
 
@@ -104,11 +108,32 @@ def loop_faults(controller: TransferMatrix | None, data: Data) -> list[str]:
     return list(dict.fromkeys(told))
 
 
-def _file(data: Data, at: int) -> str:
-    """Which file a sample is of, where there are several."""
+def file_of(data: Data, at: int) -> str:
+    """The file that a sample is of, where there are several."""
     ends = np.cumsum([samples for _, samples in data.files])
-    several = len(data.files) > 1
-    return f" of {data.files[int(np.searchsorted(ends, at, side='right'))][0]}" if several else ""
+    return data.files[int(np.searchsorted(ends, at, side="right"))][0] if len(data.files) > 1 else ""
+
+
+def without_option(runs: Sequence[tuple[str, int, int]]) -> str:
+    """The option that leaves out runs of rows: the name of the file, if need be, the first and the last."""
+    listed = [
+        f"{f'{name}:' if name else ''}{first}{f'-{last}' if last > first else ''}"
+        for name, first, last in runs
+    ]
+    return f"--without {','.join(listed)}" if len(listed) <= _LISTED else "--without"
+
+
+def _without_samples(data: Data, runs: Sequence[tuple[int, int]]) -> str:
+    """The option that leaves out samples, the first and the last of each run."""
+    if data.recorded is None:
+        return "--without"
+    rows = data.recorded.rows
+    return without_option([(file_of(data, first), rows[first], rows[last]) for first, last in runs])
+
+
+def _file(data: Data, at: int) -> str:
+    name = file_of(data, at)
+    return f" of {name}" if name else ""
 
 
 def places(units: Units, data: Data, samples: Sequence[int]) -> str:
@@ -121,12 +146,12 @@ def _spikes(units: Units, estimate: Estimate, data: Data) -> list[str]:
     """A sentence for every output in whose residuals a few samples hold most of the sum of squares."""
     told = []
     for one in spikes(estimate.errors):
-        many, output = len(one.samples), _named(units, one.output)
+        many, output = len(one.samples), output_named(units, one.output)
         told.append(
             f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
             f"{100 * one.share:.3g} % of the squares of its residuals (at "
             f"{places(units, data, one.samples)}): spikes, or events that the model does not know, decide "
-            "what these data say; empty the cells that are faults of measurement, which cuts the record "
-            "there, and try again"
+            "what these data say; leave rows out that are faults of measurement, which cuts the record "
+            f"there: {_without_samples(data, [(at, at) for at in one.samples])}"
         )
     return told

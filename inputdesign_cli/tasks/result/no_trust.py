@@ -69,7 +69,7 @@ def distrusted(
         *rivalled(found),
         *(() if found.steady or rising or unseen else (_UNSTEADY,)),
         *(f"{told}: {DRIVE}" for told in undriven),
-        *(() if loop else late_inputs(log.parts)),
+        *late_inputs(log.parts),
         *(f"{told}: {DRIVE}" for told in inverses),
         *doubts,
     )

@@ -156,10 +156,14 @@ def repetitions(estimate: Estimate, files: Sequence[tuple[str, int]]) -> list[st
 
 
 def refutations(model: Model, estimate: Estimate) -> list[str]:
-    """What the strongest test of every kind of fault says, and which single parameters are missing."""
+    """What the strongest test of every kind of fault says, and which single parameters are missing.
+
+    Of an output that shifts see `level_shifts.py`.
+    """
     strongest: dict[str, ScoreTest] = {}
     directed = {one.test: one.alternatives for one in estimate.directed}
-    for test in estimate.failed:
+    failing = estimate.failed_besides
+    for test in failing:
         if test in directed:
             continue
         if test.fault not in strongest or test.probability < strongest[test.fault].probability:
@@ -181,7 +185,7 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
         )
         + _or_else(directed[test][1:])
         for test in sorted(directed, key=lambda test: test.probability)
-        if test in estimate.failed
+        if test in failing
     ]
     return of_many + of_one
 

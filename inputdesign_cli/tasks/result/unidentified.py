@@ -9,7 +9,7 @@ from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.processes import LONGER
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.result.rivals import most_apart
-from inputdesign_cli.tasks.result.unrelated import chance_of_response
+from inputdesign_cli.tasks.result.unrelated import chance_of_response, driving_nothing
 
 # A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
 # not at all beyond the other.
@@ -112,6 +112,16 @@ def untold_parameters(found: Found, share: float = _NO_DIGIT) -> list[str]:
     ]
 
 
+def _remedy(found: Found) -> str:
+    """What to do about parameters that are not told: inputs without an effect have any."""
+    idle = set(driving_nothing(found.model, found.estimate)) - set(found.still)
+    move = "move the inputs independently of each other, and at more frequencies"
+    if not 0 < len(idle) < len(found.moving):
+        return move
+    names = " and ".join(f"u{j + 1}" for j in sorted(idle))
+    return f"leave out {names}, of which no effect can be told from none (--columns), or {move}"
+
+
 def rivalled(found: Found) -> tuple[str, ...]:
     """A sentence where parameters of another minimum explain the record about as well, with another G."""
     w = np.linspace(1e-6, np.pi, _FREQUENCIES)
@@ -129,8 +139,8 @@ def rivalled(found: Found) -> tuple[str, ...]:
             share = f"{100.0 * apart:.3g} % of" if apart < 1.0 else f"{apart:.3g} times"
             return (
                 f"two sets of parameters explain the record about equally well ({values}{more}; -2 log "
-                f"likelihood differs by {rival.excess:.2g}), and their G by {share} its peak: move the "
-                "inputs independently of each other, and at more frequencies",
+                f"likelihood differs by {rival.excess:.2g}), and their G by {share} its peak: "
+                f"{_remedy(found)}",
             )
     if found.rival is None:
         return ()

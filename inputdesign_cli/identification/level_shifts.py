@@ -1,0 +1,193 @@
+"""Does an output shift and stay where it is, though no input does that, as after a change of load?
+
+What shifts is a step, or one that a lag makes smooth, from any sample on until the record ends
+([tsay-1988]). Scores of all of them are correlations of the residuals with one response: a test for every
+sample costs no more than a few transforms. A test of trends, which shares its power among many signals,
+hardly notices what has happened once; and what the estimate makes of it is another gain and slower dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.identification.adequacy import ScoreTest
+from inputdesign_cli.identification.record_problem import Point
+from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.white import White
+from inputdesign_cli.plant.polynomial import Array
+
+# Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
+_SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125
+# What is nearer to an end of a record is its start, or a few samples that are wrong.
+_FEWEST = 5
+# A shift of which the estimate explains all but this share cannot be seen.
+_EXPLAINED = 1e-3
+# Of squares, so that what is left stays positive.
+_MOST_EXPLAINED = 1.0 - 1e-9
+# Of time constants, until a lag has settled, and how far its beginning may be off.
+_SETTLED, _UNSURE = 3.0, 0.5
+
+
+@dataclass(frozen=True)
+class LevelShift:
+    """The likeliest shift of an output.
+
+    Attributes:
+        output: from zero.
+        sample: likely the first of it, counted through all records.
+        lag: the time constant by which it is smooth, in samples; zero of a step.
+        begins, ends: the samples between which, for certain, it begins and has settled, the last left out.
+        rises: whether the output is larger after it.
+        test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
+        by_score: the probability of the score alone, which is larger.
+        alone: whether it explains more than a line through its record does, or single samples beside it do.
+    """
+
+    output: int
+    sample: int
+    lag: float
+    begins: int
+    ends: int
+    rises: bool
+    test: ScoreTest
+    by_score: float
+    alone: bool
+
+
+@dataclass(frozen=True)
+class _Scores:
+    """Of one signal, begun at every sample of a record: statistics (n,), and the signs of their sizes."""
+
+    statistic: Array
+    rises: Array
+
+
+def level_shift(records: Records, point: Point, white: White) -> LevelShift | None:
+    """The likeliest shift; None in records that are too short for any."""
+    found: list[tuple[float, int, int, float, bool, bool]] = []
+    lags = _lags(max(records.lengths))
+    steps = np.stack([_smooth(max(records.lengths), lag) for lag in lags], axis=1)
+    single = np.eye(1, len(steps))[0]
+    through = _responses(records, point.theta, np.column_stack([steps, single]))
+    for begin, length in _stretches(records):
+        inner = slice(_FEWEST, length - _FEWEST)
+        for output in range(len(through)):
+            of_sample = _scores(white, begin, output, through[output, :length, -1])
+            line = _line(records, point.theta, white, begin, length, output)
+            for lag, response in zip(lags, through[output, :length, :-1].T, strict=True):
+                scores = _scores(white, begin, output, response)
+                at = _FEWEST + int(np.argmax(scores.statistic[inner]))
+                size = float(scores.statistic[at])
+                near = slice(max(at - int(lag) - _FEWEST, 0), at + int(lag) + _FEWEST)
+                alone = size > max(line, float(np.max(of_sample.statistic[near])))
+                found.append((size, output, begin + at, lag, bool(scores.rises[at] > 0.0), alone))
+    if not found:
+        return None
+    score, output, sample, lag, rises, alone = max(found)
+    # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
+    share = min(score * white.variance / records.samples, _MOST_EXPLAINED)
+    statistic = -float(np.log1p(-share)) * point.near.freedom / len(through)
+    looks = sum(length for _, length in _stretches(records)) * len(through) * len(lags)
+    probability, by_score = (min(looks * float(scipy.special.chdtrc(1, x)), 1.0) for x in (statistic, score))
+    test = ScoreTest("level_shift", "shift", statistic, 1, probability, None, output)
+    before, after = (1 + round(share * lag) for share in (_UNSURE, _SETTLED))
+    begin, length = next(one for one in _stretches(records) if sample < sum(one))
+    begins, ends = max(sample - before, begin), min(sample + 1 + after, begin + length)
+    return LevelShift(output, sample, lag, begins, ends, rises, test, by_score, alone)
+
+
+def taken_off(records: Records, point: Point, white: White, shift: LevelShift) -> tuple[Point, White]:
+    """The same with the shift estimated along, as far as errors are concerned."""
+    begin, length = next(one for one in _stretches(records) if shift.sample < sum(one))
+    signal = np.zeros((records.samples, 1))
+    after = begin + length - shift.sample
+    signal[shift.sample : begin + length, 0] = _smooth(after, shift.lag)
+    left = white.unexplained(_column(records, point.theta, white, signal, shift.output))
+    along = left / np.linalg.norm(left)
+    less = replace(
+        white,
+        residuals=white.residuals - along[:, 0] * float(along[:, 0] @ white.residuals),
+        explained=np.column_stack([along, white.explained]),
+        basis=np.column_stack([along, white.basis]),
+    )
+    outputs = len(white.root)
+    errors = less.residuals[: records.samples * outputs].reshape(-1, outputs)
+    near = replace(point.near, errors=errors @ np.linalg.inv(white.root).T)
+    return replace(point, near=near), less
+
+
+def _stretches(records: Records) -> Iterator[tuple[int, int]]:
+    """Where each record begins, and its samples; too short ones are passed over."""
+    begin = 0
+    for length in records.lengths:
+        if length > 2 * _FEWEST:
+            yield begin, length
+        begin += length
+
+
+def _lags(samples: int) -> list[float]:
+    """None, then ever longer ones."""
+    found = [0.0]
+    lag = _SHORTEST
+    while lag <= _SHARE * samples:
+        found.append(lag)
+        lag *= _GROWTH
+    return found
+
+
+def _smooth(samples: int, lag: float) -> Array:
+    """(samples,): a step at the first, behind a lag."""
+    return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
+
+
+def _responses(records: Records, theta: Array, signals: Array) -> Array:
+    """(p, n, m): signals (n, m) of the longest record through the inverse noise model of each output."""
+    at = int(np.argmax(records.lengths))
+    begin = sum(records.lengths[:at])
+    every = np.zeros((records.samples, signals.shape[1]))
+    every[begin : begin + len(signals)] = signals
+    return records.whitened(theta, every)[:, begin : begin + len(signals)]
+
+
+def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:
+    """Of a response (n,) in the errors of one output, begun at every sample of the record from `begin` on.
+
+    A score is what residuals and response have in common; what the estimate explains of the response is
+    taken off its power.
+    """
+    size, outputs = len(response), len(white.root)
+    rows = slice(begin * outputs, (begin + size) * outputs)
+
+    def common(signals: Array) -> Array:
+        """(n, m): products of the response, begun at every sample, with signals (n p, m)."""
+        own = np.einsum("npm,p->nm", signals.reshape(size, outputs, -1), white.root[:, output])
+        return np.asarray(scipy.signal.fftconvolve(own[::-1], response[:, None], axes=0)[:size][::-1])
+
+    power = np.cumsum(response**2)[::-1] * float(white.root[:, output] @ white.root[:, output])
+    left = power - np.sum(common(white.basis[rows]) ** 2, axis=1)
+    score = common(white.residuals[rows, None])[:, 0]
+    seen = left > _EXPLAINED * power
+    return _Scores(np.where(seen, score**2 / np.where(seen, left, 1.0), 0.0) / white.variance, score)
+
+
+def _line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
+    """The statistic of a line through one record of an output."""
+    signal = np.zeros((records.samples, 1))
+    signal[begin : begin + length, 0] = np.linspace(-1.0, 1.0, length)
+    column = _column(records, theta, white, signal, output)
+    left = white.unexplained(column)[:, 0]
+    power = float(left @ left)
+    if power <= _EXPLAINED * float(column[:, 0] @ column[:, 0]):
+        return 0.0
+    return float(left @ white.residuals) ** 2 / (power * white.variance)
+
+
+def _column(records: Records, theta: Array, white: White, signal: Array, output: int) -> Array:
+    """((N + M) p, 1): a signal (N, 1) in one output, as errors in the units of the noise."""
+    own = np.zeros((1, records.samples, len(white.root)))
+    own[0, :, output] = records.whitened(theta, signal)[output, :, 0]
+    return white.columns(own)

@@ -1,0 +1,142 @@
+"""Outputs that shift and stay, whatever the inputs do."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.identification import identify
+from inputdesign_cli.tasks.build.system import build_model
+
+ARX = "sample_time: 1\nplant: {A: [1, -0.8], B: [0, 0.5]}\nnoise: {variance: 0.01}\n"
+LAG = (
+    "sample_time: 1\nplant: {parameters: {K: 1, T: 10, L: 3.3}, "
+    "continuous: {numerator: [K], denominator: [T, 1], delay: L}, sample: zoh}\n"
+)
+NOISES = {
+    "white": "noise: {variance: 0.01}",
+    "coloured": "noise: {variance: 0.01, D: [1, -0.5]}",
+    "walk": "noise: {variance: 0.01, C: [1, -0.5], drift: true}",
+}
+
+
+def model_of(text):
+    return build_model(parse_spec(text, design=False))
+
+
+def lag_of(samples, seed, noise="white", size=0.1):
+    """u and y of 1/(9 s + 1) e^-2s, inputs held for 5 to 30 samples, and noise of the named sort."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 0.0, 1.0], samples), rng.integers(5, 31, samples))[:samples]
+    pole = np.exp(-1.0 / 9.0)
+    e = rng.standard_normal(samples)
+    v = {
+        "white": e,
+        "coloured": scipy.signal.lfilter([1.0], [1.0, -0.7], e),
+        "walk": 0.3 * np.cumsum(e) + rng.standard_normal(samples),
+    }[noise]
+    y = scipy.signal.lfilter([0.0, 0.0, 0.0, 1.0 - pole], [1.0, -pole], u) + size * v
+    return u[:, None], y[:, None]
+
+
+def shift_of(text, u, y, **settings):
+    return identify(model_of(text), u, y, **settings).shift
+
+
+def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_more():
+    """Of ARX models a shift is a regressor; it makes the sum of squares smaller by a factor."""
+    rng = np.random.default_rng(4)
+    u, e = rng.choice([-1.0, 1.0], 120), 0.1 * rng.standard_normal(120)
+    y = scipy.signal.lfilter([0.0, 0.5], [1.0, -0.8], u) + scipy.signal.lfilter([1.0], [1.0, -0.8], e)
+    phi = np.stack([np.append(0.0, -y[:-1]), np.append(0.0, u[:-1])], axis=1)
+
+    def squares(regressors):
+        return np.sum((y - regressors @ np.linalg.lstsq(regressors, y, rcond=None)[0]) ** 2)
+
+    expected = {}
+    for lag in (0.0, 4.0):
+        for at in range(5, 115):
+            after = np.maximum(np.arange(120.0) - at + 1.0, 0.0)
+            column = -np.expm1(-after / lag) if lag else (after > 0.0).astype(float)
+            expected[lag, at] = 120.0 * np.log(squares(phi) / squares(np.column_stack([phi, column])))
+    found = shift_of(ARX, u[:, None], y[:, None], rest=True)
+    best = max(expected, key=expected.get)
+    # The third lag that is tried has 16 samples, more than an eighth of the record.
+    assert found.test.statistic == pytest.approx(expected[best], rel=1e-6)
+    assert found.sample == best[1]
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_right_models_have_none(noise):
+    told = [
+        shift_of(LAG + NOISES[noise], *lag_of(int(120 + 37 * seed), seed, noise)).test.probability < 1e-3
+        for seed in range(12)
+    ]
+    assert not any(told)
+
+
+@pytest.mark.parametrize(("at", "lag"), [(90, 0.0), (150, 10.0), (200, 25.0)])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_where_it_happens_is_found(at, lag, sign):
+    u, y = lag_of(300, 3)
+    after = np.maximum(np.arange(300.0) - at, 0.0)
+    y[:, 0] += sign * 0.5 * (-np.expm1(-after / lag) if lag else after >= 1.0)
+    estimate = identify(model_of(LAG + NOISES["white"]), u, y)
+    found = estimate.shifted
+    assert found is estimate.shift
+    assert found.test in estimate.failed
+    assert abs(found.sample - at) <= 6
+    assert found.begins <= at + 1 < found.ends
+    assert found.rises == (sign > 0.0)
+
+
+def test_it_belongs_to_a_record_and_to_an_output():
+    first, second = lag_of(150, 5), lag_of(200, 6)
+    matrix = model_of(
+        "sample_time: 1\nplant: {A: [[1, -0.9], [1, -0.9]], B: [[[0, 0.1]], [[0, 0.1]]]}\n"
+        "noise: {variance: [[0.01, 0], [0, 0.01]]}\n"
+    )
+    u = np.concatenate([first[0], second[0]])
+    y = np.concatenate([first[1], second[1]])
+    two = np.column_stack([y[:, 0], np.random.default_rng(1).permutation(y[:, 0])])
+    two[250:, 0] += 3.0
+    found = identify(matrix, u, two, lengths=[150, 200]).shift
+    assert (found.output, found.sample) == (0, 250)
+    two = two[:, ::-1]
+    assert identify(matrix, u, two, lengths=[150, 200]).shift.output == 1
+    # A record of its own has a level of its own.
+    apart = np.concatenate([first[1], second[1] + 3.0])
+    assert shift_of(LAG + NOISES["white"], u, apart, lengths=[150, 200], rest=False).test.probability > 0.01
+
+
+def test_lines_and_single_samples_are_no_shifts():
+    u, y = lag_of(300, 7)
+    line = y + np.linspace(0.0, 1.0, 300)[:, None]
+    found = identify(model_of(LAG + NOISES["white"]), u, line, rest=False)
+    assert found.shift.test.probability < 1e-3
+    assert not found.shift.alone
+    assert found.shifted is None
+    spike = y.copy()
+    spike[288] += 5.0
+    found = identify(model_of(LAG + NOISES["white"]), u, spike)
+    assert found.shift.test.probability < 1e-3
+    assert found.shifted is None
+
+
+def test_what_the_unit_of_an_output_is_does_not_matter():
+    u, y = lag_of(250, 8)
+    y[120:] += 0.4
+    one, other = (
+        shift_of(LAG.replace("K: 1", f"K: {unit}") + f"noise: {{variance: {0.01 * unit**2}}}", u, unit * y)
+        for unit in (1.0, 1000.0)
+    )
+    assert other.test.statistic == pytest.approx(one.test.statistic, rel=1e-4)
+    assert (other.sample, other.rises) == (one.sample, one.rises)
+
+
+def test_a_record_too_short_for_any_has_none():
+    rng = np.random.default_rng(2)
+    u = rng.choice([-1.0, 1.0], (10, 1))
+    y = np.append(0.0, 0.5 * u[:-1, 0])[:, None] + 0.1 * rng.standard_normal((10, 1))
+    text = "sample_time: 1\nplant: {B: [0, 0.5]}\nnoise: {variance: 0.01}\n"
+    assert shift_of(text, u, y, rest=True) is None
