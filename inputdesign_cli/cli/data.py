@@ -42,7 +42,7 @@ from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 if TYPE_CHECKING:
     from inputdesign_cli.tasks.build.preparation import Preparation, Run
 
-_CHANNEL = re.compile(r"[uy]([1-9]\d*)?|time", re.ASCII)
+_CHANNEL = re.compile(r"[uyr]([1-9]\d*)?|time", re.ASCII)
 
 
 def identify(
@@ -188,7 +188,7 @@ def levels(text: str) -> dict[str, float]:
 
 
 def named(text: str, option: str, example: str) -> dict[str, str]:
-    """`u1=a,y1=b` by channel; u and y are u1 and y1.
+    """`u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
 
     Raises:
         typer.BadParameter: A part has no `=`, or names nothing.
@@ -199,9 +199,12 @@ def named(text: str, option: str, example: str) -> dict[str, str]:
         if not (name and equals and value):
             raise typer.BadParameter(f"{part!r} is not of the form {example}", param_hint=option)
         if not _CHANNEL.fullmatch(name):
-            message = f"{name!r} is no channel: inputs are u1, u2, .., outputs y1, y2, .. (as in {example})"
+            message = (
+                f"{name!r} is no channel: inputs are u1, u2, .., outputs y1, y2, .., references of a loop "
+                f"r1, r2, .. (as in {example})"
+            )
             raise typer.BadParameter(message, param_hint=option)
-        channel = f"{name}1" if name in ("u", "y") else name
+        channel = f"{name}1" if name in ("u", "y", "r") else name
         if channel in found:
             raise typer.BadParameter(f"{channel} stands there twice", param_hint=option)
         found[channel] = value

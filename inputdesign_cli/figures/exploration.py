@@ -25,7 +25,12 @@ def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
         least = min(least, float(np.min(fit, initial=0.0)))
         handles += axes.plot(sizes, shown, marker, color=color, markersize=5, alpha=0.8, label=family)
     handles += axes.plot(
-        *curves.chosen, "o", markersize=12, markerfacecolor="none", color=BLACK, label="chosen"
+        *curves.chosen,
+        "o",
+        markersize=12,
+        markerfacecolor="none",
+        color=BLACK,
+        label=f"chosen: {curves.family}",
     )
     axes.set_xlabel("parameters")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

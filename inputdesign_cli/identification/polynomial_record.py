@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import errors_and_gradient
 from inputdesign_cli.identification.problem import PredictionErrors
-from inputdesign_cli.identification.start import Start, density, noise_before
+from inputdesign_cli.identification.start import Start, density, each_later, noise_before
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
@@ -126,19 +126,21 @@ class PolynomialRecord:
 
 
 def _start(row: OutputOrders, theta: Array, samples: int, *, free: bool) -> Start:
+    """Impulses, and levels, with what 1/F makes of them; each is filtered once, and delayed."""
     p = row.polynomials(theta[None])
     C, D = p.C[0], p.D[0]
+    impulse, level = np.eye(1, samples, dtype=theta.dtype)[0], np.ones(samples)
     if free:
-        parts = [np.ones((1, samples))]
-        parts.append(np.eye(max([row.a, *(entry.b - entry.f for entry in row.entries)]), samples))
+        most = max([row.a, *(entry.b - entry.f for entry in row.entries)])
+        parts = [(level, 1), (impulse, most)]
         for entry, F in zip(row.entries, p.F, strict=True):
             if entry.f:
-                entering = np.concatenate([np.eye(entry.f, samples), np.ones((1, samples))])
-                parts.append(filtered([1.0], F[0], entering))
-        disturbance = np.concatenate(parts)
+                parts += [(filtered([1.0], F[0], impulse), entry.f), (filtered([1.0], F[0], level), 1)]
     else:
-        disturbance = np.eye(row.a if row.c else 0, samples, dtype=theta.dtype)
+        parts = [(impulse, row.a if row.c else 0)]
+    disturbance = np.concatenate([each_later(one, count) for one, count in parts])
     if C.size == D.size == 1:
         return Start.white(disturbance)
+    through = np.concatenate([each_later(filtered(D, C, one), count) for one, count in parts])
     zeros = density(C) if row.c else np.zeros(())
-    return Start(filtered(D, C, disturbance), disturbance, noise_before(C, D, samples), zeros)
+    return Start(through, disturbance, noise_before(C, D, samples), zeros)

@@ -93,9 +93,13 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
     (above, c), (below, d) = _padded(C, n), _padded(D, n)
     past = c[1 + i + j] @ below[n + j - i] - d[1 + i + j] @ above[n + j - i]
     r = past @ _autoregression(d[: n + 1])[::-1]
-    entering = np.zeros((n, samples), dtype=r.dtype)
-    entering[:, : min(n, samples)] = r.T[:, :samples]
-    return filtered([1.0], C, entering)
+    return np.asarray(r.T @ each_later(filtered([1.0], C, np.eye(1, samples, dtype=r.dtype)[0]), n))
+
+
+def each_later(response: Array, count: int) -> NDArray:
+    """(count, N): a response (N,) begun at once, and one sample later than the row before."""
+    padded = np.concatenate([np.zeros(max(count - 1, 0), dtype=response.dtype), response])
+    return np.lib.stride_tricks.sliding_window_view(padded, response.size)[:count][::-1]
 
 
 def _padded(p: Array, n: int) -> tuple[Array, Array]:

@@ -155,11 +155,17 @@ def _without_model(units: Units, log: Log, found: Found, *, loop: bool) -> _Resp
     def delays(samples: int) -> NDArray[np.int64]:
         return response_delays(found.model, samples, step=units.step)[:, found.moving]
 
-    response = frequency_response(moving, log.y, lengths=log.lengths, delays=delays)
+    outside = log.r[:, found.moving] if loop and log.r is not None else None
+    response = frequency_response(moving, log.y, outside, lengths=log.lengths, delays=delays)
+    if response is None and outside is not None:  # a reference that rests excites nothing
+        outside = None
+        response = frequency_response(moving, log.y, lengths=log.lengths, delays=delays)
     if response is None:
         return None
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
-    made = response_of_data(units, found.model, response, by_reference=False, inputs=found.moving, loop=loop)
+    made = response_of_data(
+        units, found.model, response, by_reference=outside is not None, inputs=found.moving, loop=loop
+    )
     return _Response(*made, silent)
 
 

@@ -132,8 +132,11 @@ def _doubted(
 ) -> tuple[dict[str, SilentLines], Doubts]:
     """What silent lines have beside a drift, and what besides noise decides on the response.
 
-    Spikes are in every line: beside them silent lines tell nothing.
+    Spikes are in every line: beside them silent lines tell nothing. Of inputs that do not repeat, periods of
+    outputs differ by what these do.
     """
+    if judged.differing > UNLIKE:
+        return {}, judged.doubts
     units, periods, doubts = question.header.units, judged.periods, judged.doubts
     kept = repeats * periods.kept(data.lengths[0])
     spiked = spikes_told(units, period_spikes(data.y, periods, repeats=repeats), data, kept)

@@ -36,6 +36,12 @@ WRONG = {
     ("--range", "5"): "is not two times",
     ("--range", "nan:"): "is not two times",
     ("--detrend", "cubic"): "must be none, constant",
+    ("--without", "90-99"): "has no row from 90 to 99",
+    ("--without", "20:30"): "names no rows: write 183-240",
+    ("--without", "-4"): "names no rows",
+    ("--without", "30-20"): "write 20-30?",
+    ("--without", "other.csv:3"): "write log.csv:3",
+    ("--without", "1-999"): "--without leaves no row",
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 from inputdesign_cli.errors import DataError
@@ -186,13 +186,28 @@ def _plain_unit(unit: str) -> str:
     return _SPELLINGS.get(plain, plain)
 
 
-def reference_columns(units: Units, header: Sequence[str]) -> Sequence[str]:
-    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
-    if not units.closed_loop:
-        return []
-    if units.inputs == 1:
-        return [name for name in ("r1", "r") if name in header][:1]
-    return list(units.excitations) if set(units.excitations) <= set(header) else []
+def reference_columns(inputs: int, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+    """`r1` -> the column of the reference that is added to an input, if all have one: r1, r2, .., r of one.
+
+    Args:
+        columns: by channel, those that the user names.
+
+    Raises:
+        DataError: only some are named.
+    """
+    channels = [f"r{i + 1}" for i in range(inputs)]
+    found = {name: columns.get(name, name) for name in channels if name in columns or name in sheet.header}
+    if inputs == 1 and not found and "r" in sheet.header:
+        found = {"r1": "r"}
+    if len(found) == inputs:
+        return found
+    named = [name for name in channels if name in columns]
+    if named:
+        missing = ", ".join(name for name in channels if name not in found)
+        message = f"--columns names {', '.join(named)}, and {sheet.path.name} has no column for {missing}"
+        hint = f"name the reference of every input, or none: --columns {missing.split(',')[0]}=NAME"
+        raise DataError(sheet.error("data-missing-column", message, hint))
+    return {}
 
 
 def unused_columns(sheet: Sheet, units: Units, preparation: Preparation) -> list[str]:

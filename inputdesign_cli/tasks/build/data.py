@@ -119,9 +119,10 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
             says.
     """
     channels = [f"u{i + 1}" for i in range(units.inputs)] + [f"y{i + 1}" for i in range(units.outputs)]
+    named = set(preparation.columns) - {"time"} - (set(units.excitations) if units.closed_loop else set())
     for what, option, names in (
         ("operating point names", f"--operating-point {channels[0]}=1.5", preparation.operating_point),
-        ("columns name", f"--columns {channels[0]}=2", set(preparation.columns) - {"time"}),
+        ("columns name", f"--columns {channels[0]}=2", named),
     ):
         for name in names:
             if name not in channels:
@@ -237,8 +238,8 @@ def _worst_step(time: Array, step: float) -> int:
 def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) -> Data:
     """One file, which the notes name if asked to."""
     sheet = read_sheet(path, key="")
-    references = reference_columns(units, sheet.header)
     preparation = with_names(sheet, units, with_headers(sheet, preparation))
+    references = reference_columns(units.inputs, sheet, preparation.columns) if units.closed_loop else {}
     signals, joined = joined_rows(
         signals_of(sheet, units.inputs, units.outputs, preparation, references), resample=preparation.resample
     )

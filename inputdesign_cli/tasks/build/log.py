@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.column_hints import columns_hint
-from inputdesign_cli.tasks.build.columns import counted_unit, time_unit_in, with_headers, without_times
+from inputdesign_cli.tasks.build.columns import (
+    counted_unit,
+    reference_columns,
+    time_unit_in,
+    with_headers,
+    without_times,
+)
 from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
@@ -36,6 +42,7 @@ class Log:
 
     Attributes:
         u, y: (N, r), (N, p) as logged, without gaps.
+        r: (N, r), the references of a loop; None where some file does not have them.
         time: (N,), counted from zero in a file that has none.
         lengths: the samples of each segment.
         files: the name of each file and its samples.
@@ -57,6 +64,7 @@ class Log:
     steps: tuple[str, ...]
     recorded: Recorded
     lined: bool = False
+    r: Array | None = None
 
     @property
     def parts(self) -> list[tuple[Array, Array]]:
@@ -84,6 +92,7 @@ class Log:
         return replace(
             self,
             u=self.u[samples],
+            r=None if self.r is None else self.r[samples],
             y=self.y[samples],
             time=self.time[samples],
             lengths=tuple(map(len, kept)),
@@ -102,7 +111,10 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     columns = with_channels(sheet, preparation.columns)
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = with_headers(sheet, replace(preparation, columns=columns))
-    signals, told = joined_rows(signals_of(sheet, counts["u"], counts["y"], given), resample=given.resample)
+    references = _references(counts["u"], sheet, given.columns)
+    signals, told = joined_rows(
+        signals_of(sheet, counts["u"], counts["y"], given, references), resample=given.resample
+    )
     unit = counted_unit(signals.sheet, signals.name, preparation, dated=signals.dated)
     unit = unit or time_unit_in(sheet, signals.name) or "s"
     stated = stated_step(sheet, preparation)
@@ -131,8 +143,9 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         hint = "give it: --sample-time 0.5; or say which column holds the time (--columns)"
         raise DataError(sheet.error("data-not-uniform", message, hint, 0))
     segments, notes = prepared(signals, step, unit, given)
+    inputs = np.concatenate([part.u for part in segments])
     return Log(
-        np.concatenate([part.u for part in segments]),
+        inputs[:, : counts["u"]],
         np.concatenate([part.y for part in segments]),
         np.concatenate([part.time for part in segments]),
         tuple(len(part.y) for part in segments),
@@ -141,9 +154,20 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         step,
         unit,
         (*told, *notes),
-        recorded_in(signals, step, segments, signals.u.shape[1]),
+        recorded_in(signals, step, segments, counts["u"]),
         any(part.lined for part in segments),
+        inputs[:, counts["u"] :] if references else None,
     )
+
+
+def _references(inputs: int, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+    """The columns of the reference of a loop; those that nobody names count where they hold numbers alone."""
+    found = reference_columns(inputs, sheet, columns)
+    if set(found) & set(columns):
+        return found
+    own = [sheet.columns[sheet.header.index(name)] for name in found.values()]
+    clean = all(column.fault is None and not np.isnan(column.numbers).any() for column in own)
+    return found if clean else {}
 
 
 def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
@@ -217,6 +241,7 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
             message = f"{path.name} has other channels or another sample time than {paths[0].name}"
             hint = "explore one experiment at a time, or say --columns and --sample-time"
             raise DataError.because("data-not-uniform", message, hint)
+    references = [log.r for log in logs if log.r is not None]
     return Log(
         np.concatenate([log.u for log in logs]),
         np.concatenate([log.y for log in logs]),
@@ -236,4 +261,5 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
         ),
         Recorded.together([log.recorded for log in logs]),
         any(log.lined for log in logs),
+        np.concatenate(references) if len(references) == len(logs) else None,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,9 +61,13 @@ class Signals:
 
 
 def signals_of(
-    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Sequence[str] = ()
+    sheet: Sheet,
+    inputs: int,
+    outputs: int,
+    preparation: Preparation,
+    references: Mapping[str, str] | None = None,
 ) -> Signals:
-    """The columns of so many channels; those of `references` follow the inputs.
+    """The columns of so many channels; those of `references`, by their labels, follow the inputs.
 
     Raises:
         DataError: a column is missing, holds text or nothing, or leaves the range of arithmetic; the times
@@ -72,7 +76,7 @@ def signals_of(
     wanted = {
         **channel_columns("u", inputs, sheet, preparation),
         **channel_columns("y", outputs, sheet, preparation),
-        **{name: name for name in references},
+        **(references or {}),
         **time_column(sheet, preparation),
     }
     untimed = {"time": NO_TIMES} if without_times(sheet, preparation.columns) else {}
@@ -99,8 +103,9 @@ def signals_of(
         if not np.isnan(own).all():
             # Clocks count from long ago.
             check_range(kept, wanted[role], own - np.nanmin(own) if role == "time" else own)
-    driving = (*_labels("u", inputs), *references)
-    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
+    labels = tuple(references or {})
+    driving = (*_labels("u", inputs), *labels)
+    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *labels)])
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
     time, told, dated = time[rows], [], False
     if name:

@@ -203,7 +203,7 @@ def structure_curves(found: Found) -> dict[str, Curves]:
         single = len(found.outputs) == 1
         mark = (float(taken.orders.size), taken.validation)
         curves["structures" if single else f"structures_{i + 1}"] = OrderCurves(
-            fits, mark, None if single else i, found.split != "none"
+            fits, mark, taken.orders.family, None if single else i, found.split != "none"
         )
     return curves
 

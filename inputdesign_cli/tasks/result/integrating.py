@@ -37,13 +37,15 @@ def like_integrators(found: Found, step: float, unit: str, *, loop: bool) -> tup
     with np.errstate(all="ignore"):
         change, G = model.plant_gradient(w), model.plant_at(w)
         for i in range(model.outputs):
-            for j in found.moving:
+            for k, j in enumerate(found.moving):
                 size, deviations = np.abs(G[:, i, j]), _deviations(found, change[:, :, i, j].T)
                 if _rises(size, deviations):
                     at = 1 + int(np.argmin(deviations[1:] / size[1:]))
                     where = "" if single else f" from u{j + 1} to y{i + 1}"
                     gain = f"{size[0]:.3g} +- {deviations[0]:.1g}"
-                    offer = _offer(_slope(G[at, i, j], w[at], step), step, unit)
+                    late = max(found.taken[i].orders.delays[k] - 1, 0)
+                    slope = float(np.copysign(w[at] * size[at] / step, G[0, i, j].real))
+                    offer = _offer(slope, step, unit, late)
                     besides = f", and {CONTROLLER}" if loop else ""
                     if single and not loop and _wanders_besides(found, offer):
                         besides = f", and {_WALK}"
@@ -71,12 +73,6 @@ def _rises(size: Array, deviations: Array) -> bool:
     return bool(size[0] < _UNTOLD * deviations[0] and np.any(told))
 
 
-def _slope(G: complex, w: float, step: float) -> float:
-    """What an integrator that goes through G at w gains in a unit of time from an input of one."""
-    through = 1j * w * G / step
-    return float(np.copysign(abs(through), through.real))
-
-
 def _deviations(found: Found, change: ComplexArray) -> Array:
     """(n,): standard deviations of values whose real and imaginary parts have gradients `change` (k, n)."""
     if not np.all(np.isfinite(change)):
@@ -86,10 +82,15 @@ def _deviations(found: Found, change: ComplexArray) -> Array:
     return np.asarray(np.sqrt(np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)))
 
 
-def _offer(slope: float, step: float, unit: str) -> tuple[str, str, str]:
-    """The slope in words, then lines of a spec: its clock, and an integrator."""
+def _offer(slope: float, step: float, unit: str, late: int) -> tuple[str, str, str]:
+    """The slope in words, then lines of a spec: its clock, and an integrator so many samples late.
+
+    Args:
+        slope: what it gains in a unit of time from an input of one.
+    """
+    delay = f"{max(late, _LATE) * step:.4g}"
     plant = (
-        f"plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, continuous: {{numerator: [K], "
+        f"plant: {{parameters: {{K: {slope:.4g}, L: {delay}}}, continuous: {{numerator: [K], "
         "denominator: [1, 0], delay: L}, sample: zoh}"
     )
     return f"{slope:.4g} per {unit} for an input of one", clock_of(step, unit), plant
