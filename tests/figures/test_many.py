@@ -25,9 +25,9 @@ def apart(lines):
 @pytest.mark.parametrize("families", [1, 6, 8, 20])
 def test_every_family_is_drawn_and_told_apart(page, families):
     fits = {f"F{n}": (SIZES, np.array([90.0 - n, 80.0 - n])) for n in range(families)}
-    (axes,) = (figure := page(OrderCurves(fits, (2.0, 90.0)))).axes
+    (axes,) = (figure := page(OrderCurves(fits, (2.0, 90.0), "OE"))).axes
     named = {line.get_label(): line for line in axes.lines}
-    assert set(named) == {*fits, "chosen"}
+    assert set(named) == {*fits, "chosen: OE"}
     for family, (sizes, fit) in fits.items():
         np.testing.assert_array_equal(named[family].get_xydata(), np.column_stack([sizes, fit]))
     assert apart(list(named.values()))
@@ -36,7 +36,7 @@ def test_every_family_is_drawn_and_told_apart(page, families):
 
 def test_fits_that_are_drawn_elsewhere_are_told(page):
     told = [
-        page(OrderCurves({"OE": (SIZES, np.array([90.0, low]))}, (2.0, 90.0))).axes[0].get_ylabel()
+        page(OrderCurves({"OE": (SIZES, np.array([90.0, low]))}, (2.0, 90.0), "OE")).axes[0].get_ylabel()
         for low in (10.0, -500.0)
     ]
     assert ["-20" in label for label in told] == [False, True]
