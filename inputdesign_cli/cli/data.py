@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -42,6 +43,7 @@ from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 if TYPE_CHECKING:
     from inputdesign_cli.tasks.build.preparation import Preparation, Run
 
+_ROWS = re.compile(r"(?:(.+):)?\s*((\d+)(?:\s*-\s*(\d+))?)\s*", re.DOTALL)
 _CHANNEL = re.compile(r"[uyr]([1-9]\d*)?|time", re.ASCII)
 
 
@@ -65,7 +67,7 @@ def identify(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
-    without: Without = "",
+    without: Without = None,
     frequency_response: Annotated[
         bool,
         typer.Option(
@@ -127,7 +129,7 @@ def assess(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
-    without: Without = "",
+    without: Without = None,
     figures: Figures = True,
     figure_format: FigureFormat = "png",
     json_output: Json = False,
@@ -219,7 +221,7 @@ def preparation(
     detrend: str,
     skip: int,
     span: str,
-    without: str,
+    without: Sequence[str] | None,
     data: Sequence[Path],
 ) -> Preparation:
     """What the options about `data` say.
@@ -242,27 +244,36 @@ def preparation(
         detrend=DETRENDS[detrend],
         skip=skip,
         span=_limits(span) if span else None,
-        without=tuple(_run(part, data) for part in filter(None, map(str.strip, without.split(",")))),
+        without=tuple(run for text in without or () for run in _runs(text, data)),
     )
 
 
-def _run(text: str, data: Sequence[Path]) -> Run:
-    """Rows as in 183-240 or 310, of several files with the name of one before."""
-    name, _, numbers = text.rpartition(":")
-    first, _, last = numbers.partition("-")
-    names = sorted({path.name for path in data})
-    rows = first.strip().isdecimal() and (last or first).strip().isdecimal()
-    if not rows or (name.isdecimal() and name not in names):
-        message = f"{text!r} names no rows: write 183-240, or 310 for one"
+def _runs(text: str, data: Sequence[Path]) -> Iterator[Run]:
+    """Rows as in 183-240,310, of several files with the name of one before each run.
+
+    Raises:
+        typer.BadParameter: A part is something else, or its file is not clear.
+    """
+    names = {str(path) for path in data} | {path.name for path in data}
+    shared = {name for name, count in Counter(path.name for path in data).items() if count > 1}
+    part = ""
+    for piece in text.split(","):  # names of files may have commas, too
+        part = f"{part},{piece}" if part else piece
+        found = _ROWS.fullmatch(part)
+        if found is None:
+            continue
+        name, rows, first, last = (found[1] or "").strip(), found[2], int(found[3]), int(found[4] or found[3])
+        if last < first:
+            message = f"{rows!r} ends before it begins: write {last}-{first}?"
+            raise typer.BadParameter(message, param_hint="--without")
+        if name in shared or (name not in names and (name or len(data) > 1)):
+            message = f"which file {rows} are rows of is not clear: write {data[0]}:{rows}"
+            raise typer.BadParameter(message, param_hint="--without")
+        yield name, first, last
+        part = ""
+    if part or not text.strip():
+        message = f"{part!r} names no rows: write 183-240, or 310 for one"
         raise typer.BadParameter(message, param_hint="--without")
-    if name not in names and (name or len(data) > 1):
-        message = f"which file {text!r} is of is not clear: write {names[0]}:{numbers.strip()}"
-        raise typer.BadParameter(message, param_hint="--without")
-    begin, end = int(first), int(last or first)
-    if end < begin:
-        message = f"{text!r} ends before it begins: write {end}-{begin}?"
-        raise typer.BadParameter(message, param_hint="--without")
-    return name, begin, end
 
 
 def _limits(span: str) -> tuple[float, float]:

@@ -45,7 +45,7 @@ def explore(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
-    without: Without = "",
+    without: Without = None,
     output: ExplorationOutput = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,

@@ -100,12 +100,12 @@ Span = Annotated[
     str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
 ]
 Without = Annotated[
-    str,
+    list[str] | None,
     typer.Option(
         "--without",
         metavar="ROWS",
         help="Leave out these rows, as notes number them, such as 183-240,310; the record is cut there. Of "
-        "several files: log1.csv:183-240.",
+        "several files: log1.csv:183-240. Repeatable.",
     ),
 ]
 Overrides = Annotated[

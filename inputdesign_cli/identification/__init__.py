@@ -21,7 +21,10 @@ from inputdesign_cli.identification.frozen import (
     frozen as frozen,
     resolution_of as resolution_of,
 )
-from inputdesign_cli.identification.level_shifts import LevelShift as LevelShift
+from inputdesign_cli.identification.level_shifts import (
+    LevelShift as LevelShift,
+    chance_of_shifts as chance_of_shifts,
+)
 from inputdesign_cli.identification.mattering import Moves as Moves, that_matter as that_matter
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (

@@ -14,7 +14,7 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
-from inputdesign_cli.identification.level_shifts import LevelShift, level_shift, taken_off
+from inputdesign_cli.identification.level_shifts import LevelShift, chance_of_shifts, level_shifts
 from inputdesign_cli.identification.one_system import of_one_system
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
@@ -60,7 +60,7 @@ class Estimate:
             their correlations are (lags, p, p) and (lags, p, r).
         tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
         shift: where an output most likely shifts, whatever the inputs do; None in too short records.
-        beside_shift: where that refutes the structure, `tests` once it is taken off.
+        shifts: all that refute the structure; `beside_shifts`, `tests` once they are taken off.
     """
 
     names: tuple[str, ...]
@@ -84,7 +84,8 @@ class Estimate:
     tests: tuple[ScoreTest, ...]
     directed: tuple[Directed, ...]
     shift: LevelShift | None
-    beside_shift: tuple[ScoreTest, ...]
+    shifts: tuple[LevelShift, ...]
+    beside_shifts: tuple[ScoreTest, ...]
     alike: tuple[float, ...]
     rivals: tuple[Rival, ...]
     repeated: Repetition | None
@@ -112,22 +113,25 @@ class Estimate:
         return self.failed_within(1)
 
     @property
-    def shifted(self) -> LevelShift | None:
-        """Where an output shifts, if nothing else that is left then speaks more against the structure."""
-        if self.shift is None or self.shift.test not in self.failed:
-            return None
+    def shifted(self) -> tuple[LevelShift, ...]:
+        """Where outputs shift, if nothing else that is left then speaks more against the structure."""
+        if not self.shifts:
+            return ()
         # Likelihood ratios are compared with one, scores with the other.
-        ratios = (*self.beside_shift, *(one.test for one in self.directed if one.of_structure))
+        by_ratio, by_score = chance_of_shifts(self.shifts)
+        ratios = (*self.beside_shifts, *(one.test for one in self.directed if one.of_structure))
         scores = [one.test for one in self.directed if not one.of_structure]
-        compared = ((self.shift.test.probability, ratios), (self.shift.by_score, scores))
-        prevails = all(own < test.probability for own, tests in compared for test in tests)
-        return self.shift if prevails else None
+        prevails = all(
+            own < test.probability
+            for own, tests in ((by_ratio, ratios), (by_score, scores))
+            for test in tests
+        )
+        return self.shifts if prevails else ()
 
     @property
     def failed_besides(self) -> tuple[ScoreTest, ...]:
-        """The tests that refute the structure but for a shift of an output."""
-        directed = tuple(one.test for one in self.directed)
-        return failed(self.tests if self.shifted is None else self.beside_shift, directed)
+        """The tests that refute the structure beside shifts, which upset those of one parameter."""
+        return failed(self.beside_shifts) if self.shifted else self.failed
 
     def failed_within(self, looks: int) -> tuple[ScoreTest, ...]:
         """Those where data come in and are looked at so often: a right model seldom fails at any look."""
@@ -214,8 +218,7 @@ def concluded(
     def tested(point: Point, white: White) -> tuple[ScoreTest, ...]:
         return score_tests(records, point, white, recent=recent, feedback=feedback, echoes=echoes)
 
-    shift = level_shift(records, point, white)
-    refuting = shift is not None and shift.alone and failed((), shifts=(shift.test,))
+    shift, shifts, less = level_shifts(records, point, white)
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
@@ -243,7 +246,8 @@ def concluded(
         tests=tested(point, white),
         directed=directed_tests(records, point, white, alternatives, echoes),
         shift=shift,
-        beside_shift=tested(*taken_off(records, point, white, shift)) if shift and refuting else (),
+        shifts=shifts,
+        beside_shifts=tested(*less) if shifts else (),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
         repeated=repetition(point.errors, records.u, feedback=feedback),

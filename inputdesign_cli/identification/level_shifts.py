@@ -8,13 +8,13 @@ hardly notices what has happened once; and what the estimate makes of it is anot
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
-from inputdesign_cli.identification.adequacy import ScoreTest
+from inputdesign_cli.identification.adequacy import SHIFT_LEVEL, ScoreTest
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.white import White
@@ -22,6 +22,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 # Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
 _SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125
+# So many are told.
+_MOST = 6
 # What is nearer to an end of a record is its start, or a few samples that are wrong.
 _FEWEST = 5
 # A shift of which the estimate explains all but this share cannot be seen.
@@ -43,7 +45,7 @@ class LevelShift:
         begins, ends: the samples between which, for certain, it begins and has settled, the last left out.
         rises: whether the output is larger after it.
         test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-        by_score: the probability of the score alone, which is larger.
+        score: the statistic of the score, which is smaller; so many `looks` it was the largest of.
         alone: whether it explains more than a line through its record does, or single samples beside it do.
     """
 
@@ -54,8 +56,14 @@ class LevelShift:
     ends: int
     rises: bool
     test: ScoreTest
-    by_score: float
+    score: float
+    looks: int
     alone: bool
+
+    @property
+    def refutes(self) -> bool:
+        """Whether a model without it is refuted."""
+        return self.alone and self.test.probability < SHIFT_LEVEL
 
 
 @dataclass(frozen=True)
@@ -64,6 +72,37 @@ class _Scores:
 
     statistic: Array
     rises: Array
+
+
+def level_shifts(
+    records: Records, point: Point, white: White
+) -> tuple[LevelShift | None, tuple[LevelShift, ...], tuple[Point, White]]:
+    """The likeliest shift, all that refute a model without them, and the estimate with these taken off.
+
+    The first is None in records that are too short for any.
+    """
+    first, found = level_shift(records, point, white), list[LevelShift]()
+    shift = first
+    while shift is not None and shift.refutes and len(found) < _MOST:
+        found.append(shift)
+        point, white = _taken_off(records, point, white, shift)
+        shift = level_shift(records, point, white)
+    return first, tuple(found), (point, white)
+
+
+def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
+    """The probability of so many shifts together, by the likelihood ratio and by the score."""
+    looks = shifts[0].looks
+    return (
+        _by_chance([shift.test.statistic for shift in shifts], looks),
+        _by_chance([shift.score for shift in shifts], looks),
+    )
+
+
+def _by_chance(statistics: Sequence[float], looks: int) -> float:
+    """That of a sum of statistics, each the largest of so many."""
+    size = len(statistics)
+    return min(float(looks) ** size * float(scipy.special.chdtrc(size, sum(statistics))), 1.0)
 
 
 def level_shift(records: Records, point: Point, white: White) -> LevelShift | None:
@@ -89,18 +128,18 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
         return None
     score, output, sample, lag, rises, alone = max(found)
     # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
-    share = min(score * white.variance / records.samples, _MOST_EXPLAINED)
+    power = float(white.residuals @ white.residuals) / len(through)
+    share = min(score * white.variance / power, _MOST_EXPLAINED)
     statistic = -float(np.log1p(-share)) * point.near.freedom / len(through)
     looks = sum(length for _, length in _stretches(records)) * len(through) * len(lags)
-    probability, by_score = (min(looks * float(scipy.special.chdtrc(1, x)), 1.0) for x in (statistic, score))
-    test = ScoreTest("level_shift", "shift", statistic, 1, probability, None, output)
+    test = ScoreTest("level_shift", "shift", statistic, 1, _by_chance([statistic], looks), None, output)
     before, after = (1 + round(share * lag) for share in (_UNSURE, _SETTLED))
     begin, length = next(one for one in _stretches(records) if sample < sum(one))
     begins, ends = max(sample - before, begin), min(sample + 1 + after, begin + length)
-    return LevelShift(output, sample, lag, begins, ends, rises, test, by_score, alone)
+    return LevelShift(output, sample, lag, begins, ends, rises, test, score, looks, alone)
 
 
-def taken_off(records: Records, point: Point, white: White, shift: LevelShift) -> tuple[Point, White]:
+def _taken_off(records: Records, point: Point, white: White, shift: LevelShift) -> tuple[Point, White]:
     """The same with the shift estimated along, as far as errors are concerned."""
     begin, length = next(one for one in _stretches(records) if shift.sample < sum(one))
     signal = np.zeros((records.samples, 1))
@@ -168,8 +207,10 @@ def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:
         return np.asarray(scipy.signal.fftconvolve(own[::-1], response[:, None], axes=0)[:size][::-1])
 
     power = np.cumsum(response**2)[::-1] * float(white.root[:, output] @ white.root[:, output])
-    left = power - np.sum(common(white.basis[rows]) ** 2, axis=1)
-    score = common(white.residuals[rows, None])[:, 0]
+    explained = common(white.basis[rows])
+    left = power - np.sum(explained**2, axis=1)
+    # Where a search ends at a kink, residuals are not at right angles to all gradients.
+    score = common(white.residuals[rows, None])[:, 0] - explained @ (white.basis.T @ white.residuals)
     seen = left > _EXPLAINED * power
     return _Scores(np.where(seen, score**2 / np.where(seen, left, 1.0), 0.0) / white.variance, score)
 

@@ -156,6 +156,8 @@ def _without_model(units: Units, log: Log, found: Found, *, loop: bool) -> _Resp
         return response_delays(found.model, samples, step=units.step)[:, found.moving]
 
     outside = log.r[:, found.moving] if loop and log.r is not None else None
+    if outside is not None and np.any(np.all(outside == moving, axis=0)):
+        outside = None  # what is u itself is not from outside
     response = frequency_response(moving, log.y, outside, lengths=log.lengths, delays=delays)
     if response is None and outside is not None:  # a reference that rests excites nothing
         outside = None

@@ -12,8 +12,8 @@ from inputdesign_cli.identification.explore import Found, explore_records
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.level_shifts import left_out
 
-# With more of them, the plant is another than any that is looked for.
-_MOST = 3
+# Where more appear, once these are left out so often, the plant is another than any that is looked for.
+_MOST = 2
 
 
 def explored_beside_shifts(log: Log, *, loop: bool) -> tuple[Log, Found]:
@@ -35,17 +35,22 @@ def explored_beside_shifts(log: Log, *, loop: bool) -> tuple[Log, Found]:
 
     rest, found = log, found_in(log, unless_shifted=True)
     for _ in range(_MOST):
-        shift = found.estimate.shifted
-        if shift is None:
+        shifts = found.estimate.shifted
+        if not shifts:
             return rest, found
-        samples = found.samples
-        less = rest.without(int(samples[shift.begins]), int(samples[shift.ends - 1]) + 1)
+        samples, less = found.samples, rest
+        for shift in sorted(shifts, key=lambda one: -one.sample):
+            less = less.without(int(samples[shift.begins]), int(samples[shift.ends - 1]) + 1)
         try:
             another = found_in(less, unless_shifted=True)
         except SpecError:
             break
         if another.split == "none" != found.split:
             break
-        told = left_out(rest, shift, samples)
+        told = left_out(rest, shifts, samples)
         rest, found = replace(less, steps=(*rest.steps, told)), another
+    else:
+        if not found.estimate.shifted:
+            return rest, found
+        rest = log
     return rest, found_in(rest, unless_shifted=False)

@@ -37,10 +37,12 @@ WRONG = {
     ("--range", "nan:"): "is not two times",
     ("--detrend", "cubic"): "must be none, constant",
     ("--without", "90-99"): "has no row from 90 to 99",
-    ("--without", "20:30"): "names no rows: write 183-240",
+    ("--without", "20:30"): "which file 30 are rows of is not clear",
+    ("--without", "20-"): "names no rows: write 183-240",
+    ("--without", " "): "names no rows",
     ("--without", "-4"): "names no rows",
     ("--without", "30-20"): "write 20-30?",
-    ("--without", "other.csv:3"): "write log.csv:3",
+    ("--without", "other.csv:3"): "which file 3 are rows of is not clear",
     ("--without", "1-999"): "--without leaves no row",
 }
 

@@ -62,7 +62,11 @@ def nyquist(**entries):
         (FitCurves(W, (), (2,)), "from the input alone.", "Dotted"),
         (OrderCurves({}, (1.0, 2.0), "ARX", 1), "was tried for y2, estimated on one part", ""),
         (OrderCurves({}, (1.0, 2.0), "ARX"), "was tried, estimated on one part", "y1"),
-        (OrderCurves({}, (1.0, 2.0), "ARX", unseen=False), "the record that it is estimated from", "one part"),
+        (
+            OrderCurves({}, (1.0, 2.0), "ARX", unseen=False),
+            "the record that it is estimated from",
+            "one part",
+        ),
         (FanCurves(W, ONES[None], ONES, dict.fromkeys("abc", ONES)), "those that bind in colour", "5 of"),
         (
             FanCurves(W, ONES[None], ONES, dict.fromkeys("abcdefg", ONES)),

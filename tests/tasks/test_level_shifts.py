@@ -46,7 +46,7 @@ def shifts_in(notes):
     return [note for note in notes if "stays so, though no input does that" in note]
 
 
-@pytest.mark.parametrize("at", [150, 260])
+@pytest.mark.parametrize("at", [150, pytest.param(260, marks=pytest.mark.slow)])
 def test_explore_leaves_it_out_and_finds_the_plant(at, tmp_path):
     log = saved(tmp_path / "log.csv", rows_of(400, at, 2))
     found = explore([log], Preparation())
@@ -92,3 +92,17 @@ def test_of_several_files_the_note_says_in_which_it_is(tmp_path):
     assert first <= 153 <= last
     again = identify(parse_spec(SPEC), files, preparation=Preparation(without=((name, first, last),)))
     assert not shifts_in(again.result["notes"])
+
+
+def test_nothing_is_left_out_where_the_rest_could_not_judge(tmp_path):
+    """The input moves twice, and the load between the moves: both parts are needed."""
+    rng = np.random.default_rng(8)
+    u = np.repeat([-1.0, 1.0, -1.0], 60)
+    pole = np.exp(-1.0 / T)
+    y = scipy.signal.lfilter([0.0, K * (1.0 - pole)], [1.0, -pole], u + 1.0)
+    y += np.where(np.arange(180) >= 100, 1.0, 0.0) + 0.05 * rng.standard_normal(180)
+    rows = np.c_[np.arange(180), u, y]
+    found = explore([saved(tmp_path / "log.csv", rows)], Preparation())
+    split = found.results.result["exploration"]["split"]
+    left = shifts_in(found.results.result["exploration"]["steps"])
+    assert not left or split != "none"

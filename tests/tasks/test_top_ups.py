@@ -23,7 +23,9 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     left, times = result["assessment"]["left"], result["assessment"]["experiments"]
     assert left > 1.5
     assert f"still {left:.4g} times" in said(found.results)
-    assert "if the structure of the model is right: apply it" in said(found.results)
+    growth = result["signal"]["begun_anywhere"]
+    promised = f"right and the record begins at rest, its levels known (--operating-point; else {growth:.3g}"
+    assert f"if the structure of the model is {promised} times as much): apply it" in said(found.results)
     # So many of them, one after the other, are enough, and one fewer is not.
     one = np.asarray(result["information"]["matrix"])
     data = np.asarray(identify(parse_spec(HEATER), path).result["information"]["matrix"])

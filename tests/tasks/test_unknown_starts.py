@@ -8,6 +8,7 @@ import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_begun_anywhere
+from inputdesign_cli.report.evidence import verdict
 from inputdesign_cli.tasks.build.system import build_model
 
 N = 500
@@ -62,11 +63,33 @@ def test_a_level_that_an_integrator_keeps():
     done, notes = told(SINGLE)
     psi = scipy.signal.lfilter([0.0, 1.0], [1.0, -1.0], done.tables["signal"].columns["u1"])
     line = np.column_stack([np.ones(N), np.arange(N) / N])
-    assert growth(notes) == pytest.approx(np.linalg.norm(psi) / left(psi, line), rel=5e-3)
+    expected = pytest.approx(np.linalg.norm(psi) / left(psi, line), rel=5e-3)
+    assert growth(notes) == expected
+    assert done.result["signal"]["begun_anywhere"] == expected
 
 
 def test_a_plant_that_forgets_its_start_has_no_note():
-    assert told(SETTLED)[1] == []
+    done, notes = told(SETTLED)
+    assert notes == []
+    assert "begun_anywhere" not in done.result["signal"]
+
+
+@pytest.mark.parametrize(
+    ("signal", "words"),
+    [
+        ({}, "if the structure of the model is right; assess"),
+        (
+            {"begun_anywhere": 4.44},
+            "right and the record begins at rest, its levels known (--operating-point; ",
+        ),
+        ({"begun_anywhere": 4.44}, "else 4.44 times as much); assess"),
+        ({"begun_anywhere": None}, "else nothing is promised); assess"),
+    ],
+)
+def test_a_top_up_says_what_its_promise_rests_on(signal, words):
+    entry = {"name": "model_error", "worst_ratio": 3.0, "frequency": None}
+    assessment = {"requirements": [entry], "met": False, "left": 0.99}
+    assert words in " ".join(verdict({"assessment": assessment, "signal": signal}))
 
 
 @pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])

@@ -71,7 +71,7 @@ def explore_records(
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
     """
     level = _about_levels(parts, feedback=feedback, step=step, ramp=ramp, unless_shifted=unless_shifted)
-    if unless_shifted and level.estimate.shifted is not None:
+    if unless_shifted and level.estimate.shifted:
         return level
     # In a loop the noise is estimated with every structure.
     which = [] if feedback else _may_wander(level)
@@ -104,7 +104,7 @@ def _about_levels(parts: Parts, *, feedback: bool, step: float, ramp: bool, unle
                 if not any(_drifting(even)):
                     return even
     level = explored(parts, feedback=feedback, step=step, ramp=False)
-    shifted = unless_shifted and level.estimate.shifted is not None
+    shifted = unless_shifted and bool(level.estimate.shifted)
     if shifted or not (any(_drifting(level)) or _hardly_decays(level)):
         return level
     lines = lines_of(moved).beyond(np.sqrt(np.diag(level.estimate.noise)), longest)

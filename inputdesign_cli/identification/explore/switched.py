@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import past, untold
+from inputdesign_cli.identification.frequency_response import found_period
 from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
@@ -34,6 +35,10 @@ _ALIKE, _COMPARED = 4.0, 4
 _SAME = 1e-6  # of sizes of jumps
 # What is new is rounding where it is less than this share of the output.
 _ROUNDING = 1e-6
+# What is new in an input is nothing where it has less than this share of its power.
+_FAINT = 1e-6
+# A relay has so many levels at most.
+_LEVELS = 4
 Parts = Sequence[tuple[Array, Array]]
 
 
@@ -56,15 +61,22 @@ def switched_by(parts: Parts, j: int) -> float:
 
 
 def early_answers(parts: Parts) -> list[Early]:
-    """Outputs that know of jumps of an input before these are logged, as their plant answers them."""
+    """Outputs that know of moves of an input before these are logged, as their plant answers them.
+
+    Of jumps it is asked whether what is new in an output goes their way; of all that is new in an input,
+    whether it goes together with what was new in an output before. An input that moves at most samples may
+    do so because of the noise of an output, which it sends back.
+    """
     inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
     parts, found = busiest(parts, _MOST_SAMPLES), []
-    for j in range(inputs):
+    held = [j for j in range(inputs) if _moving(parts, j) <= _HELD]
+    for j in held:
         for i in range(outputs):
-            answers = _answers(parts, j, i)
-            probability = inputs * outputs * answers.ahead
+            tried = (_answers(parts, j, i), _foretold(parts, j, i))
+            answers = min(tried, key=lambda one: one.ahead)
+            probability = len(tried) * inputs * outputs * answers.ahead
             # What is said of one side shows a little on the other at other lags.
-            if probability < min(_CERTAIN, _LITTLE * answers.against):
+            if probability < min(_CERTAIN, _LITTLE * min(one.against for one in tried)):
                 found.append(Early(j, i, answers.lead, probability))
     return found
 
@@ -100,8 +112,7 @@ class _Answers:
 
 
 def _answers(parts: Parts, j: int, i: int) -> _Answers:
-    lags = max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * (parts[0][0].shape[1] + 1))), 1)
-    long = [(u - u.mean(axis=0), y[:, i : i + 1] - y[:, i].mean()) for u, y in parts if len(y) > 3 * lags]
+    lags, long = _centred(parts, i)
     largest = max((float(np.max(np.abs(np.diff(u[:, j])))) for u, _ in long), default=0.0)
     held = [_Held.of(u[lags - 1 :, j], _JUMP * largest) for u, _ in long]
     jumps, samples = sum(one.jumps.size for one in held), sum(one.moves.size for one in held)
@@ -113,6 +124,56 @@ def _answers(parts: Parts, j: int, i: int) -> _Answers:
             each = [_by_chance(sign * _surprises(held, new, k)) for k in range(1, lags + 1)]
             return _Answers(at_once, *(np.array(side) for side in zip(*each, strict=True)))
     return _Answers(1.0, np.ones(lags), np.ones(lags))
+
+
+def _moving(parts: Parts, j: int) -> float:
+    """The share of the samples at which an input is another than at the one before."""
+    moves = np.concatenate([np.diff(u[:, j]) for u, _ in parts])
+    return float(np.mean(moves != 0.0)) if moves.size else 0.0
+
+
+def _foretold(parts: Parts, j: int, i: int) -> _Answers:
+    """By what is new in input j, beyond the past of all inputs, and what was new in output i before.
+
+    An input that repeats tells nothing: what a plant that is not linear adds comes again with it. Nor does
+    one of few levels, which a relay may switch by rules that are not linear: of that its jumps tell.
+    """
+    lags, long = _centred(parts, i)
+    nothing = _Answers(1.0, np.ones(lags), np.ones(lags))
+    longest = max((u[:, j] for u, _ in long), key=len, default=np.zeros(0))
+    if np.unique(longest).size <= _LEVELS or found_period(longest):
+        return nothing
+    # An input that answers the same sample of an output has its noise.
+    new = _new(long, lags, present=False)
+    moves = untold([past(u, lags) for u, _ in long], [u[lags:, j] for u, _ in long])
+    power = float(np.mean(np.concatenate(moves) ** 2))
+    spread = float(np.sqrt(np.mean(np.concatenate(new) ** 2)))
+    if power <= _FAINT * np.var(longest) or spread <= _ROUNDING * np.std(long[0][1]):
+        return nothing
+    outputs = [y[lags:, 0] for _, y in long]
+    # What an output does after a move, beyond the sample whose noise the move may have answered.
+    after = sum(
+        float(own[: len(own) - lag] @ (y[lag:] - y[1 : len(y) - lag + 1]))
+        for own, y in zip(moves, outputs, strict=True)
+        for lag in range(2, lags + 1)
+    )
+    t = np.zeros(lags + 1)
+    for k in range(lags + 1):
+        later = np.concatenate([own[k:] for own in moves])
+        before = np.concatenate([own[: len(own) - k] for own in new])
+        size = float(np.linalg.norm(later)) * spread
+        t[k] = np.sign(after) * float(later @ before) / size if size else 0.0
+    # An input that answers an output at once is moved by its noise, and moves back a sample later.
+    found = _Answers(float(scipy.special.ndtr(t[0])), scipy.special.ndtr(-t[1:]), scipy.special.ndtr(t[1:]))
+    return found if found.against > _ALSO else nothing
+
+
+def _centred(parts: Parts, i: int) -> tuple[int, list[tuple[Array, Array]]]:
+    """How many lags are looked at, and the inputs and output i of records that are long enough for them."""
+    lags = max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * (parts[0][0].shape[1] + 1))), 1)
+    return lags, [
+        (u - u.mean(axis=0), y[:, i : i + 1] - y[:, i].mean()) for u, y in parts if len(y) > 3 * lags
+    ]
 
 
 @dataclass(frozen=True)

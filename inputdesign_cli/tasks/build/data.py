@@ -42,6 +42,7 @@ from inputdesign_cli.tasks.build.preparation import (
     whole_segments,
 )
 from inputdesign_cli.tasks.build.signals import Signals, check_stated, signals_of, stated_step
+from inputdesign_cli.tasks.build.without import labels
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
 _UNSTATED = " (as it is where none is stated)"
@@ -140,7 +141,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         np.concatenate(references) if len(references) == len(parts) else None,
         np.concatenate([part.time for part in parts]),
         tuple(length for part in parts for length in part.lengths),
-        tuple(file for part in parts for file in part.files),
+        tuple((name, len(part.u)) for name, part in zip(labels(paths), parts, strict=True)),
         tuple(note for part in parts for note in part.notes),
         np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
         Recorded.together(recorded),
@@ -172,6 +173,7 @@ def prepared(
         )
         if np.any(whole):
             message, hint = f"--without leaves no row of {sheet.path.name}", "leave fewer rows out"
+            raise DataError(sheet.error("data-unreadable", message, hint))
         raise DataError(sheet.error("data-not-a-number", message, hint, 0))
     for name, x in zip(signals.inputs, signals.u.T, strict=True):
         there = ~np.isnan(x) & ~signals.without

@@ -26,6 +26,7 @@ from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import SHORTEST, Preparation
 from inputdesign_cli.tasks.build.signals import check_stated, signals_of, stated_step, typical_step
 from inputdesign_cli.tasks.build.tables import may_be_times, no_column
+from inputdesign_cli.tasks.build.without import labels
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 
 _CHANNELS = {
@@ -247,7 +248,7 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
         np.concatenate([log.y for log in logs]),
         np.concatenate([log.time for log in logs]),
         tuple(length for log in logs for length in log.lengths),
-        tuple(file for log in logs for file in log.files),
+        tuple((name, len(log.y)) for name, log in zip(labels(paths), logs, strict=True)),
         first.names,
         first.step,
         first.time_unit,

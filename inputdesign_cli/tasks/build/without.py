@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,12 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.preparation import Run
+
+
+def labels(paths: Sequence[Path]) -> list[str]:
+    """What messages and options call files: their names, with the folders where two have the same."""
+    counts = Counter(path.name for path in paths)
+    return [path.name if counts[path.name] == 1 else str(path) for path in paths]
 
 
 def left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
@@ -20,7 +28,7 @@ def left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
     """
     found = np.zeros(len(sheet.lines), dtype=bool)
     for name, first, last in runs:
-        if name not in ("", sheet.path.name):
+        if name not in ("", sheet.path.name, str(sheet.path)):
             continue
         inside = (sheet.lines >= first) & (sheet.lines <= last)
         if not np.any(inside):

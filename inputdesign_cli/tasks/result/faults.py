@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 
 import numpy as np
@@ -120,7 +121,7 @@ def without_option(runs: Sequence[tuple[str, int, int]]) -> str:
         f"{f'{name}:' if name else ''}{first}{f'-{last}' if last > first else ''}"
         for name, first, last in runs
     ]
-    return f"--without {','.join(listed)}" if len(listed) <= _LISTED else "--without"
+    return f"--without {shlex.quote(','.join(listed))}" if len(listed) <= _LISTED else "--without"
 
 
 def _without_samples(data: Data, runs: Sequence[tuple[int, int]]) -> str:

@@ -86,7 +86,8 @@ def response_note(told: dict[str, Json]) -> list[str]:
     usual = "" if "caveat" in told else " (a right model: at about 5 %)"
     entries = "" if told["entries"] == 1 else f", counted over {told['entries']} entries of G"
     sentence = (
-        "frequency_response.csv has what the data say of G without a model, with discs of 95 %: the model is "
+        "frequency_response.csv has what the data say of G without a model"
+        f"{', by the reference' if told['excitation'] == 'r' else ''}, with discs of 95 %: the model is "
         f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies{entries}{usual}"
     )
     return [sentence, *([told["caveat"]] if "caveat" in told else [])]

@@ -87,3 +87,42 @@ def test_a_pole_outside_the_circle_is_told_where_it_is(A, controller):
     else:
         assert found.radius == pytest.approx(radius, abs=4.0 * found.deviation + 2e-3)
         assert found.denominator == pytest.approx(A, abs=0.02)
+
+
+def levels(rng, n, low, high):
+    """An input at any level, held for `low` to `high` samples."""
+    return np.repeat(rng.uniform(-1.0, 1.0, n), rng.integers(low, high + 1, n))[:n]
+
+
+@pytest.mark.parametrize("late", [3, 4])
+@pytest.mark.parametrize("gain", [2.0, -2.0])
+def test_an_input_of_many_levels_that_is_logged_late_is_told(late, gain):
+    """The plant answers after one sample, so that the output moves late - 1 samples before the log does."""
+    seen = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        u = levels(rng, 600, 7, 29)
+        y = gain * scipy.signal.lfilter([0.0, 0.1], [1.0, -0.9], u) + 0.2 * rng.standard_normal(600)
+        assert early_answers([(u[:, None], y[:, None])]) == []
+        logged = np.concatenate([np.full(late, u[0]), u[:-late]])
+        seen += early_answers([(logged[:, None], y[:, None])])
+    assert len(seen) >= 5
+    assert max(found.samples for found in seen) <= late - 1
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.5])
+def test_inputs_in_loops_or_that_bend_a_plant_are_not_logged_late(bend):
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        r = levels(rng, 800, 20, 50)
+        u, y, x, total = np.zeros(800), np.zeros(800), 0.0, 0.0
+        for k in range(800):
+            y[k] = x + bend * np.tanh(x) ** 2 + 0.05 * rng.standard_normal()
+            total += 0.05 * (r[k] - y[k])
+            u[k] = 0.5 * (r[k] - y[k]) + total
+            x = 0.9 * x + 0.2 * u[k]
+        assert early_answers([(u[:, None], y[:, None])]) == []
+        many = np.sin(np.outer(np.arange(800.0), [0.03, 0.11, 0.17])).sum(axis=1)
+        x = scipy.signal.lfilter([0.0, 0.2], [1.0, -0.9], many)
+        y = x + bend * x**2 + 0.05 * rng.standard_normal(800)
+        assert early_answers([(many[:, None], y[:, None])]) == []

@@ -53,7 +53,7 @@ def test_only_the_file_that_is_named_loses_rows(tmp_path):
     [
         (("", 90, 99), "data-unreadable", "log.csv has no row from 90 to 99"),
         (("", 1, 1), "data-unreadable", "log.csv has no row 1,"),
-        (("", 1, 99), "data-not-a-number", "--without leaves no row of log.csv"),
+        (("", 1, 99), "data-unreadable", "--without leaves no row of log.csv"),
     ],
 )
 def test_rows_that_are_not_there_and_all_of_them_are_refused(run, code, words, tmp_path):
@@ -63,6 +63,15 @@ def test_rows_that_are_not_there_and_all_of_them_are_refused(run, code, words, t
     assert diagnostic.code == code
     assert words in diagnostic.message
     assert diagnostic.hint
+
+
+def test_files_of_one_name_are_told_by_their_folders(tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    paths = [log_in(tmp_path / "a" / "log.csv"), log_in(tmp_path / "b" / "log.csv", samples=70)]
+    found = read_logs(paths, Preparation(without=((str(paths[1]), 22, 31),)))
+    assert found.lengths == (60, 20, 40)
+    assert [name for name, _ in found.files] == list(map(str, paths))
 
 
 def test_a_log_without_some_samples_is_the_same_as_a_file_without_their_rows(tmp_path):
