@@ -81,7 +81,8 @@ def main() -> None:
         left = np.setdiff1d(log.recorded.rows, rest.recorded.rows) - log.recorded.rows[0]
         whole = explore_records(log.parts, step=log.step).model if left.size else best.model
         found.append((off(whole, plant), off(best.model, plant)))
-        where = f"{left[0]} to {left[-1]}" if left.size else "none"
+        runs = np.split(left, np.flatnonzero(np.diff(left) > 1) + 1) if left.size else []
+        where = " and ".join(f"{run[0]} to {run[-1]}" for run in runs) or "none"
         shifts = "" if given.none else at
         print(
             f"| {seed} | {len(rows)} | {shifts} | {where} | {found[-1][0]:.1f} | {found[-1][1]:.1f} |",
