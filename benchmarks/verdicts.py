@@ -301,6 +301,7 @@ def counted(trials: Iterable[tuple[Trial, np.random.Generator]]) -> Counter[str]
         counts["a parameter missed"] += one.missed
         counts["an input that answers"] += one.answering
         counts.update({test.name for test in one.found.tests} & {test.name for test in one.found.failed})
+        counts["level_shift"] += any(test.name == "level_shift" for test in one.found.failed)
         counts["directed"] += any(tried.test in one.found.failed for tried in one.found.directed)
     return counts
 

@@ -114,19 +114,22 @@ class Estimate:
 
     @property
     def shifted(self) -> tuple[LevelShift, ...]:
-        """Where outputs shift, if nothing else that is left then speaks more against the structure."""
-        if not self.shifts:
-            return ()
+        """Where outputs shift, if nothing else that refutes the structure speaks more against it.
+
+        Tests of many signals that a shift upsets count by what they say once it is taken off.
+        """
+        directed = tuple(one.test for one in self.directed)
+        others = failed(self.tests, directed)
+        if not self.shifts or not others:
+            return self.shifts
         # Likelihood ratios are compared with one, scores with the other.
         by_ratio, by_score = chance_of_shifts(self.shifts)
-        ratios = (*self.beside_shifts, *(one.test for one in self.directed if one.of_structure))
-        scores = [one.test for one in self.directed if not one.of_structure]
-        prevails = all(
-            own < test.probability
-            for own, tests in ((by_ratio, ratios), (by_score, scores))
-            for test in tests
-        )
-        return self.shifts if prevails else ()
+        of_structure = {one.test for one in self.directed if one.of_structure}
+        compared = [(by_ratio, test) for test in self.beside_shifts]
+        compared += [
+            (by_ratio if test in of_structure else by_score, test) for test in directed if test in others
+        ]
+        return self.shifts if all(own < test.probability for own, test in compared) else ()
 
     @property
     def failed_besides(self) -> tuple[ScoreTest, ...]:

@@ -42,7 +42,7 @@ class LevelShift:
         output: from zero.
         sample: likely the first of it, counted through all records.
         lag: the time constant by which it is smooth, in samples; zero of a step.
-        begins, ends: the samples between which, for certain, it begins and has settled, the last left out.
+        begins, ends: between these samples it likely begins and has settled, the last left out.
         rises: whether the output is larger after it.
         test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
         score: the statistic of the score, which is smaller; so many `looks` it was the largest of.

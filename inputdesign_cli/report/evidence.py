@@ -160,8 +160,8 @@ def _from_rest(result: Result) -> str:
     if "begun_anywhere" not in signal:
         return ""
     growth = signal["begun_anywhere"]
-    else_ = "nothing is promised" if growth is None else f"{growth:.3g} times as much"
-    return f" and the record begins at rest, its levels known (--operating-point; else {else_})"
+    otherwise = "nothing is promised" if growth is None else f"{growth:.3g} times as much"
+    return f" and the record begins at rest, its levels known (--operating-point; else {otherwise})"
 
 
 def _open_structure(assessment: Result) -> Iterator[str]:

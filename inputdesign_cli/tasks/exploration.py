@@ -35,6 +35,7 @@ from inputdesign_cli.tasks.result.exploration import (
     without_drift,
 )
 from inputdesign_cli.tasks.result.faults import biasing
+from inputdesign_cli.tasks.result.level_shifts import shifted_levels
 from inputdesign_cli.tasks.result.no_trust import DRIVE, HALF, LEAST_FIT, distrusted, undriven_inputs
 from inputdesign_cli.tasks.result.refutations import chance, refutations
 from inputdesign_cli.tasks.result.responses import contradicted, response_note, response_of_data
@@ -112,7 +113,10 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         resolved_spec=warned(text, reasons, loop=bool(loops)),
         curves={**results.curves, **structure_curves(found)},
     )
-    against = tuple(refutations(found.model, found.estimate))
+    against = (
+        *shifted_levels(found.estimate, data, log.time_unit),
+        *refutations(found.model, found.estimate),
+    )
     return Exploration(complete if response is None else response.beside(complete), reasons, against)
 
 

@@ -177,7 +177,7 @@ def speaking_against(task: Identification, found: Identified) -> list[str]:
     return mismeasured(task, found) or [
         # Where an expression ends G may vanish, whatever the inputs do.
         *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
-        *shifted_levels(units, estimate, data),
+        *shifted_levels(estimate, data, units.time_unit),
         *refutations(found.model, estimate),
         *([] if found.loop_told else answering(units, estimate, data)),
         *(repetitions(estimate, data.files) or data.repeated),

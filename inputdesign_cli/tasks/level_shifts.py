@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.explore import Found, explore_records
 from inputdesign_cli.tasks.build.log import Log
@@ -38,16 +40,15 @@ def explored_beside_shifts(log: Log, *, loop: bool) -> tuple[Log, Found]:
         shifts = found.estimate.shifted
         if not shifts:
             return rest, found
-        samples, less = found.samples, rest
-        for shift in sorted(shifts, key=lambda one: -one.sample):
-            less = less.without(int(samples[shift.begins]), int(samples[shift.ends - 1]) + 1)
+        shifting = np.unique(np.concatenate([found.samples[one.begins : one.ends] for one in shifts]))
+        less = rest.without(shifting)
         try:
             another = found_in(less, unless_shifted=True)
         except SpecError:
             break
         if another.split == "none" != found.split:
             break
-        told = left_out(rest, shifts, samples)
+        told = left_out(rest, shifts, found.samples, short=len(rest.y) - len(less.y) - len(shifting))
         rest, found = replace(less, steps=(*rest.steps, told)), another
     else:
         if not found.estimate.shifted:

@@ -121,6 +121,9 @@ def test_an_integrator_earns_no_trust_and_is_offered(tmp_path):
     assert "integrator" in reason
     assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.02, rel=0.05)
     spec = re.search(r"in SPEC (sample_time: \S+) and (plant: .*)$", reason)
+    assert re.search(r"parameters: \{K: 0\.0\d+, L: ([\d.]+)\}", spec[2])[1] == "0.1", (
+        "it answers the next row"
+    )
     result = identify(parse_spec(f"{spec[1]}\n{spec[2]}\n", design=False), log).result
     assert result["identification"]["theta"]["K"] == pytest.approx(0.02, rel=0.02)
     assert not any("is asked" in note for note in result["notes"]), "this spec asks for nothing"

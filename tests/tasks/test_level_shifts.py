@@ -1,13 +1,18 @@
 """A change of load that no input shows: told where it is, left out of what is explored, and by --without."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec
-from inputdesign_cli.tasks import explore
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import LevelShift
+from inputdesign_cli.identification.adequacy import ScoreTest
+from inputdesign_cli.tasks import explore, level_shifts
+from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 
 K, T = 2.0, 12.0
@@ -94,15 +99,54 @@ def test_of_several_files_the_note_says_in_which_it_is(tmp_path):
     assert not shifts_in(again.result["notes"])
 
 
-def test_nothing_is_left_out_where_the_rest_could_not_judge(tmp_path):
-    """The input moves twice, and the load between the moves: both parts are needed."""
-    rng = np.random.default_rng(8)
-    u = np.repeat([-1.0, 1.0, -1.0], 60)
-    pole = np.exp(-1.0 / T)
-    y = scipy.signal.lfilter([0.0, K * (1.0 - pole)], [1.0, -pole], u + 1.0)
-    y += np.where(np.arange(180) >= 100, 1.0, 0.0) + 0.05 * rng.standard_normal(180)
-    rows = np.c_[np.arange(180), u, y]
-    found = explore([saved(tmp_path / "log.csv", rows)], Preparation())
-    split = found.results.result["exploration"]["split"]
-    left = shifts_in(found.results.result["exploration"]["steps"])
-    assert not left or split != "none"
+def found_with(samples, places, split="halves"):
+    """What an exploration of so many samples would return that finds steps at these places."""
+    shifts = tuple(
+        LevelShift(
+            0,
+            at,
+            0.0,
+            at - 1,
+            at + 2,
+            True,
+            ScoreTest("level_shift", "shift", 50.0, 1, 1e-9, None),
+            50.0,
+            99,
+            True,
+        )
+        for at in places
+    )
+    return SimpleNamespace(estimate=SimpleNamespace(shifted=shifts), samples=np.arange(samples), split=split)
+
+
+@pytest.mark.parametrize(
+    ("answers", "lengths"),
+    [
+        ([found_with(100, [])], (100,)),
+        ([found_with(100, [40]), found_with(97, [])], (39, 58)),
+        ([found_with(100, [40, 42]), found_with(95, [])], (39, 56)),
+        ([found_with(100, [8, 60]), found_with(86, [])], (49, 38)),
+        ([found_with(100, [40]), found_with(97, [], split="none"), found_with(100, [])], (100,)),
+        ([found_with(100, [40]), SpecError([]), found_with(100, [])], (100,)),
+        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [])], (39, 30, 25)),
+        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [20]), found_with(100, [])], (100,)),
+    ],
+)
+def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths):
+    """Shifts that overlap, leave too little beside them, are all that tells the plant, or have no end."""
+    log = read_log(saved(tmp_path / "log.csv", rows_of(100, None, 1)), Preparation())
+    given = iter(answers)
+
+    def explored(*args, **settings):
+        answer = next(given)
+        if isinstance(answer, SpecError):
+            raise answer
+        return answer
+
+    monkeypatch.setattr(level_shifts, "explore_records", explored)
+    rest, found = level_shifts.explored_beside_shifts(log, loop=False)
+    assert rest.lengths == lengths
+    assert found is answers[-1]
+    told = " ".join(rest.steps)
+    assert bool(shifts_in([told])) == (rest.lengths != (100,))
+    assert ("too few for a segment" in told) == (len(answers[0].estimate.shifted) == 2 and lengths[0] == 49)

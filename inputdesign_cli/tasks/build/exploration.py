@@ -63,7 +63,7 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
     limit, amplitude = _numbers([float(f"{x:.6g}") for x in power]), _numbers(widths)
     ranges = " and ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True))
     offset = levels[0] if single else levels
-    source = " and ".join(path.name for path in sources)
+    source = " ".join(" and ".join(path.name for path in sources).split())
     text = f"""\
 # Written by `idesign explore` from {source}.
 # `idesign solve FILE` designs what it asks; every entry can be changed here or by --set key=value.
@@ -116,9 +116,9 @@ def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
             "in the loop."
         )
     lines = [textwrap.fill(one, 110, initial_indent="# ", subsequent_indent="#   ") for one in told]
-    head, title, rest = text.partition("title: ")
+    head, title, rest = text.partition("\ntitle: ")
     doubted = f"{title}{_DOUBTED}{rest[1:]}" if reasons else title + rest
-    return head + "".join(f"{line}\n" for line in lines) + doubted
+    return "\n".join([head, *lines]) + doubted
 
 
 def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:

@@ -79,26 +79,22 @@ class Log:
         counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends))
         return tuple((name, int(count)) for (name, _), count in zip(self.files, counts, strict=True))
 
-    def without(self, begin: int, end: int) -> Log:
-        """The same without the samples from `begin` until before `end`, and what is too short beside them.
-
-        Args:
-            begin, end: counted through all segments.
-        """
-        left = np.concatenate([np.arange(begin), np.arange(end, len(self.y))])
+    def without(self, samples: NDArray[np.int64]) -> Log:
+        """The same without some samples, counted through all segments, and what is too short beside them."""
+        left = np.setdiff1d(np.arange(len(self.y)), samples)
         apart = (np.diff(left) > 1) | np.isin(left[1:], np.cumsum(self.lengths))
         runs = np.split(left, np.flatnonzero(apart) + 1)
         kept = [run for run in runs if len(run) >= SHORTEST] or [max(runs, key=len)]
-        samples = np.concatenate(kept)
+        rest = np.concatenate(kept)
         return replace(
             self,
-            u=self.u[samples],
-            r=None if self.r is None else self.r[samples],
-            y=self.y[samples],
-            time=self.time[samples],
+            u=self.u[rest],
+            r=None if self.r is None else self.r[rest],
+            y=self.y[rest],
+            time=self.time[rest],
             lengths=tuple(map(len, kept)),
-            files=self.files_of(samples),
-            recorded=self.recorded.at(samples),
+            files=self.files_of(rest),
+            recorded=self.recorded.at(rest),
         )
 
 

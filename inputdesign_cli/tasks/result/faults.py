@@ -35,13 +35,13 @@ def biasing(units: Units, estimate: Estimate, data: Data, fitted: Sequence[float
         share = sum(one.length for one in runs) / len(data.y)
         if share >= _BIASING:
             told.append(
-                f"{output_named(units, output)} stands still at {100.0 * share:.2g} % of the samples while "
+                f"{_named(units, output)} stands still at {100.0 * share:.2g} % of the samples while "
                 "the input moves: a model of what a sensor does not follow has another gain, and other "
                 "dynamics, than the plant; leave these rows out (--without), which cuts the record there"
             )
     told += [
         f"a few samples hold {100.0 * one.share:.3g} % of the squares of the residuals of "
-        f"{output_named(units, one.output)}, and the simulation explains {fitted[one.output]:.1f} % of it: "
+        f"{_named(units, one.output)}, and the simulation explains {fitted[one.output]:.1f} % of it: "
         "spikes, or events that the model does not know, decide what it is; leave rows out that are faults "
         "of measurement (--without)"
         for one in spikes(estimate.errors)
@@ -50,8 +50,7 @@ def biasing(units: Units, estimate: Estimate, data: Data, fitted: Sequence[float
     return told
 
 
-def output_named(units: Units, output: int) -> str:
-    """How messages call an output."""
+def _named(units: Units, output: int) -> str:
     return f"y{output + 1}" if units.outputs > 1 else "y"
 
 
@@ -80,7 +79,7 @@ def _frozen(units: Units, estimate: Estimate, data: Data) -> list[str]:
             for first, last in [data.recorded.rows[[one.first, one.first + one.length - 1]]]
         ]
         told.append(
-            f"{output_named(units, output)} stands still while the input moves, for "
+            f"{_named(units, output)} stands still while the input moves, for "
             f"{sum(one.length for one in runs)} of {len(data.y)} samples ({', '.join(places)}"
             f"{', ..' * (len(runs) > _SHOWN)}), and rounding does "
             "not explain it: the sensor is frozen or saturated, or the logger repeats its last value; leave "
@@ -109,10 +108,10 @@ def loop_faults(controller: TransferMatrix | None, data: Data) -> list[str]:
     return list(dict.fromkeys(told))
 
 
-def file_of(data: Data, at: int) -> str:
-    """The file that a sample is of, where there are several."""
-    ends = np.cumsum([samples for _, samples in data.files])
-    return data.files[int(np.searchsorted(ends, at, side="right"))][0] if len(data.files) > 1 else ""
+def file_of(files: Sequence[tuple[str, int]], at: int) -> str:
+    """The file that a sample is of, where there are several; `files` are names and samples."""
+    ends = np.cumsum([samples for _, samples in files])
+    return files[int(np.searchsorted(ends, at, side="right"))][0] if len(files) > 1 else ""
 
 
 def without_option(runs: Sequence[tuple[str, int, int]]) -> str:
@@ -129,11 +128,11 @@ def _without_samples(data: Data, runs: Sequence[tuple[int, int]]) -> str:
     if data.recorded is None:
         return "--without"
     rows = data.recorded.rows
-    return without_option([(file_of(data, first), rows[first], rows[last]) for first, last in runs])
+    return without_option([(file_of(data.files, first), rows[first], rows[last]) for first, last in runs])
 
 
 def _file(data: Data, at: int) -> str:
-    name = file_of(data, at)
+    name = file_of(data.files, at)
     return f" of {name}" if name else ""
 
 
@@ -147,7 +146,7 @@ def _spikes(units: Units, estimate: Estimate, data: Data) -> list[str]:
     """A sentence for every output in whose residuals a few samples hold most of the sum of squares."""
     told = []
     for one in spikes(estimate.errors):
-        many, output = len(one.samples), output_named(units, one.output)
+        many, output = len(one.samples), _named(units, one.output)
         told.append(
             f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
             f"{100 * one.share:.3g} % of the squares of its residuals (at "
