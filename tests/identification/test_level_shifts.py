@@ -1,5 +1,7 @@
 """Outputs that shift and stay, whatever the inputs do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -150,3 +152,25 @@ def test_a_record_too_short_for_any_has_none():
     y = np.append(0.0, 0.5 * u[:-1, 0])[:, None] + 0.1 * rng.standard_normal((10, 1))
     text = "sample_time: 1\nplant: {B: [0, 0.5]}\nnoise: {variance: 0.01}\n"
     assert shift_of(text, u, y, rest=True) is None
+
+
+def test_a_shift_that_alone_refutes_a_model_is_told_whatever_hardly_counts():
+    """Its score may say less than a test that does not fail; another one that fails outweighs it."""
+    u, y = lag_of(300, 5)
+    y[120:] += 0.6
+    found = identify(model_of(LAG + NOISES["white"]), u, y)
+    shift = found.shifts[0]
+    faint = replace(shift, score=5.0)
+    one = next(one for one in found.directed if not one.of_structure)
+
+    def beside(probability):
+        other = replace(one, test=replace(one.test, probability=probability))
+        quiet = tuple(replace(test, probability=0.5) for test in found.tests)
+        return replace(found, shift=faint, shifts=(faint,), tests=quiet, directed=(other,))
+
+    alone, outweighed = beside(0.1), beside(1e-9)
+    assert alone.failed == (faint.test,)
+    assert alone.shifted == (faint,)
+    assert outweighed.shifted == ()
+    assert outweighed.failed_besides == outweighed.failed
+    assert len(outweighed.failed) == 2
