@@ -39,6 +39,7 @@ fuzz: $(READY)  ## extreme and broken specs for FUZZ_SECONDS (60): no crash, no 
 
 lint: $(READY)  ## ruff and mypy
 	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 
 golden: $(READY)  ## compare with the golden results

@@ -18,9 +18,9 @@ import numpy as np
 import scipy.optimize
 import scipy.signal
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import fit_batch
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.plant.polynomial import Array
 
 ROOT = Path(__file__).parent.parent
 MODEL = PolynomialModel(

@@ -22,6 +22,7 @@ import numpy as np
 import scipy.signal
 
 from inputdesign_cli import load_spec
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error import (
     LimitedDesign,
     LoopErrorDesign,
@@ -35,7 +36,6 @@ from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
 from inputdesign_cli.design.loop_error.weight import adjoint, weight
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.plant import TransferMatrix
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
 from inputdesign_cli.tasks.loop_error_signal import design_lines, white_lines
 

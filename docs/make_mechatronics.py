@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text, read_csv
 from pages import Terminal, filled, keep, write

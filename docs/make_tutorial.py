@@ -16,7 +16,7 @@ import numpy as np
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text, read_csv
 from pages import DOCS, Terminal, filled, keep, write

@@ -18,8 +18,8 @@ import numpy as np
 import scipy.signal
 
 from inputdesign_cli import load_spec
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.record import load_result
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text, read_csv

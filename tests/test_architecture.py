@@ -11,7 +11,7 @@ ROOT = Path(inputdesign_cli.__file__).parent
 
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
 ORDER = [
-    {"errors", "error_codes", "expressions", "version", "regular_file", "compute"},
+    {"arrays", "errors", "error_codes", "expressions", "version", "regular_file", "compute"},
     {"diagnostics"},
     {"specification", "plant"},
     {"spectrum", "information", "accuracy"},

@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant import Loop, Model, ScalarTransfer, local_maxima
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _NOWHERE = np.zeros(0)
 # Where the weight vanishes the requirement is void; a large finite r_adm says so without an infinity.

@@ -16,7 +16,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy.model_error import ModelError
 from inputdesign_cli.accuracy.requirement import Requirement, inverse_factor
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 _POINTS, _AT_ONCE = 800, 256
 

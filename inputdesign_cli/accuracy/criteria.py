@@ -20,7 +20,7 @@ import scipy
 from inputdesign_cli.accuracy.cut import Cut
 from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.accuracy.requirement import OneCondition, Requirement
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 Letter = Literal["D", "A", "E", "T"]
 

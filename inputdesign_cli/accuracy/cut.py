@@ -14,7 +14,7 @@ from typing import Literal, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 CutKind = Literal["nonnegative", "psd", "exponential"]
 

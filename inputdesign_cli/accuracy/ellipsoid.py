@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.accuracy.ellipsoid_cut import EllipsoidCut
 from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.accuracy.over_frequency import real_rows
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 _BISECTIONS = 80
 _FLOOR = 1e-150  # its square is a number still

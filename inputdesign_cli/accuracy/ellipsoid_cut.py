@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from inputdesign_cli.accuracy.cut import CutBlock, Inequality, positive_part
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.spectrum import smat, svec, svec_length
 
 

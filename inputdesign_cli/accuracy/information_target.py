@@ -13,7 +13,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy.cuts import MatrixCut
 from inputdesign_cli.accuracy.requirement import OneCondition, inverse_factor
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 
 @dataclass(frozen=True)

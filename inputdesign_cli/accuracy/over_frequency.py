@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.requirement import Entry, Requirement, Violation, inverse_factor, worst
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, graded_grid, local_maxima
 from inputdesign_cli.plant.frequencies import SLACK
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
 _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12

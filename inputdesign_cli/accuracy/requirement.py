@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.accuracy.cut import Cut
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 Entry = tuple[int, int]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.campaign.applied import LIKE, UNLIKE, Match, copied, matched, standing_in
 from inputdesign_cli.campaign.memory import Memory
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.text_formats import csv_rows, read_csv
 from inputdesign_cli.tasks.campaign_rounds import Part

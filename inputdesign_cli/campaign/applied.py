@@ -13,7 +13,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 LIKE = 0.9
 """From this correlation on a record follows its plan; below, that is told."""

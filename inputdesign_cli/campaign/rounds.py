@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.campaign.acceptance import accepted
 from inputdesign_cli.campaign.memory import VERSION, Memory
 from inputdesign_cli.campaign.pictures import history
 from inputdesign_cli.campaign.unchanged import digests
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.curves import Curves, SignalCurves
 from inputdesign_cli.runs.results import Json, Results, Table

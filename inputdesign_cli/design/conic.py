@@ -13,9 +13,9 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec_length
 
 ConeKind = Literal["zero", "nonnegative", "psd", "exponential"]

@@ -17,9 +17,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.errors import IdesignError, InaccurateError, bad_spec
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 Goal = Literal["cost", "factor", "samples", "given"]
 _ROUNDING = 1e-9

@@ -19,10 +19,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records, shifted
 from inputdesign_cli.identification.white import DEPENDENT, Echoes, White
-from inputdesign_cli.plant.polynomial import Array
 
 # A right model fails some test of many signals, some of one parameter, and that of level shifts, with at most
 # these probabilities.

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information.coordinates import taking_part, triangular_factor
-from inputdesign_cli.plant.polynomial import Array
 
 # A direction is not excited where gradients change by more than this share of themselves when they are
 # rounded otherwise.

@@ -14,6 +14,7 @@ from functools import cached_property, partial, reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.extensions import Extension, late_echo
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
@@ -25,7 +26,6 @@ from inputdesign_cli.identification.starts import noise_polynomials
 from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import Coloured
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import Array
 
 _STEP = 1e-6
 

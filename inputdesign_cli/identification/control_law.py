@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import TransferMatrix
-from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = (-2, -1, 1, 2)
 # Another lag holds where it leaves this share of what the signals as they are leave, and of the input itself.

@@ -14,12 +14,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.adequacy import Fault, ScoreTest
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.white import Echo, Echoes, White
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # A score of a larger probability is the last word.
 _OPEN = 0.3

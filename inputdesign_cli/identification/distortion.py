@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.periodic_response import PeriodicResponse
 from inputdesign_cli.identification.silent_lines import SilentLines
-from inputdesign_cli.plant.polynomial import Array
 
 _OF_THE_SHARE = 9.0 / 6.0 * 3.0 / 2.0
 

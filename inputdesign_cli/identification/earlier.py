@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 # Directions of which less than this share of the knowledge is of one side only are the other's alone.
 _OF_ONE_SIDE = 1e-9

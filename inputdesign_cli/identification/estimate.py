@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
@@ -25,7 +26,6 @@ from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.white import Echoes, White
 from inputdesign_cli.information.coordinates import triangular_factor
-from inputdesign_cli.plant.polynomial import Array
 
 # Samples that residual tests need.
 _FEWEST_TESTED = 20

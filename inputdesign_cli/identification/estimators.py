@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.coloured import ColouredKind
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, information_of
@@ -30,7 +31,6 @@ from inputdesign_cli.plant import (
     SampledModel,
     StateSpaceModel,
 )
-from inputdesign_cli.plant.polynomial import Array
 
 # Of records that follow each other; None for one.
 Lengths = Sequence[int] | None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.identification.adequacy import Fault
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
@@ -16,7 +17,6 @@ from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import DELAY, Listed
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, Rows
 
 _LAGS = ("a", "f", DELAY)
 

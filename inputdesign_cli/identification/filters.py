@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import Array
 
 # With fewer runs than this, a call of lfilter a run is faster than a loop over time.
 FEW = 24

@@ -21,8 +21,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.start import Start
-from inputdesign_cli.plant.polynomial import Array
 
 # Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
 _DEPENDENT = 1e-7

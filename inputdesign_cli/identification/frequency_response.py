@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.late_inputs import behind
 from inputdesign_cli.identification.period_drift import line_of_periods
 from inputdesign_cli.identification.periodic_response import (
@@ -28,7 +29,6 @@ from inputdesign_cli.identification.periodic_response import (
 )
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 CONFIDENCE = 0.95
 _MOST_FREQUENCIES = 200

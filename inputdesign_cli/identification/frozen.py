@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.repeated import NORMAL, whitened
-from inputdesign_cli.plant.polynomial import Array
 
 # Fewer equal samples in a row, and fewer samples in all, say nothing.
 _SHORTEST, _FEW = 5, 20

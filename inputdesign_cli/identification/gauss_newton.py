@@ -13,7 +13,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 # Settled: the next step, squared and in standard deviations of the estimate, is this small. It is still
 # taken; the steps shrink at least tenfold where the model fits, so that what is left is far smaller.

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.rivals import NEARLY, distance, excess_of, is_near
-from inputdesign_cli.plant.polynomial import Array
 
 # Instants that are farther, in standard deviations, part the estimate from nothing that is likely.
 _REACH = 3.0

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.earlier import Earlier
@@ -25,7 +26,6 @@ from inputdesign_cli.identification.records import Record, Records, centred, lon
 from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.variations import variations
 from inputdesign_cli.identification.white import Echoes
-from inputdesign_cli.plant.polynomial import Array
 
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""

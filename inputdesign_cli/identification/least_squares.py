@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.plant.polynomial import Array
 
 
 def is_arx(model: PolynomialModel) -> bool:

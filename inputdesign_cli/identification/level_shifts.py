@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import SHIFT_LEVEL, ScoreTest
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.white import White
-from inputdesign_cli.plant.polynomial import Array
 
 # Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
 _SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125

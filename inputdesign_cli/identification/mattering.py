@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.directed import Directed
-from inputdesign_cli.plant.polynomial import Array
 
 # A gain that is not always the same often has a large effect that the record hardly shows. It matters where
 # it moves G by more than is admitted with a probability below this, shared among all that would (Bonferroni).

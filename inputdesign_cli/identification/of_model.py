@@ -9,11 +9,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.records import Record, split
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.record_problem import Point
-from inputdesign_cli.plant.polynomial import Array
 
 # Directions of which one side has less than this share of the information are the other's alone.
 _OF_ONE_SIDE = 1e-6

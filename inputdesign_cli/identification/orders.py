@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.plant.polynomial import Array
 
 _MOST_DEGREE = 3
 _CERTAIN = 1e-4

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 _EXCITED = 1e-6
 # Where less of the inputs differs from period to period, what differs is noise, and lines that are no more

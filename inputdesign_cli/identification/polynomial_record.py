@@ -10,13 +10,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import errors_and_gradient
 from inputdesign_cli.identification.problem import PredictionErrors
 from inputdesign_cli.identification.start import Start, density, each_later, noise_before
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import Array
 
 _STEP = 1e-30
 

@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.extensions import Extension, echo_of, larger_polynomials, new_name
@@ -28,7 +29,6 @@ from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.plant.polynomial import Array
 
 # Many runs share the cost of a pass over time; with more outputs at once the blocks no longer fit the cache.
 _OUTPUTS_AT_ONCE = 512

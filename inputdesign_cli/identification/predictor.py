@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.filters import FEW, Stream
 from inputdesign_cli.identification.orders import OutputOrders, Polynomials
-from inputdesign_cli.plant.polynomial import Array
 
 _BLOCK = 32
 

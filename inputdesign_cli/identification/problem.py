@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import block_length, stream
 from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.records import Linearised, Records
-from inputdesign_cli.plant.polynomial import Array
 
 # Errors of this power relative to the output are rounding. It is added to S, so that an output without
 # noise does not hide the others.

@@ -15,10 +15,10 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.free_starts import FreeStarts
 from inputdesign_cli.identification.start import Start
-from inputdesign_cli.plant.polynomial import Array
 
 _MOST_STARTED = 3
 # Of a coefficient of the noise, or of one: central differences of a filtered line lose about half the digits.

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
@@ -24,7 +25,6 @@ from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.identification.white import Echo, Echoes
 from inputdesign_cli.plant import Parametrisation, Reparametrised
-from inputdesign_cli.plant.polynomial import Array
 
 # So often a point is moved halfway towards the nominal one before that takes its place.
 _HALVINGS = 40

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.records import shifted
-from inputdesign_cli.plant.polynomial import Array
 
 # So many samples in a row have a correlation beyond this at another time by chance in one of 1e10 cases.
 _IN_A_ROW, _FOLLOWS = 30, 0.9

@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.records import shifted
-from inputdesign_cli.plant.polynomial import Array
 
 # Two-sided 99 % of the normal distribution: the band of a single correlation.
 _BAND = 2.5758293035489004

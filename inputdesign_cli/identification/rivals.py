@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.gauss_newton import Minimum
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
-from inputdesign_cli.plant.polynomial import Array
 
 NEARLY = 2.0 * float(np.log(1000.0))
 """What another minimum may have more in -2 log likelihood: a thousandth of the likelihood of the best."""

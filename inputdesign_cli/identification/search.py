@@ -9,12 +9,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.gauss_newton import MOST_STEPS, best_run, minimise
 from inputdesign_cli.identification.instants import beyond_instants, minima_beside
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.rivals import Rival, rivals
-from inputdesign_cli.plant.polynomial import Array
 
 # A record that begins at rest is taken for one that does not with this probability.
 _MISTAKEN = 0.01

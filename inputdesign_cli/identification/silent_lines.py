@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 # Neighbouring lines over which the spectrum of the noise is taken to be even, where it is not known.
 _NEIGHBOURS = 15

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.repeated import NORMAL
-from inputdesign_cli.plant.polynomial import Array
 
 # Farther from zero than so many robust standard deviations; of as few samples as this, than twice as many.
 _FAR, _UNSURE = 8.0, 20

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import Array
 
 # Roots on the circle, which may be known, are taken for some so far inside: noise would have no stationary
 # start, and its zeros no density.

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.orders import Block, OutputOrders
 from inputdesign_cli.identification.stability import reflected
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 15
 _LONGEST = 40

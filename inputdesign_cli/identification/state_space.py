@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Part, Starts
 from inputdesign_cli.identification.of_model import OfModel
@@ -20,7 +21,6 @@ from inputdesign_cli.identification.transfer_record import crossings_of, late_sa
 from inputdesign_cli.identification.white import Echoes
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array
 
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
 _MARGIN = 1e-9

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.orders import InputOrders, OutputOrders
 from inputdesign_cli.identification.problem import PredictionErrors
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
@@ -24,7 +25,6 @@ from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array
 
 # Of the starts made from the data, as many are followed to the end: the likeliest after the instruments that
 # are not beside each other.

@@ -10,12 +10,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array
 
 # A mode that loses less than this over the whole record cannot be told from one on the stability limit.
 _LEAST_DECAY = 0.01

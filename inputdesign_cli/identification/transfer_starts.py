@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.polynomial import polynomial as ascending
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _CUTOFFS = 5
 _HIGHEST_ORDER = 8

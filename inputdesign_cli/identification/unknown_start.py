@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.estimate import information_of
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.record_problem import evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 # Numbers that unknown starts may take up: inputs of long dead times are taken for known beyond.
 _MOST = 2e7

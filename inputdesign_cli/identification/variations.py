@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import Fault
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 # A signal that lies on a straight line but for this share is the input itself.
 _STRAIGHT = 1e-6

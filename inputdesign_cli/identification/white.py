@@ -10,9 +10,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
-from inputdesign_cli.plant.polynomial import Array
 
 DEPENDENT = 1e-6
 """Signals of norm one of which less is left depend on the others."""

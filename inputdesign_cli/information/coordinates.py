@@ -15,9 +15,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 _RANK_TOLERANCE = 1e-11
 # Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.

@@ -15,12 +15,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
 from inputdesign_cli.information.noise import told_by_noise
 from inputdesign_cli.information.products import WeightedProducts
 from inputdesign_cli.information.quadrature import Quadrature, band_quadrature
 from inputdesign_cli.plant import Loop, Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")

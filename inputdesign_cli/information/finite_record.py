@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information.experiment import Experiment, PowerKind
 from inputdesign_cli.information.record_filters import RecordFilters
 from inputdesign_cli.information.record_transforms import RecordTransforms
-from inputdesign_cli.plant.polynomial import Array
 
 
 class _Answers(Protocol):

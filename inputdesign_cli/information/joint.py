@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
 from inputdesign_cli.information.noise import told_by_noise
 from inputdesign_cli.plant import (
@@ -20,7 +21,6 @@ from inputdesign_cli.plant import (
     input_gradients,
     noise_gradients,
 )
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
 _AT_A_NODE = 256

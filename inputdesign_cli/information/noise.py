@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import ComplexArray
 from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, Values, integrate
-from inputdesign_cli.plant.polynomial import ComplexArray
 
 
 def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import InaccurateError
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 NODES = 20
 RELATIVE_ERROR = 1e-11

@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information.experiment import Experiment, PowerKind
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import Array
 
 Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information.experiment import Experiment, PowerKind
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # e^-32 is below rounding; a plant that remembers longer than this many samples is cut there.
 _FORGOTTEN = 32.0

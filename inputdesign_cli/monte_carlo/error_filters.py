@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.loop_error.laws import complement
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.plant import TransferMatrix
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, multiply
 from inputdesign_cli.plant.transfer import product_of
 

@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, in_phase_record
 from inputdesign_cli.signal.designed import constant_density
 from inputdesign_cli.signal.settings import Method

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.identification.periodic_response import Periods, response_at
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _BATCH_SAMPLES = 1_000_000
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Earlier, Estimate, Rival, identify
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.simulated_runs import noise, responses
-from inputdesign_cli.plant.polynomial import Array
 
 
 def searched_run(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, fit_batch, identify
@@ -14,7 +15,6 @@ from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.monte_carlo.trials import Trials
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.monte_carlo.simulated_runs import TrialJob, run_job
 from inputdesign_cli.monte_carlo.trials import Trials
-from inputdesign_cli.plant.polynomial import Array
 
 # Records of outputs that are simulated and identified in one pass.
 _OUTPUTS_AT_ONCE = 100

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Absolute, Entry, ModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.loop import BESIDE, INTEGRATES, Loop, beside_zero, close_loop
 from inputdesign_cli.plant.loop_around import LoopAround
 from inputdesign_cli.plant.model import Fraction, Listed, Parameter, Parametrised, row_parameters
-from inputdesign_cli.plant.polynomial import (
-    Array,
-    ComplexArray,
-    evaluate,
-    join_roots,
-    roots_in_z,
-    unit_circle,
-)
+from inputdesign_cli.plant.polynomial import evaluate, join_roots, roots_in_z, unit_circle
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _T = TypeVar("_T")

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.intersample import Intersample
 from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised, WhiteNoise, entry_label
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, Rows
 
 
 @dataclass(frozen=True)

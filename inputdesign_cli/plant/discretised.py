@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.sampling import zero_order_hold
 from inputdesign_cli.plant.transfer import Rational, product_of
 

@@ -22,8 +22,8 @@ import numpy as np
 import scipy
 from numpy.polynomial import polynomial as ascending
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # What is left of a state, far below rounding.
 _FORGOTTEN = 1e-20

@@ -14,8 +14,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.held import HeldEntry, integrators
-from inputdesign_cli.plant.polynomial import Array
 
 # Rounding grows by e to this power over a record.
 _DECAY = 4.0

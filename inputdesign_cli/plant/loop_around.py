@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.loop import Loop
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
 @dataclass(frozen=True)

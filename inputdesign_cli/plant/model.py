@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.model import Model
-from inputdesign_cli.plant.polynomial import Array
 
 _FIRST, _LONGEST = 1024, 2**20
 # What the second half of an impulse response may hold of its energy.

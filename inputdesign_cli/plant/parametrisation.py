@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
-from inputdesign_cli.plant.polynomial import Array
 
 # So many values of the parameters are kept with their coefficients.
 _RECENT = 4

@@ -7,11 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-Rows = tuple[tuple[Array, ...], ...]
-"""A matrix of polynomials: output by output, one an input."""
-
+from inputdesign_cli.arrays import ComplexArray
 
 _latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
 _WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared

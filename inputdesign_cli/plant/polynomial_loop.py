@@ -10,16 +10,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.loop import Loop, close_loop
-from inputdesign_cli.plant.polynomial import (
-    Array,
-    ComplexArray,
-    evaluate,
-    join_roots,
-    roots_in_z,
-    unit_circle,
-)
+from inputdesign_cli.plant.polynomial import evaluate, join_roots, roots_in_z, unit_circle
 from inputdesign_cli.plant.polynomial_matrix import at, stack
 from inputdesign_cli.plant.polynomial_model import PolynomialModel
 from inputdesign_cli.plant.transfer import TransferMatrix

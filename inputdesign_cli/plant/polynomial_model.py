@@ -8,16 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import Fraction, input_gradients, noise_gradients, prediction_gradients
-from inputdesign_cli.plant.polynomial import (
-    Array,
-    ComplexArray,
-    evaluate,
-    frequencies_last,
-    power,
-    unit_circle,
-)
+from inputdesign_cli.plant.polynomial import evaluate, frequencies_last, power, unit_circle
 from inputdesign_cli.plant.polynomial_structure import PolynomialStructure
 
 

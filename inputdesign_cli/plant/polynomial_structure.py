@@ -13,9 +13,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Parameter, Parametrised, entry_label, row_parameters
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, Rows, join_roots, roots_in_z
+from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.loop import Loop, close_loop
 from inputdesign_cli.plant.loop_around import LoopAround
 from inputdesign_cli.plant.model import Fraction, Model
 from inputdesign_cli.plant.parametrisation import Parametrisation
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 # Where in the words of a spec the value of a parameter stands.

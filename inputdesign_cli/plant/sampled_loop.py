@@ -10,9 +10,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.loop import Loop, close_loop
 from inputdesign_cli.plant.model import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.sampled_model import SampledModel
 from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix
 

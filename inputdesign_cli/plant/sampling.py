@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from inputdesign_cli.arrays import Rows
 from inputdesign_cli.plant.held import HeldEntry
-from inputdesign_cli.plant.polynomial import Rows
 from inputdesign_cli.plant.transfer import Rational
 
 

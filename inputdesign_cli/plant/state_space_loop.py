@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.loop import close_loop
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.sampled_loop import SampledLoop
 from inputdesign_cli.plant.state_space_model import StateSpaceModel
 from inputdesign_cli.plant.transfer import TransferMatrix

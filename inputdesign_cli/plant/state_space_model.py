@@ -19,10 +19,10 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import whole_samples
 from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import StateSpace
 
 # This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.

@@ -17,15 +17,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import (
-    Array,
-    ComplexArray,
-    evaluate,
-    join_roots,
-    roots_in_z,
-    unit_circle,
-)
+from inputdesign_cli.plant.polynomial import evaluate, join_roots, roots_in_z, unit_circle
 from inputdesign_cli.plant.polynomial_matrix import at, delay_of, stack
 
 Coefficients = Sequence[float] | Array

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.constraints import SignalConstraint, peak_ratio
 from inputdesign_cli.signal.input_limits import InputLimits
 from inputdesign_cli.signal.limiter import Limiter

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.plant.polynomial import Array
 
 LinearMap = Callable[[Array], Array]
 # The limits hold in floating-point arithmetic, not only before rounding.

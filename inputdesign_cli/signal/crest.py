@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
 POWERS = (4, 8, 16, 32, 64, 128, 256, 512)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.lines import Lines, grid_lines, merged
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum
 

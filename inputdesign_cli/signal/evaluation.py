@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import FiniteRecord, PowerKind
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.level_search import least_level
 
 # A record meets the accuracy when its ratio exceeds one by no more than rounding.

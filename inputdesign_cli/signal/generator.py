@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.designed import DesignedSpectrum
 from inputdesign_cli.signal.levels import few_levels
 from inputdesign_cli.signal.lines import Lines

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.constraints import largest_move, ramped, slow_moves
 from inputdesign_cli.signal.settings import Quantiser
 

@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.multisine import multisine_record
 from inputdesign_cli.signal.phases import low_peak_phases

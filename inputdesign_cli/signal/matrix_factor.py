@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 _MAX_STEPS = 60
 _SETTLED = 1e-12

@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.settings import LineVectors
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.signal.crest import POWERS, STEPS, optimise_phases
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.multisine import block_vectors

@@ -15,7 +15,8 @@ import numpy as np
 import scipy
 import scipy.sparse.linalg
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, unit_circle
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.plant.polynomial import unit_circle
 
 _LONGEST = 1024
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.harmonic_grid import harmonics_between
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.multisine import multisine_record

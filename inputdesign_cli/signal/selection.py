@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.bounds import Bounds, limiter_of
 from inputdesign_cli.signal.constraints import compressed, peak_ratio
 from inputdesign_cli.signal.evaluation import MET, Evaluator, Target

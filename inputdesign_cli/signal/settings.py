@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.sinusoids import Selection
 
 Method = Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white", "given"]

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 Selection = Literal["odd"] | int | Sequence[int] | None
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 _MAX_STEPS = 100
 _SETTLED = 1e-13

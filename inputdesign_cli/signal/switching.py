@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import time_is_over
-from inputdesign_cli.plant.polynomial import Array
 
 _MOST_CHANGES = 3
 _SHIFTED = 0.6  # the share of the changes that shift a switch; the others add or remove one

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 # From frequencies (n,) to values (n, ..) of one input, or Hermitian matrices (n, .., r, r) of several.
 Density = Callable[[Array], NDArray]

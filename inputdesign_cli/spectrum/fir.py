@@ -12,8 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Quadrature, integrate
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import directed_scale
 from inputdesign_cli.spectrum.svec import smat, svec_layout

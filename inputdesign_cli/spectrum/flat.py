@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Experiment, Quadrature, integrate_band
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import integrand
 

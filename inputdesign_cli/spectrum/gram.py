@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.spectrum.basis import DensityFamily, Face, Functional, Pricing
 from inputdesign_cli.spectrum.directions import directed_scale, leading_pairs
 from inputdesign_cli.spectrum.svec import smat

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import (
     directed_scale,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import NODES_AT_ONCE, Quadrature, integrate
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Factor
 from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import GramBasis

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 
 @lru_cache(maxsize=64)

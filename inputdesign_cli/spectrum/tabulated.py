@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Quadrature, integrate_band
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Factor
 from inputdesign_cli.spectrum.directions import integrand
 

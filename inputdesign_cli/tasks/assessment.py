@@ -17,9 +17,9 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from inputdesign_cli.accuracy import model_errors
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.identification import frequency_response, response_delays
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Units

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.tasks.result.design import Designed

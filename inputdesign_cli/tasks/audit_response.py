@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.errors import InaccurateError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.text_formats import csv_columns, csv_text, json_text
 from inputdesign_cli.tasks.result.response import Planned, ResponseTerms

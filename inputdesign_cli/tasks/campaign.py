@@ -14,11 +14,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.identification import ModelQuestion
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import (
     Coloured,
@@ -17,7 +18,6 @@ from inputdesign_cli.plant import (
     SampledModel,
     StateSpaceModel,
 )
-from inputdesign_cli.plant.polynomial import Array
 
 if TYPE_CHECKING:
     import control

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time, seconds_left, what_ended
 from inputdesign_cli.design.convex.cost import Weight
@@ -18,7 +19,6 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record

@@ -9,10 +9,10 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage, with_alpha
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inputdesign_cli.accuracy import Criterion
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.spectrum import PolynomialBasis, hvec, svec
 

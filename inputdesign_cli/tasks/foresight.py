@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, what_ended
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Earlier, Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.searched_runs import searched_run
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.knowledge import Knowledge

@@ -11,13 +11,13 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.objectives import white_labels
 from inputdesign_cli.runs.results import Json, Results, Table

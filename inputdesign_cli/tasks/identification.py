@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, TransferMatrix
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data

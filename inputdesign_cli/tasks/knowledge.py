@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate, Rival
-from inputdesign_cli.plant.polynomial import Array
 
 # People are surer than they should be: parameters count as possible to so many times the stated distance.
 _ROOM = 3.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.loop_error import LoopErrorDesign
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.lines import Lines, grid_lines
 from inputdesign_cli.signal.matrix_factor import matrix_factor
 from inputdesign_cli.signal.periodic import even_multisine, harmonics, periodogram

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.cubes import cubes
@@ -29,7 +30,6 @@ from inputdesign_cli.identification.silent_lines import SilentLines, silent_line
 from inputdesign_cli.identification.spikes import period_spikes
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, read_data

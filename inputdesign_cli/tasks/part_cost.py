@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.campaign import REACHED, Planned
 
 

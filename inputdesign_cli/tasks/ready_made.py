@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import SignalCurves, SpectrumCurves
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError

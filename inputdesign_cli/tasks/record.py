@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weights_of
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import (

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.question import Alternative
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.regression import (
     OutOfReachError,
@@ -20,7 +21,6 @@ from inputdesign_cli.design.regression import (
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves, MomentsCurves
 from inputdesign_cli.runs.results import Results, Table
 from inputdesign_cli.tasks.regressors import RegressorRecord, RegressorSettings, realise_regressors

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import delayed_regressors, free_regressors, periodic_input, rank
 from inputdesign_cli.signal.moments import Start
 from inputdesign_cli.tasks.result.plain_signal import signal_entry

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.design.response import (
@@ -22,7 +23,6 @@ from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.response import ResponseStudy, study_response
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit_response import audit_response

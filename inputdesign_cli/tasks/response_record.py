@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     Bounds,
     Lines,

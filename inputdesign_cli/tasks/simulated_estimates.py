@@ -9,12 +9,12 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage, largest_error
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Excitation, Reapplied, Recorded
 from inputdesign_cli.monte_carlo.study import Study, tried_on_truth
-from inputdesign_cli.plant.polynomial import Array
 
 # Streams that no `simulation.seed` of a spec begins.
 _TO_CORRECT, _TO_CHECK = 2**60, 2**60 + 1

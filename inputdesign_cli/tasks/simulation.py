@@ -14,6 +14,7 @@ from math import inf
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.design.convex.cost import Weight
@@ -23,7 +24,6 @@ from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redraw
 from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_truth
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.plant import Loop, Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import BoundCurves, Curves
 from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Units

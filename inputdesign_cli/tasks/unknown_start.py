@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import information_begun_anywhere
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.record import worst_ratio
 

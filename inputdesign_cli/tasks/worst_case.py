@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.question import Alternative, Question
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.region import Region
 from inputdesign_cli.tasks.robust import Batch, Kept, Plants, Searched, delivered_samples, kept_by, tried_on

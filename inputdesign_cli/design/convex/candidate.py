@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.plant.polynomial import Array
 
 Place = tuple[int, float | None]
 

@@ -26,10 +26,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.gradients import weighty_ones
 from inputdesign_cli.design.convex.master import Proof, Row
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Functional, weighted_mean
 
 # Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs

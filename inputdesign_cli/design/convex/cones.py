@@ -11,8 +11,8 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.entries import Entries, Stack
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import smat, svec
 
 

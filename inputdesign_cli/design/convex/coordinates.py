@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.candidate import least_scale
 from inputdesign_cli.design.convex.limits import implied_power
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.white import least_white_power, suffices
 from inputdesign_cli.information import Experiment, jointly_whitened
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import LinesBasis, flat_basis
 
 _EVEN = 1e-9

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.accuracy import ConcaveFunction, Inequality
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cones import Orthant, Semidefinite, furthest, reach
 from inputdesign_cli.design.convex.entries import Entries, Stack
-from inputdesign_cli.plant.polynomial import Array
 
 
 class Concave(Orthant):

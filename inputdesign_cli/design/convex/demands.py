@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, inverse_factor, worst
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, joint_noise
-from inputdesign_cli.plant.polynomial import Array
 
 RequirementFactory = Callable[[Experiment], Requirement]
 # So many scenarios are enough for a next step: what serves the worst few serves most of the others.

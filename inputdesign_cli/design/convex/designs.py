@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
 from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate
@@ -20,7 +21,6 @@ from inputdesign_cli.design.convex.faint_lines import without_faint_lines
 from inputdesign_cli.design.convex.limited import KEEPS, solve_limited
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 
 _ANY_SPECTRUM_TOLERANCE = 1e-6

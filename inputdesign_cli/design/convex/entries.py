@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.spectrum import svec_layout
 
 Stack = NDArray[np.float64]  # matrices (number, d, d)

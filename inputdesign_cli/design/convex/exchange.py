@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.compute.watching import Round, tell
 from inputdesign_cli.design.convex.candidate import Place
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.state import State, first_state
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
 
 MAX_ROUNDS = 60

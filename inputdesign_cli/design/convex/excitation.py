@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InfeasibleError, bad_spec
-from inputdesign_cli.plant.polynomial import Array
 
 _UNEXCITED = 1e-13
 _PLENTY = 1e9

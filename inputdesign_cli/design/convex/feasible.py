@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.candidate import least_scale, missing_floor, scaled_up
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InaccurateError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
 
 _TOLERANCE = 1e-6

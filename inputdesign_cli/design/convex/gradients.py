@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, WeightedProducts
 from inputdesign_cli.plant import common_grid, graded_grid
-from inputdesign_cli.plant.polynomial import Array
 
 
 def weighty_ones(weights: NDArray[np.float64]) -> list[int]:

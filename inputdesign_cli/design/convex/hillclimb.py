@@ -18,8 +18,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
-from inputdesign_cli.plant.polynomial import Array
 
 CriterionName = Literal["D", "A", "E", "T"]
 _MAX_STEPS = 100

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.cones import Cone
-from inputdesign_cli.plant.polynomial import Array
 
 _MOST_ITERATIONS = 100
 _NEAREST, _FURTHEST = 0.9, 0.09  # of the way to the edge of the cones

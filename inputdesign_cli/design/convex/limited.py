@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
 from inputdesign_cli.design.convex.candidate import Place, candidate_at, excess, scaled_up
 from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError, exchange
 from inputdesign_cli.design.convex.feasible import strictly_feasible
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.plant.polynomial import Array
 
 KEEPS = 1e-9
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, positive_part
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.candidate import Candidate
 from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, solve_program
 from inputdesign_cli.design.convex.limits import DensityPlace
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
 
 # The conic program is solved this much tighter than the gap that is asked for.

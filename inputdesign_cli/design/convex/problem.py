@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.gradients import Gradients, weighty_ones
@@ -31,7 +32,6 @@ from inputdesign_cli.design.convex.limits import (
 )
 from inputdesign_cli.information import Experiment, PowerKind, joint_information, mean_cost
 from inputdesign_cli.plant import local_maxima
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
 
 Goal = Literal["cost", "factor", "samples"]

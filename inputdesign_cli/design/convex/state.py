@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inputdesign_cli.accuracy import Cut, Violation
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.candidate import (
     Candidate,
     Place,
@@ -23,7 +24,6 @@ from inputdesign_cli.design.convex.limits import DensityBreach
 from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.rows import alike, density_row, first_density_rows, on_basis, power_rows
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Face
 
 # A far-off iterate is not worth repairing: its upper bound would say nothing.

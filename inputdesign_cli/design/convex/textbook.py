@@ -16,12 +16,12 @@ from typing import Literal
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.master import Implied, Proof
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InaccurateError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec
 
 

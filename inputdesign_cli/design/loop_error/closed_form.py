@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error.weight import adjoint
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
 def eigen(matrix: ComplexArray) -> tuple[Array, ComplexArray]:

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import time_is_over
 from inputdesign_cli.design.loop_error.closed_form import error_of
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
@@ -14,7 +15,6 @@ from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0

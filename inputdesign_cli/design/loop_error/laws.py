@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error.checks import (
     check_circle,
     check_minimum_variance,
@@ -21,7 +22,7 @@ from inputdesign_cli.design.loop_error.checks import (
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z, unit_circle
+from inputdesign_cli.plant.polynomial import join_roots, roots_in_z, unit_circle
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix, product_of
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error.closed_form import eigen, error_of, power_of
 from inputdesign_cli.design.loop_error.weight import adjoint
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _MAX_STEPS = 200
 _SETTLED = 1e-13

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
-from inputdesign_cli.plant.polynomial import Array
 
 _REACH = 90.0
 _STEP = 0.02

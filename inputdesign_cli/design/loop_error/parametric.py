@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.frequencies import local_maxima
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _MAX_ROUNDS = 25
 _START = 24

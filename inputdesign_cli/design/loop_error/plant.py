@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, roots_in_z
+from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, stack
 from inputdesign_cli.plant.polynomial_model import PolynomialModel
 from inputdesign_cli.plant.transfer import product_of

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error.closed_form import best_spectrum, power_of
 from inputdesign_cli.design.loop_error.laws import ControlLaw, kronecker, propagation, sensitivity
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
@@ -19,7 +20,6 @@ from inputdesign_cli.design.loop_error.weight import adjoint, weight as weight_f
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import graded_grid, logarithmic_distance
 from inputdesign_cli.plant.model import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import Rational
 
 _SETTLED = 1e-11

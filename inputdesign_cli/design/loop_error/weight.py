@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import ComplexArray
 from inputdesign_cli.design.loop_error.laws import kronecker
-from inputdesign_cli.plant.polynomial import ComplexArray
 
 
 def adjoint(matrix: ComplexArray) -> ComplexArray:

@@ -13,11 +13,11 @@ from itertools import count
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound
 from inputdesign_cli.design.regression.limits import box_limits
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
-from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(order=True)

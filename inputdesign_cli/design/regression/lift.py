@@ -24,9 +24,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import positive_part
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import smat, svec, svec_length
 from inputdesign_cli.spectrum.svec import svec_layout
 

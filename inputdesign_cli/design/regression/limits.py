@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.regression.lift import Box, Scaling
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
-from inputdesign_cli.plant.polynomial import Array
 
 SMALLEST_EIGENVALUE = 1e-6
 """Assumed of R11 / r_0 where nothing better is known: for m >= 3 in boxes with singular R11."""

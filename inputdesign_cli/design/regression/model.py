@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 # Below this fraction of the largest eigenvalue a direction of R11 counts as not excited.
 _RANK = 1e-12

@@ -12,12 +12,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.regression.local import Counter, Goal, descend
 from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.design.regression.steps import line_shapes
 from inputdesign_cli.design.regression.structured import Normalisation
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
-from inputdesign_cli.plant.polynomial import Array
 
 _EXACT = 1e-10
 _ALL_LINES = 400  # up to this many lines all of them take part

@@ -13,9 +13,9 @@ import scipy
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec
 
 _TOLERANCE = 1e-10

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import finishing, seconds_left
 from inputdesign_cli.design.regression.alternating import alternate
 from inputdesign_cli.design.regression.branch import BranchAndBound
@@ -16,7 +17,6 @@ from inputdesign_cli.design.regression.local import Counter, Goal, best, descend
 from inputdesign_cli.design.regression.model import ErrorSplit, Regression
 from inputdesign_cli.design.regression.steps import Region, all_shapes, extend
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
-from inputdesign_cli.plant.polynomial import Array
 
 _STEP_TOLERANCE = 1e-10
 _NODES = {1: 400, 2: 400, 3: 400}

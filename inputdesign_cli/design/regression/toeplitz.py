@@ -17,8 +17,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.regression.model import Regression
-from inputdesign_cli.plant.polynomial import Array
 
 # As in `Regression.error`: directions of P11 that count as not excited, and how much of L1 may lie there.
 _RANK = 1e-12

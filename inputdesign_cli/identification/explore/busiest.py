@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import Parts
-from inputdesign_cli.plant.polynomial import Array
 
 
 def busiest(parts: Parts, most: int) -> list[tuple[Array, Array]]:

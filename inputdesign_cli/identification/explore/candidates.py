@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.orders import Orders
 from inputdesign_cli.identification.explore.processes import Process
 from inputdesign_cli.identification.explore.regression import delay_ranges
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 # An error of simulation that is larger by less than this share, and by no more points, is as good.
 _AS_GOOD, _POINTS = 1.2, 2.0

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.explore.fits import Parts, output_error_form, simulate_free
 from inputdesign_cli.identification.explore.one_line import strongest, wave
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # A mode that loses more than this, in nepers, over the record is no cycle, nor is less than half a turn.
 _DECAYS, _LEAST_TURN = 3.0, np.pi

@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.regression import LONG
-from inputdesign_cli.plant.polynomial import Array
 
 Cut = Literal[
     "the first 60 % and the rest",

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.explore.fits import Parts, output_error_form
 from inputdesign_cli.identification.explore.integrated import like_random_walks
 from inputdesign_cli.identification.explore.joint import Found, criterion, explored
 from inputdesign_cli.identification.explore.moving import moving_in
 from inputdesign_cli.identification.explore.regression import best_delays, output_error
-from inputdesign_cli.plant.polynomial import Array
 
 _ORDERS, _ROUNDS, _MOST_DELAY = (1, 2, 3, 4, 5), 3, 150
 # Of longer records means over stretches tell a slope as well: a line is slow.

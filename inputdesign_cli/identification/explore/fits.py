@@ -16,11 +16,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametrised, SampledModel
-from inputdesign_cli.plant.polynomial import Array
 
 Parts = Sequence[tuple[Array, Array]]
 NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgError)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 # Fewer values that are held tell nothing; an input that moves at a smaller share of them is held longer.
 _FEWEST, _MOVES = 40, 1.0 / 3.0

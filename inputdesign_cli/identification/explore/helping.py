@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import output_error_form
 from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.identification.explore.one_line import MOSTLY, cycle, is_held
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 _LAGS, _PER_LAG = 20, 12
 _CERTAIN = 1e-3

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 _FAINT = 1e-9
 # The past of another input that an input may follow, and samples to a regressor, at least.

@@ -11,10 +11,10 @@ from functools import singledispatch
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametrised, SampledModel
-from inputdesign_cli.plant.polynomial import Array
 
 _ONE = (np.ones(1),)
 _LAGS, _PER_LAG = 5, 12

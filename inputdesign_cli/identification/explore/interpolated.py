@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 # A line goes on where its rise changes by less than this share of the usual rise.
 _STRAIGHT = 1e-6

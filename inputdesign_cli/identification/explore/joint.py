@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.estimate import Estimate
@@ -31,7 +32,6 @@ from inputdesign_cli.identification.explore.orders import NOISE_ORDERS
 from inputdesign_cli.identification.explore.search import explore_structure
 from inputdesign_cli.identification.explore.together import joined
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 _MOST_SAMPLES = 20_000
 _TOO_SIMPLE = "the input moves too little or too simply: apply steps of several lengths, or a PRBS"

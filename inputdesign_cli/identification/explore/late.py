@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.identification.explore.regression import SharedDenominator, output_error
 from inputdesign_cli.identification.late_inputs import behind
-from inputdesign_cli.plant.polynomial import Array
 
 _ORDER = 20
 # The probability of a correlation as large by chance, at all lags together.

@@ -8,9 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
 from inputdesign_cli.identification.frequency_response import REPEATS, found_period
-from inputdesign_cli.plant.polynomial import Array
 
 # How far back a controller looks; what rounding of its output may leave of the power of an input.
 _CONTROLLER, _NOTHING = 6, 1e-6

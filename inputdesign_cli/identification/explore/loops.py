@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.held import of_moves
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
@@ -25,7 +26,6 @@ from inputdesign_cli.identification.explore.laws import (
 )
 from inputdesign_cli.identification.explore.relays import told_by_levels
 from inputdesign_cli.identification.explore.switched import switched_by
-from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
 _CERTAIN = 1e-4

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.checks import check_varying
 from inputdesign_cli.identification.explore.fits import Parts
-from inputdesign_cli.plant.polynomial import Array
 
 _FEWEST = 30
 _UNKNOWN = ("gain and dynamics",)

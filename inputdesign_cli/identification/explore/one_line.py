@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.inputs import left_over, past, untold
-from inputdesign_cli.plant.polynomial import Array
 
 # The share of the power of an input from which it is a sinusoid, mostly, and the level at which what is left
 # of the input moves what is left of the output.

@@ -7,12 +7,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.regression import SharedDenominator
 from inputdesign_cli.identification.records import longest
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.plant.polynomial import Array
 
 NOISE_ORDERS = (1, 2)
 """Those of C and D that are tried."""

@@ -12,6 +12,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.orders import NOISE_ORDERS
@@ -25,7 +26,6 @@ from inputdesign_cli.plant import (
     Words,
 )
 from inputdesign_cli.plant.model import DELAY, Parameter
-from inputdesign_cli.plant.polynomial import Array
 
 _NAMES = {1: "FOPDT", 2: "SOPDT", 3: "TOPDT"}
 # Numerators and denominators in s by their parameters, descending.

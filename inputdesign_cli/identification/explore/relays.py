@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 # Of fewer phases of a state nothing is told; neighbours in time are compared, so that slow drifts of both
 # signals, which agree by chance, do not count.

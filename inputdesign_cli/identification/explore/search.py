@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
@@ -54,7 +55,6 @@ from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 
 _MOST_SAMPLES = 4000
 _HIGHEST, _HIGHEST_ARX = 5, 8

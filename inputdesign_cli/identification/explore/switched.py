@@ -16,10 +16,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.inputs import past, untold
 from inputdesign_cli.identification.frequency_response import found_period
-from inputdesign_cli.plant.polynomial import Array
 
 _LAGS = 20
 # Of longer records the stretch in which the inputs move most is enough.

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.inputs import past
-from inputdesign_cli.plant.polynomial import Array
 
 _HIGHEST = 5
 # So many standard deviations beyond the circle, and steps of one by which it is told how a pole moves.

@@ -10,12 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.signal import DesignedSpectrum
 from inputdesign_cli.specification import Spec, parse_spec

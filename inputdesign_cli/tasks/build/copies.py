@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Location
-from inputdesign_cli.plant.polynomial import Array
 
 # So many rows that follow each other, half of them different, come again in another record by copying only.
 _IN_A_ROW = 8

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.identification import resolution_of
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification.models.units import SECONDS

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 
 _PARTS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 # Counts of these years: those of one part are none of another, and in seconds they would be millennia away.

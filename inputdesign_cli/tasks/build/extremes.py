@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.files import Sheet
 
 # Squares of signals are powers, and a spec has none beyond the square of this, or below that of its inverse.

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.tasks.build import rows
 from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of

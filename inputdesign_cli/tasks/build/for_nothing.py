@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid, local_maxima
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import matrices
 
 Counted = tuple[PowerKind, int | None, float]

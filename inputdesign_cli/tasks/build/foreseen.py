@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.parameter_draws import reach
 from inputdesign_cli.tasks.build.system import build_experiment

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum

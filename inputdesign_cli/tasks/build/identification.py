@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.accuracy.calibration import with_alpha
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.controllers import controller_matrix

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
 from inputdesign_cli.tasks.build.header import build_units

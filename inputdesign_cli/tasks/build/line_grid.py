@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.harmonic_grid import (
     HarmonicGrid,
     TooFewHarmonicsError,

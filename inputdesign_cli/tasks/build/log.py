@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.column_hints import columns_hint
 from inputdesign_cli.tasks.build.columns import (
     counted_unit,

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.design.loop_error import MatrixPlant
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model, PolynomialModel
-from inputdesign_cli.plant.polynomial import Array, Rows, join_roots, roots_in_z
+from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant
 from inputdesign_cli.specification.transfer_of_states import transfer_functions

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
 from inputdesign_cli.tasks.build.model_error import confidence_factor

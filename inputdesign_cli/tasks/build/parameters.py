@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array, Rows
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.tasks.build.parameters import embedded
 

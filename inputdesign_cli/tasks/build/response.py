@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.response import Goal, ResponseLines
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import GivenMultisine

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Location
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.column_hints import called, columns_option, rising
 from inputdesign_cli.tasks.build.columns import (
     NO_TIMES,

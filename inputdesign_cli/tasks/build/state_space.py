@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import Matrices, StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.plant import StateSpacePlant
 

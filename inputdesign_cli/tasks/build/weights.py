@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import ComplexArray
 from inputdesign_cli.plant import ContinuousRational, Rational, ScalarTransfer, zero_order_hold
-from inputdesign_cli.plant.polynomial import ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
 from inputdesign_cli.tasks.build.header import build_units

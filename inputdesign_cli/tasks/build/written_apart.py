@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.preparation import MOST_JITTER, SHORTEST
 from inputdesign_cli.tasks.build.signals import Signals
 

@@ -6,6 +6,7 @@ import copy
 from collections.abc import Sequence
 from functools import singledispatch
 
+from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -15,7 +16,6 @@ from inputdesign_cli.plant import (
     SampledModel,
     StateSpaceModel,
 )
-from inputdesign_cli.plant.polynomial import Array, Rows
 from inputdesign_cli.plant.reparametrised import Place
 from inputdesign_cli.runs.results import Json
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import BoundCurves, BoundPanel
 from inputdesign_cli.runs.objectives import WHITE
 from inputdesign_cli.runs.results import Table

@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.cost import Weight, paid_for, weighted_sum
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Ellipse, EllipseCurves
 
 _PAIRS = 6

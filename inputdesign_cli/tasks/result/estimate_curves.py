@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError, model_errors
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.curves import FanCurves
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.tasks.result.design import Designed

@@ -13,8 +13,8 @@ import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError, model_errors
 from inputdesign_cli.accuracy.requirement import Requirement
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.question import Alternative
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 
 _LISTED = 12

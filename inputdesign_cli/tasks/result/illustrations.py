@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.objectives import white_labels
 from inputdesign_cli.runs.results import Result, Table

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore import Found
 from inputdesign_cli.identification.explore.fits import NOT_COMPUTED
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.system import build_model
 

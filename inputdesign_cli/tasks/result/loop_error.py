@@ -8,12 +8,12 @@ from typing import Literal
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.curves import Curves, DirectionCurves, SpectrumCurves
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Header

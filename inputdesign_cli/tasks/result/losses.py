@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.monte_carlo.loop_error import LossStudy
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves, LossCurves
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.tasks.result.loop_error import Entry, theory_entry

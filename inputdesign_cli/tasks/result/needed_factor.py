@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.plant.polynomial import Array
 
 _TOLERANCE = 1e-6
 _STEPS = 30

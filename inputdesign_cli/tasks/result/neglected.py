@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Directed, Estimate, Moves, that_matter
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.refutations import REMEDY, chance

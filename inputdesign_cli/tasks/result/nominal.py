@@ -9,9 +9,9 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 

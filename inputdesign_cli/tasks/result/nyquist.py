@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.curves import Curves, NyquistCurves
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units

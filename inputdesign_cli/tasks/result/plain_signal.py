@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.runs.curves import SignalCurves
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import PredictedPanel
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.record import RecordRequest, worst_ratio

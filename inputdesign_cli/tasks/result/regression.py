@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.regression import (
     ErrorSplit,
     Regression,
@@ -17,7 +18,6 @@ from inputdesign_cli.design.regression import (
     least_energy,
 )
 from inputdesign_cli.monte_carlo.regression import Estimates
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import ErrorCurves
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.result.status import proof_status

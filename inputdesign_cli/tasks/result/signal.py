@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import SignalCurves
 from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.signal_files import WRITERS

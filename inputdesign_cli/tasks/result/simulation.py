@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
 from inputdesign_cli.monte_carlo.study import Study, Tried
 from inputdesign_cli.monte_carlo.trials import PredictedError
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.simulation_curves import QUANTILES

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
 from inputdesign_cli.plant import Loop
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import CloudCurves, ErrorBandCurves, ErrorBandPanel, SignalCurves
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units

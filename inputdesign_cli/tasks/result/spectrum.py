@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import OptimalityCurves, SpectrumCurves
 from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units

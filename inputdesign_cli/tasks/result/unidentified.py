@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.explore import Found, left_of_inputs, one_line, order_of_excitation
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.processes import LONGER
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.result.rivals import most_apart
 from inputdesign_cli.tasks.result.unrelated import chance_of_response, driving_nothing
 

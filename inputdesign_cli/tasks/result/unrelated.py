@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.explore import answers_output, early_answers
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.result.refutations import chance
