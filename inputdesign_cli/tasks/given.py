@@ -20,7 +20,7 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, P
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.objectives import white_labels
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.results import Json, Results, Table, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
@@ -198,7 +198,7 @@ class GivenTask:
         if notes:
             result["notes"] = notes
         result["timing_s"] = {"analysis": time.perf_counter() - started}
-        results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        results = Results(typed(result), self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, confidence.alpha)
         renewed, seen = self._renewed(len(record.samples)), self.foresight

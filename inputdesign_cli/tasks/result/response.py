@@ -17,7 +17,7 @@ from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.monte_carlo.response import ResponseStudy
 from inputdesign_cli.runs.curves import DeviationCurves, DeviationPanel, SpectrumCurves
-from inputdesign_cli.runs.results import Array, Json, Results, Table
+from inputdesign_cli.runs.results import Array, Json, Results, Table, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
@@ -179,7 +179,7 @@ def response_results(
     for i in range(units.outputs):
         deviations[f"noise_spectrum{'' if units.outputs == 1 else f'_{i + 1}'}"] = terms.lines.noise[:, i]
     return Results(
-        result,
+        typed(result),
         terms.header.resolved_spec,
         units.time_unit,
         {"deviations": Table(deviations), "spectrum": Table(spectrum), **signals},
@@ -271,7 +271,7 @@ def study_results(
     timing = {**results.result["timing_s"], "simulation": time.perf_counter() - begun}
     return replace(
         results,
-        result={**results.result, "simulation": told, "timing_s": timing},
+        outcome=typed({**results.result, "simulation": told, "timing_s": timing}),
         tables={**results.tables, "deviations": Table(columns)},
         curves={**results.curves, "deviations": curves},
     )
