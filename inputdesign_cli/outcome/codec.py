@@ -38,7 +38,7 @@ def write_plain(value: object) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         plain: dict[str, object] = {}
         for field in dataclasses.fields(value):
-            content = getattr(value, field.name)
+            content = vars(value)[field.name]
             if "others" in field.metadata:
                 plain |= {key: write_plain(item) for key, item in content.items()}
             elif content is not None or "null" in field.metadata:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Self
 
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.outcome.assessment import Assessment
@@ -71,3 +72,11 @@ class Outcome:
     notes: tuple[str, ...] | None = None
     timing_s: Mapping[str, float] | None = None
     provenance: Mapping[str, object] = others()
+
+    def saying(self, findings: Iterable[Finding]) -> Self:
+        """Return the same outcome with further findings and their notes."""
+        more = tuple(findings)
+        if not more:
+            return self
+        messages = tuple(one.message for one in more)
+        return replace(self, findings=(*(self.findings or ()), *more), notes=(*(self.notes or ()), *messages))

@@ -8,8 +8,10 @@ import sys
 from pathlib import Path
 
 # They differ from run to run, from machine to machine, or are sentences, of which the wording is free.
-PASSED_OVER = {"timing_s", "environment", "spec_sha256", "signal_sha256", "asked_sha256", "made_from", "files",
-               "notes", "findings", "undecided", "reasons", "steps", "why", "message", "caveat", "no_top_up"}  # fmt: skip
+PASSED_OVER = {
+    *("timing_s", "environment", "spec_sha256", "signal_sha256", "asked_sha256", "made_from", "files"),
+    *("notes", "findings", "undecided", "reasons", "steps", "why", "message", "caveat", "no_top_up"),
+}
 LONGEST = 12
 
 
@@ -28,8 +30,6 @@ def condensed(value):
 
 
 if __name__ == "__main__":
-    found = {
-        path.parent.name: condensed(json.loads(path.read_text()))
-        for path in sorted(Path(sys.argv[1]).glob("*/result.json"))
-    }
+    results = sorted(Path(sys.argv[1]).glob("*/result.json"))
+    found = {path.parent.name: condensed(json.loads(path.read_text())) for path in results}
     Path(sys.argv[2]).write_text(json.dumps(found, indent=0, sort_keys=True))
