@@ -19,6 +19,7 @@ ORDER = [
     {"outcome"},
     {"runs"},
     {"monte_carlo"},
+    {"findings"},
     {"tasks"},
     {"sweep", "campaign", "figures", "wizard"},
     {"report"},

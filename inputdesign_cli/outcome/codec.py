@@ -98,6 +98,8 @@ def _read(kind: Any, data: Any, where: str) -> Any:
 
 
 def _read_object(kind: Any, data: Any, where: str) -> Any:
+    if isinstance(data, kind):
+        return data
     content = _mapping(data, where)
     known = {field.name for field, _ in _fields(kind)}
     given: dict[str, Any] = {}
