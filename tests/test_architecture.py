@@ -17,18 +17,18 @@ ORDER = [
     {"spectrum", "information", "accuracy"},
     {"design", "signal", "identification"},
     {"outcome"},
-    {"runs"},
     {"monte_carlo"},
     {"findings"},
     {"tasks"},
-    {"sweep", "campaign", "figures", "wizard"},
+    {"questions"},
+    {"sweep", "figures", "wizard"},
     {"report"},
     {"live"},
     {"cli", "__main__"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
 MATHEMATICS = {"plant", "spectrum", "information", "accuracy", "design", "signal", "identification"}
-FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("specification", "runs")} | {
+FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("specification", "outcome")} | {
     ("specification", "plant"),
     ("monte_carlo", "specification"),
 }
@@ -142,12 +142,19 @@ def test_no_two_files_need_each_other():
 # Who may know the spec: those that read or write it, those that turn it into objects or hand it to those, and
 # the page of a report that restates it in words.
 SPEC_ROOMS = {"specification", "sweep", "wizard", "cli"}
-SPEC_FILES = {"tasks/__init__.py", "report/question.py"}
+SPEC_FILES = {"questions/__init__.py", "questions/task.py", "report/question.py"}
 
 
 def knows_the_spec(path: Path) -> bool:
     inside = path.relative_to(ROOT).as_posix()
-    return room_of(path) in SPEC_ROOMS or inside in SPEC_FILES or inside.startswith("tasks/build/")
+    return room_of(path) in SPEC_ROOMS or inside in SPEC_FILES or builds(path)
+
+
+def builds(path: Path) -> bool:
+    """Whether a file turns parts of a spec into objects: `building/`, and `build*.py` of a question."""
+    inside = path.relative_to(ROOT).as_posix()
+    of_question = inside.startswith("questions/") and path.name.startswith("build")
+    return of_question or inside.startswith(("questions/building/", "tasks/build/"))
 
 
 def named_in(annotation: ast.expr | None) -> set[str]:
@@ -187,7 +194,7 @@ def test_uses_of_the_spec_are_found():
 
 
 def test_the_spec_becomes_objects_once():
-    """After `tasks/build` nothing takes a spec: it holds what the builders made of it."""
+    """After the builders nothing takes a spec: it holds what they made of it."""
     assert offenders(lambda path: not knows_the_spec(path) and uses_of_the_spec(tree_of(path))) == {}
 
 
@@ -238,7 +245,7 @@ def test_only_builders_match_kinds():
         patterns = (n for n in ast.walk(tree_of(path)) if isinstance(n, ast.MatchClass))
         return [ast.unparse(pattern) for pattern in patterns if named_in(pattern.cls) & own_kinds()]
 
-    assert [name for name in offenders(matched) if not name.startswith("tasks/build/")] == []
+    assert [name for name in offenders(matched) if not builds(ROOT / name)] == []
 
 
 def test_no_attribute_goes_by_a_computed_name():
@@ -258,10 +265,10 @@ def test_types_are_hardly_ignored():
 
 
 def test_results_are_plain_data():
-    assert imported_rooms(ROOT / "runs" / "curves.py") == set()
-    taken = {module for module, _ in imports(ROOT / "runs" / "results.py")}
+    assert imported_rooms(ROOT / "outcome" / "curves.py") == set()
+    taken = {module for module, _ in imports(ROOT / "outcome" / "results.py")}
     assert {module for module in taken if module.startswith("inputdesign_cli")} == {
-        "inputdesign_cli.runs.curves",
+        "inputdesign_cli.outcome.curves",
         "inputdesign_cli.outcome",
     }
 
