@@ -44,6 +44,16 @@ def loss_results(
     return found, {"loss": LossCurves(losses, means)} if losses else {}
 
 
+def unstable_notes(studies: Mapping[str, LossStudy], runs: int) -> list[str]:
+    """Say for each input how many controllers made the true loop unstable."""
+    return [
+        f"simulation: with the input {name}, {study.unstable} of {runs} controllers made the true loop unstable. "
+        "Their losses are infinite; the means are those of the other runs"
+        for name, study in studies.items()
+        if study.unstable
+    ]
+
+
 def _entry(theory: LossTheory, study: LossStudy, information: Array) -> Entry:
     entry: Entry = {
         "theory": theory_entry(theory),
