@@ -32,7 +32,7 @@ from inputdesign_cli.tasks.record import Made, RecordRequest, designed_spectrum,
 from inputdesign_cli.tasks.record_search import fitting_record, samples_of_record
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs
-from inputdesign_cli.tasks.result.illustrations import illustrations
+from inputdesign_cli.tasks.result.illustrations import illustrations, illustrations_of_length
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.reach import Reach
 from inputdesign_cli.tasks.result.record_notes import record_notes, shortfall
@@ -182,7 +182,8 @@ class ConvexTask:
         renewed = redrawn(made.request, made.design, inputs, samples)
         seen, asked = self.foresight, done.problem.requirements
         tried = None if seen is None else partial(seen.tried, record.samples, asked)
-        return Delivered(results, record.samples, renewed, done.confidence.alpha, tried)
+        of_length = partial(illustrations_of_length, units, done, self.unstated, self.ellipses)
+        return Delivered(results, record.samples, renewed, done.confidence.alpha, of_length, tried)
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.

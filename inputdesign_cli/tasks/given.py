@@ -32,6 +32,7 @@ from inputdesign_cli.tasks.result.design import information_entry, requirements_
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
 from inputdesign_cli.tasks.result.nyquist import nyquist_curves
+from inputdesign_cli.tasks.result.of_length import curves_of_length
 from inputdesign_cli.tasks.result.record_notes import record_notes
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
@@ -203,7 +204,17 @@ class GivenTask:
             return Delivered(results, None, None, confidence.alpha)
         renewed, seen = self._renewed(len(record.samples)), self.foresight
         tried = None if seen is None else partial(seen.tried, record.samples, requirements)
-        return Delivered(results, record.samples, renewed, confidence.alpha, tried)
+        of_length = partial(
+            curves_of_length,
+            units,
+            experiment,
+            information,
+            white,
+            stated or unstated,
+            stated=bool(stated),
+            ellipses=self.ellipses,
+        )
+        return Delivered(results, record.samples, renewed, confidence.alpha, of_length, tried)
 
     def _result(
         self,

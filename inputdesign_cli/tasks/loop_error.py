@@ -64,7 +64,7 @@ class LoopErrorTask:
         _check_simulated(self.problem, trial.problem)
         design, results = self._solved()
         begun = time.perf_counter()
-        samples = self.terms.samples
+        samples = self.signal.samples
         inputs = {"design": design_lines(design, samples)}
         if trial.white:
             inputs["white"] = white_lines(design, samples)

@@ -1,4 +1,4 @@
-"""Controllers designed on simulated estimates: zeros outside the circle, other true plants, unstable loops."""
+"""Controllers designed on simulated estimates: zeros outside the circle, unstable loops, lengths."""
 
 import pytest
 
@@ -46,8 +46,18 @@ def test_unstable_loops_are_said():
 
 
 def test_a_true_plant_that_the_law_cannot_control_is_refused():
-    law = "accuracy.closed_loop_error.control={model_reference: {numerator: [0, 0.4], denominator: [1, -0.6]}}"
+    law = (
+        "accuracy.closed_loop_error.control={model_reference: {numerator: [0, 0.4], denominator: [1, -0.6]}}"
+    )
     with pytest.raises(SpecError) as caught:
         simulated(law, "plant.B=[0, 1]", "simulation.plant={A: [1, -0.8], B: [0, 1, -1.5]}")
     (found,) = caught.value.diagnostics
     assert (found.code, found.key) == ("non-minimum-phase", "simulation.plant")
+
+
+def test_records_are_as_long_as_the_signal():
+    """A design without a length counts per sample; the signal has one."""
+    long, found = simulated(), simulated("experiment=null", "signal.samples=1000")
+    assert (found["samples"], found["simulation"]["samples"]) == (1, 1000)
+    for name, entry in found["simulation"]["inputs"].items():
+        assert entry["loss"] == long["simulation"]["inputs"][name]["loss"]

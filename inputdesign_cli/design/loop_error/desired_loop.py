@@ -41,7 +41,7 @@ class DesiredLoop:
         return self.free.scaled(self.kept)
 
     def mirrored(self, determinants: Array) -> Array:
-        """Polynomials (runs, l) with b = determinant / polynomial, the determinants (runs, l) those of models.
+        """Polynomials m (runs, l) with b = determinant / m for the determinants (runs, l) of models.
 
         Zeros outside the circle are mirrored into it, and the value at frequency zero stays.
         """

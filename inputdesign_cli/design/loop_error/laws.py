@@ -1,10 +1,10 @@
 """Control laws whose response at a frequency depends on the plant at that frequency only.
 
 All have the form C = G^-1 X with X free of G at that frequency, so that Delta C = -G^-1 Delta G C,
-[rojas-asymptotic] Section VII. X may depend on a few numbers that all frequencies determine together, as zeros
-outside the circle are. Their variance stays bounded as the model order grows, so the asymptotic covariance
-holds them; `loop_gradient` is their part in the exact covariance of a model structure. Arrays are (K, n, n) over
-K frequencies; vec stacks columns.
+[rojas-asymptotic] Section VII. X may depend on a few numbers that all frequencies determine together, such as
+zeros outside the circle. Their variance stays bounded as the model order grows, so the asymptotic covariance
+leaves it out. The exact covariance of a model structure includes it, by `loop_gradient`. Arrays are (K, n, n)
+over K frequencies; vec stacks columns.
 """
 
 from __future__ import annotations

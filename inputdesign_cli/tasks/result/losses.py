@@ -47,8 +47,8 @@ def loss_results(
 def unstable_notes(studies: Mapping[str, LossStudy], runs: int) -> list[str]:
     """Say for each input how many controllers made the true loop unstable."""
     return [
-        f"simulation: with the input {name}, {study.unstable} of {runs} controllers made the true loop unstable. "
-        "Their losses are infinite; the means are those of the other runs"
+        f"simulation: with the input {name}, {study.unstable} of {runs} controllers made the true loop "
+        "unstable. Their losses are infinite; the means are those of the other runs"
         for name, study in studies.items()
         if study.unstable
     ]
