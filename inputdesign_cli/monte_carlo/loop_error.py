@@ -1,4 +1,4 @@
-"""Monte Carlo of a controller designed on an identified model: what the loop loses, input by input.
+"""Monte Carlo study of a controller designed on an identified model: losses of the loop for each input.
 
 Each run identifies an ARX model by least squares, designs the model-reference (or internal-model)
 controller on it, and compares the true loop with the one that the true plant would have given. The difference
@@ -35,7 +35,7 @@ _LONGEST_GRID = 2**16
 
 @dataclass(frozen=True)
 class LossStudy:
-    """What the runs lost with one input.
+    """Losses of the closed loop over all runs with one input.
 
     Attributes:
         loss: (runs,) square root of the sum over the simulated samples of |y - y0|^2.
@@ -54,7 +54,7 @@ class LossStudy:
 
 @dataclass(frozen=True)
 class _Trial:
-    """What all batches share; `roots` are those of the spectrum of each input, see `dense_roots`."""
+    """What all batches share; `roots` belong to the spectrum of each input, see `dense_roots`."""
 
     problem: LoopErrorProblem
     desired: DesiredLoop

@@ -20,7 +20,7 @@ class DesiredLoop:
     A controller can have b only from the model, so b errs with the model.
 
     Attributes:
-        outside: the zeros in z that b keeps; None where the law keeps none, and b is one.
+        outside: the zeros in z that b keeps. None stands for a law that keeps no zeros, so that b is one.
     """
 
     free: TransferMatrix
@@ -33,7 +33,7 @@ class DesiredLoop:
             return Rational(np.ones(1))
         above = np.poly(self.outside).real
         below = np.poly(1 / np.conj(self.outside)).real
-        return Rational(np.sum(below) / np.sum(above) * above, (below,))
+        return Rational(np.sum(below) / np.sum(above) * above, (np.asarray(below, dtype=float),))
 
     @cached_property
     def whole(self) -> TransferMatrix:
@@ -58,7 +58,7 @@ class DesiredLoop:
         return found
 
     def gradient(self, logarithmic: Array, rule: Quadrature) -> ComplexArray | None:
-        """dT (K, k, n, n) at the nodes, as b errs with the model; None where the law keeps no zero.
+        """dT (K, k, n, n) at the nodes, as b errs with the model. None if b is one.
 
         A zero z_i that moves by dz_i adds -dz_i / (z - z_i) to d log det G, its only poles outside the
         circle. With P their sum, d log b = 2j Im P on the circle.

@@ -1,10 +1,10 @@
 """Control laws whose response at a frequency depends on the plant at that frequency only.
 
 All have the form C = G^-1 X with X free of G at that frequency, so that Delta C = -G^-1 Delta G C,
-[rojas-asymptotic] Section VII. X may depend on a few numbers that all frequencies determine together, such as
-zeros outside the circle. Their variance stays bounded as the model order grows, so the asymptotic covariance
-leaves it out. The exact covariance of a model structure includes it, by `loop_gradient`. Arrays are (K, n, n)
-over K frequencies; vec stacks columns.
+[rojas-asymptotic] Section VII. X may depend on a few numbers that all frequencies determine together: the
+zeros outside the circle, or the first terms of H. Their variance stays bounded as the model order grows, so
+the asymptotic covariance leaves it out. The exact covariance of a model structure includes it, by
+`loop_gradient`. Arrays are (K, n, n) over K frequencies; vec stacks columns.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class ControlLaw(Protocol):
 
     @property
     def desired(self) -> DesiredLoop | None:
-        """T where it is stated, but for the zeros it keeps; None where it follows from the noise."""
+        """T, and the zeros that it keeps. None if T follows from the noise."""
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
         """T = G C (I + G C)^-1, the loop that the true plant would give."""
@@ -46,12 +46,12 @@ class ControlLaw(Protocol):
         """C(G)."""
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
-        """d vec C / d vec H: (K, n^2, n^2); None where C ignores the noise model."""
+        """d vec C / d vec H: (K, n^2, n^2). None if C ignores the noise model."""
 
     def loop_gradient(
         self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
     ) -> ComplexArray | None:
-        """dT (K, k, n, n) at the nodes as the parameters of the model move; None where T is fixed.
+        """dT (K, k, n, n) at the nodes as the parameters of the model move. None if T is fixed.
 
         Args:
             logarithmic: (K, k), tr(G^-1 dG).

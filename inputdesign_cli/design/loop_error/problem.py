@@ -42,7 +42,7 @@ class PowerLimit:
 
     @classmethod
     def of_output(cls, most: float, channel: int | None = None) -> PowerLimit:
-        """Of what the inputs cause at the outputs."""
+        """Of the part of the outputs that the inputs cause."""
         return cls("output", most, channel)
 
     @classmethod
@@ -65,7 +65,7 @@ class LoopErrorProblem:
     """E||y - y0||^2 of the loop with the controller designed on the model, and what the input may cost.
 
     Attributes:
-        estimated: the model in what is estimated, with the G and H of `plant`; None where that is every
+        estimated: the model in what is estimated, with the G and H of `plant`. None stands for every
             coefficient of `plant`.
         reference_variance: (n,) of the white noise behind the reference, one for each output.
         reference_filter: that colours it.

@@ -34,9 +34,9 @@ _CANDIDATES = 20
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
-    """The task, with all that can be wrong with its design already complained of.
+    """Build the task, and refuse what cannot be designed.
 
-    What speaks against its simulation alone is told to whoever asks for that.
+    Faults of the simulation alone are reported by `simulate`.
 
     Raises:
         SpecError: what this version does not design, and the diagnostics of `ControlLaw.check`.

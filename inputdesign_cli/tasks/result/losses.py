@@ -1,4 +1,4 @@
-"""What the runs of a loop-error study lost -> the entry `simulation` and its histogram."""
+"""Losses of the runs of a loop-error study -> the entry `simulation` and its histogram."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def curves_of_length(
     stated: bool,
     ellipses: Pairs | None,
 ) -> dict[str, Curves]:
-    """`bound` and `ellipses` of records of so many `samples` with the same spectrum, where they exist.
+    """`bound` and `ellipses` of records of `samples` samples with the same spectrum, as far as they exist.
 
     Args:
         information, white: (k, k) for `experiment.samples`, see `experiment_ellipses`.
