@@ -100,8 +100,10 @@ r_u is asymptotic. Two hundred simulated experiments with the designed spectrum,
 
 {simulated}
 
-The alpha of 2.45 stands for 95 % at one frequency (chi-squared, two degrees of freedom); what is counted here
-are runs in which |G_hat - G| stays below at all frequencies at once.
+The alpha of 2.45 is for all frequencies at once. G has two free parameters. With 95 % (chi-squared, two
+degrees of freedom) the estimate lies in an ellipse, and r_u is the largest |G_hat - G| in that ellipse. To
+first order 95.1 % of the runs stay below r_u at all frequencies together, and 95.1 to 98.6 % at one
+frequency alone. What is counted here are runs that stay below at all frequencies.
 
 ## 6. In Python
 

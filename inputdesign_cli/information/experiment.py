@@ -182,6 +182,11 @@ class Experiment(Coordinates):
         """(k, k): what is known without any excitation, by the noise and by `prior`."""
         return self.noise_information + self.prior_information
 
+    def of_length(self, information: Array, samples: int) -> Array:
+        """M (k, k) of this many samples of the same excitation, from M of `self.samples`."""
+        known = self.prior_information
+        return known + samples / self.samples * (information - known)
+
     @cached_property
     def told_by_noise(self) -> bool:
         """Whether noise alone tells of any parameter."""

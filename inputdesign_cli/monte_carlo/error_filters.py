@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.laws import complement
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.plant import TransferMatrix
@@ -12,17 +13,22 @@ from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_ad
 from inputdesign_cli.plant.transfer import product_of
 
 
-def error_filters(plant: MatrixPlant, target: TransferMatrix, A: Array, B: Array) -> tuple[Array, Array]:
+def error_filters(plant: MatrixPlant, desired: DesiredLoop, A: Array, B: Array) -> tuple[Array, Array]:
     """Numerators (runs, n, n, l) and denominators (runs, m) of what follows `prefilter` in each run.
 
-    With polynomials R_i = A_i of the true plant, T = T_n / d and P = rho det d I + E' T_n, the filter
-    from r - v to y - y0 is (d I - T_n) adj(P) E' / det(P) after T.
+    The loop of an estimate is (I + E) T' (I + E T')^-1 with E = G G_hat^-1 - I and T' = b' F, where b' =
+    det / m keeps the zeros of the estimate. With E = E' / (rho det), F = F_n / d and P = rho m d I + E' F_n,
+
+        y - y0 = (d I - F_n) adj(P) E' / det(P) F (r - v)                               where b is one, and
+        y - y0 = adj(P) ((b_d d - b_n f) E' + (det b_d - b_n m) rho d I) / det(P) f / (b_d d) (r - v)
+
+    for F = f I / d and b = b_n / b_d of the true plant. No factor outside the circle has to cancel.
 
     Args:
         A, B: polynomials of the estimates, (runs, n, p) and (runs, n, n, q).
     """
     n, runs = plant.outputs, A.shape[0]
-    T, d = target.common_fraction()
+    F, d = desired.free.common_fraction()
     rows = plant.per_output(plant.A)
     common = all(np.array_equal(rows[0], a) for a in rows)
     rho = product_of(rows[:1] if common else rows)
@@ -37,29 +43,29 @@ def error_filters(plant: MatrixPlant, target: TransferMatrix, A: Array, B: Array
     estimated = np.zeros((runs, n, n, A.shape[-1]))
     estimated[:, np.arange(n), np.arange(n)] = A
     ratio = multiply(multiply(scaled, adj), estimated)
-    bare = _times(det[:, None, None], rho)
-    error = _plus(ratio, -_on_diagonal(bare, n))
-    lead = _times(bare, d)
-    through = multiply(error, T[None])
-    det_P, adj_P = determinant_and_adjugate(_plus(_on_diagonal(lead, n), through))
-    numerator = multiply(adj_P, error)
-    if not _is_scalar(T):
-        numerator = multiply(complement(T, d)[None], numerator)
+    inside = desired.mirrored(det)
+    error = _plus(ratio, -_on_diagonal(_times(det, rho), n))
+    lead = _times(_times(inside, rho), d)
+    det_P, adj_P = determinant_and_adjugate(_plus(_on_diagonal(lead, n), multiply(error, F[None])))
+    if _is_scalar(F):
+        b_n, b_d = desired.kept.numerator, desired.kept.denominator_polynomial
+        late = _plus(np.convolve(b_d, d), -np.convolve(b_n, F[0, 0]))
+        moved = _times(_times(_plus(_times(det, b_d), -_times(inside, b_n)), rho), d)
+        numerator = multiply(adj_P, _plus(_times(error, late), _on_diagonal(moved, n)))
+    else:
+        numerator = multiply(complement(F, d)[None], multiply(adj_P, error))
     shift = delay_of(det_P)
     lengths = max(numerator.shape[-1], det_P.shape[-1]) - shift
     above, below = (_trimmed(_resized(p[..., shift:], lengths)) for p in (numerator, det_P))
     return above, below
 
 
-def prefilter(target: TransferMatrix) -> TransferMatrix:
-    """The part of the filter from r - v to y - y0 that is the same in all runs, applied first.
-
-    It is T in general. For T = t I what `error_filters` begins with commutes with everything, and joins it.
-    """
-    T, d = target.common_fraction()
-    if not _is_scalar(T):
-        return target
-    return TransferMatrix(multiply(complement(T, d), T), ((d,),) * len(T))
+def prefilter(desired: DesiredLoop) -> TransferMatrix:
+    """The part of the filter from r - v to y - y0 that is the same in all runs, applied first."""
+    F, d = desired.free.common_fraction()
+    if not _is_scalar(F):
+        return desired.free
+    return TransferMatrix(F, ((d, desired.kept.denominator_polynomial),) * len(F))
 
 
 def _is_scalar(numerator: Array) -> bool:
@@ -94,7 +100,6 @@ def _resized(polynomial: Array, size: int) -> Array:
     return np.concatenate([polynomial, np.zeros((*polynomial.shape[:-1], missing))], axis=-1)
 
 
-def _on_diagonal(polynomial: Array, n: int) -> Array:
-    """(runs, n, n, l) from (runs, 1, 1, l) or (runs, l)."""
-    rows = polynomial.reshape(polynomial.shape[0], 1, 1, polynomial.shape[-1])
-    return rows * np.eye(n)[:, :, None]
+def _on_diagonal(polynomials: Array, n: int) -> Array:
+    """(runs, n, n, l) from (runs, l)."""
+    return polynomials[:, None, None] * np.eye(n)[:, :, None]

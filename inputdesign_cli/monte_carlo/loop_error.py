@@ -1,8 +1,8 @@
-"""Monte Carlo of a controller designed on an identified model: what the loop loses, input by input.
+"""Monte Carlo study of a controller designed on an identified model: losses of the loop for each input.
 
 Each run identifies an ARX model by least squares, designs the model-reference (or internal-model)
-controller on it, and compares the true loop with the one that the true plant would have given. With
-E = G G_hat^-1 - I the difference is exactly y - y0 = S (I + E T)^-1 E T (r - v), v the noise at the output.
+controller on it, and compares the true loop with the one that the true plant would have given. The difference
+is exact, see `error_filters`; v is the noise at the output.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
-from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise
@@ -35,7 +35,7 @@ _LONGEST_GRID = 2**16
 
 @dataclass(frozen=True)
 class LossStudy:
-    """What the runs lost with one input.
+    """Losses of the closed loop over all runs with one input.
 
     Attributes:
         loss: (runs,) square root of the sum over the simulated samples of |y - y0|^2.
@@ -54,10 +54,10 @@ class LossStudy:
 
 @dataclass(frozen=True)
 class _Trial:
-    """What all batches share; `roots` are those of the spectrum of each input, see `dense_roots`."""
+    """What all batches share; `roots` belong to the spectrum of each input, see `dense_roots`."""
 
     problem: LoopErrorProblem
-    target: TransferMatrix
+    desired: DesiredLoop
     roots: dict[str, ComplexArray]
     samples: int
 
@@ -74,17 +74,17 @@ def study_losses(
     """Try several inputs on the true system of `problem`, all with the same noise and reference.
 
     Args:
-        problem: of an ARX plant and a law with a `target`.
+        problem: of an ARX plant and a law that states its loop.
         inputs: name -> spectrum on the harmonics of the record.
         executor: where batches of the runs are computed (default: in this process).
 
     Raises:
-        ValueError: the law has no `target`.
+        ValueError: the law states no loop.
     """
-    if problem.law.target is None:
-        raise ValueError("only loops that are the same whatever the plant are simulated")
+    if problem.law.desired is None:
+        raise ValueError("only laws that state the loop are simulated")
     roots = {name: dense_roots(lines, samples) for name, lines in inputs.items()}
-    trial = _Trial(problem, problem.law.target, roots, samples)
+    trial = _Trial(problem, problem.law.desired, roots, samples)
     size = max(1, _BATCH_SAMPLES // samples)
     parts = run_batches(_losses, trial, runs=runs, size=size, seed=seed, executor=executor)
     return {name: _joined([part[name] for part in parts]) for name in inputs}
@@ -94,19 +94,19 @@ def _losses(
     trial: _Trial, runs: int, rng: np.random.Generator
 ) -> dict[str, tuple[Array, Array, Array, Array]]:
     """For each input loss (runs,), exact loss (runs,), estimates (runs, k), mean squares (runs, inputs)."""
-    problem, target, samples = trial.problem, trial.target, trial.samples
+    problem, desired, samples = trial.problem, trial.desired, trial.samples
     plant = problem.plant
-    entering = _entering(problem, target, runs, samples, rng)
+    entering = _entering(problem, desired, runs, samples, rng)
     drive = noise_drive(plant.inputs, samples, runs, rng)
     noise = _noise(plant, runs, samples, rng)
     found = {}
     for name, root in trial.roots.items():
         u = shaped_noise(root, drive, samples)
         theta = least_squares(plant, u, plant.simulate(u, np.zeros((1, 1, plant.outputs)), 1.0)[0] + noise)
-        filters = error_filters(plant, target, *estimated_polynomials(plant, theta))
+        filters = error_filters(plant, desired, *estimated_polynomials(plant, theta))
         radius = _largest_root(filters[1])
         loss = _simulated(*filters, entering, radius < 1)
-        exact = np.sqrt(samples * _mean_square(problem, target, *filters, radius))
+        exact = np.sqrt(samples * _mean_square(problem, desired, *filters, radius))
         found[name] = (loss, exact, theta, np.mean(u * u, axis=1))
     return found
 
@@ -131,10 +131,10 @@ def _largest_root(denominator: Array) -> Array:
 
 
 def _entering(
-    problem: LoopErrorProblem, target: TransferMatrix, runs: int, samples: int, rng: np.random.Generator
+    problem: LoopErrorProblem, desired: DesiredLoop, runs: int, samples: int, rng: np.random.Generator
 ) -> Array:
     """r - v (runs, samples, n) through the common filter of all runs, from rest; channels first in memory."""
-    coloured, common = problem.reference_filter, prefilter(target)
+    coloured, common = problem.reference_filter, prefilter(desired)
     source = rng.standard_normal((problem.plant.outputs, runs, samples))
     source *= np.sqrt(problem.reference_variance)[:, None, None]
     source = filtered(coloured.numerator, coloured.denominator_polynomial, source)
@@ -162,11 +162,11 @@ def _simulated(numerator: Array, denominator: Array, entering: Array, stable: ND
 
 
 def _mean_square(
-    problem: LoopErrorProblem, target: TransferMatrix, numerator: Array, denominator: Array, radius: Array
+    problem: LoopErrorProblem, desired: DesiredLoop, numerator: Array, denominator: Array, radius: Array
 ) -> Array:
     """(runs,): E|y - y0|^2 of each loop, by a rule on the circle that is exact to the decay of its poles."""
     stable = radius < 1
-    common = prefilter(target)
+    common = prefilter(desired)
     slowest = max(float(radius[stable].max(initial=0.0)), float(np.abs(common.poles).max(initial=0.0)))
     points = 512
     while points * (1 - slowest) < _DECAY and points < _LONGEST_GRID:

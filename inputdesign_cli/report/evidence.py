@@ -265,6 +265,7 @@ def simulation_table(result: Result) -> Rows | None:
         "true ratio": lambda entry: _mean_and_tail(entry.get("true_ratio")),
         "samples": lambda entry: f"{entry['samples']['mean']:.0f}" if "samples" in entry else "",
         "ended": _endings,
+        "unstable loops": lambda entry: str(entry.get("unstable") or ""),
         "not settled": lambda entry: str(entry.get("not_converged") or ""),
     }
     cells = {name: [cell(entry) for entry in inputs.values()] for name, cell in columns.items()}

@@ -35,6 +35,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
             _clean(found["value"], kind),
             "; ".join(filter(None, [_paid(result), white(result)])),
         )
+    if kind == "closed_loop_error":
+        yield _of_structure(result["closed_loop_error"])
     if kind != "least_cost" and "cost" in result:
         yield cost, shown(result["cost"]), ""
     power = result.get("power", {})
@@ -75,6 +77,16 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "improvement" in result.get("simulation", {}):
         measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def _of_structure(found: Mapping[str, Json]) -> Fact:
+    """The error of the loop by the covariance of the model structure, with the design and white input."""
+    design, white_input = (found["parametric"][name] for name in ("design", "white"))
+    saved = 1.0 - design["loss"]["mean"] / white_input["loss"]["mean"]
+    less = f"mean loss {per_cent(abs(saved))} {'less' if saved >= 0.0 else 'more'} with the design"
+    times = f"{white_input['value'] / design['value']:.3g} times as much"
+    told = f"white excitation: {shown(white_input['value'])}, {times}; {less}"
+    return "for this structure", shown(design["value"]), told
 
 
 def _kept(told: Mapping[str, Json]) -> str:
@@ -253,7 +265,9 @@ def white(result: Result) -> str:
     told = f"white excitation: {_clean(value, kind)}"
     if not multiple:
         return told
-    return f"{told}, as much" if f"{ratio:.3g}" == "1" else f"{told}, {ratio:.3g} times as much"
+    told += ", as much" if f"{ratio:.3g}" == "1" else f", {ratio:.3g} times as much"
+    asymptotic = result.get("closed_loop_error", {}).get("covariance") == "asymptotic"
+    return f"{told}, both by asymptotic theory with model order factor 1" if asymptotic else told
 
 
 def _gap(relative: float) -> str:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.design.loop_error import LoopErrorProblem, ModelReference, PowerLimit
+from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, ModelReference, PowerLimit
+from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
 from inputdesign_cli.monte_carlo.loop_error import study_losses
@@ -14,7 +15,7 @@ from inputdesign_cli.plant import Rational, TransferMatrix
 from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.periodic import harmonics
-from tests.support.loop_error import column, random_plant
+from tests.support.loop_error import column, matrix_plant, random_plant
 
 W = np.linspace(0.05, 3.1, 9)
 
@@ -59,7 +60,7 @@ def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
     law, theta = ModelReference(T), bare.theta
     theta = theta + 0.01 * rng.standard_normal((2, theta.size)) * np.abs(theta)
     A, B = estimated_polynomials(bare, theta)
-    numerator, denominator = error_filters(bare, T, A, B)
+    numerator, denominator = error_filters(bare, DesiredLoop(T), A, B)
     for run in range(2):
         q = np.exp(-1j * W)
         G_hat = np.array(
@@ -79,9 +80,63 @@ def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
         expected = np.linalg.solve(np.eye(n) + L, L) - law.complementary(W)
         powers = q[:, None] ** np.arange(denominator.shape[-1])
         above = np.einsum("kl,ijl->kij", q[:, None] ** np.arange(numerator.shape[-1]), numerator[run])
-        got = above / (powers @ denominator[run])[:, None, None] @ prefilter(T).at(W)
+        got = above / (powers @ denominator[run])[:, None, None] @ prefilter(DesiredLoop(T)).at(W)
         np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
         assert abs(denominator[run, 0]) > 0
+
+
+INVERSE = {
+    "zero outside": [[[0, 1.0, -1.5]]],
+    "pair outside, delay": [[[0, 0, 1.0, -2.0, 3.0]]],
+    "no zero": [[[0, 1.0]]],
+    "two channels": [[[0, 1.0], [0, 0, 1.8]], [[0, 1.0], [0, 0.9, 0.3]]],
+}
+
+
+def internal_model(name, variance=0.1):
+    B = INVERSE[name]
+    n = len(B)
+    plant = matrix_plant(A=[[1, -0.8], [1, -0.5]][:n], B=B, covariance=variance * np.eye(n))
+    law = InternalModel.build(plant, Rational.build([0.4], [1, -0.6]))
+    return LoopErrorProblem(plant, law, (PowerLimit("input", 1.0),), np.ones(n))
+
+
+@pytest.mark.parametrize("name", INVERSE)
+def test_each_estimate_keeps_its_own_zeros_in_the_loop(name):
+    """The filters against the loop of the controller that the law designs on each estimate."""
+    problem = internal_model(name)
+    plant, desired = problem.plant, problem.law.desired
+    n, q = plant.outputs, np.exp(-1j * W)
+    rng = np.random.default_rng(5)
+    theta = plant.theta * (1 + 0.05 * rng.standard_normal((4, plant.theta.size)))
+    numerator, denominator = error_filters(plant, desired, *estimated_polynomials(plant, theta))
+    first = prefilter(desired).at(W)
+    for run in range(4):
+        model = plant.at(theta[run])
+        law = InternalModel.build(model, Rational.build([0.4], [1, -0.6]))
+        L = plant.plant_at(W) @ law.controller(model.plant_at(W), W)
+        expected = np.linalg.solve(np.eye(n) + L, L) - problem.law.complementary(W)
+        above = np.einsum("kl,ijl->kij", q[:, None] ** np.arange(numerator.shape[-1]), numerator[run])
+        below = q[:, None] ** np.arange(denominator.shape[-1]) @ denominator[run]
+        got = above / below[:, None, None] @ first
+        np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
+        # No factor outside the circle is left: a loop with such a model is stable.
+        assert np.abs(np.roots(denominator[run])).max() < 1
+
+
+@pytest.mark.parametrize("name", ["zero outside", "two channels"])
+def test_losses_with_zeros_outside_agree_with_theory(name):
+    problem = internal_model(name, variance=0.01)
+    samples, runs, n = 2000, 300, problem.plant.outputs
+    found = study_losses(problem, {"white": flat(samples, n)}, samples=samples, runs=runs, seed=0)["white"]
+    assert found.unstable == 0
+    criterion, lines = problem.parametric(), flat(samples, n)
+    information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
+    squares = found.exact**2
+    error = squares.std(ddof=1) / np.sqrt(runs)
+    assert squares.mean() == pytest.approx(criterion.value(information), abs=4 * error)
+    assert error < 0.1 * squares.mean()
+    assert found.loss.mean() == pytest.approx(found.exact.mean(), rel=0.03)
 
 
 def test_least_squares_without_noise_is_exact():

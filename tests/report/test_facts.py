@@ -2,6 +2,7 @@
 
 import pytest
 
+from inputdesign_cli import load_spec, solve
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.report.facts import facts, proofs
 
@@ -86,3 +87,14 @@ def test_the_worst_plant_is_measured_by_what_is_admitted_whatever_is_sought(obje
 def test_the_terminal_tells_estimates_with_their_deviations():
     found = {"theta": {"gain": 2.0, "L": 25.0}, "standard_deviation": {"gain": 0.1, "L": 2.5}}
     assert "gain 2 +- 0.1, L 25 +- 2.5" in summary({"identification": found}, "s", [])
+
+
+def test_a_loop_error_says_which_theory_its_ratios_are_of():
+    """Table I of errata.md: N J of formula (19) and of white noise, and 27.7 % in the mean loss."""
+    spec = load_spec("specs/distillation_column.yaml", ["signal={samples: 100, candidates: 1}"])
+    found = {name: f"{text} {remark}" for name, text, remark in facts(solve(spec).result, "s")}
+    assert "7.27 times" in found["error of the loop"]
+    assert "asymptotic" in found["error of the loop"]
+    assert "5.262" in found["for this structure"]
+    assert f"{1.02222e-5 / 5.26272e-6:.3g} times" in found["for this structure"]
+    assert "27.7 %" in found["for this structure"]

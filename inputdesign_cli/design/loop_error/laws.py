@@ -1,14 +1,17 @@
 """Control laws whose response at a frequency depends on the plant at that frequency only.
 
-All have the form C = G^-1 X with X free of G, so that Delta C = -G^-1 Delta G C, [rojas-asymptotic] Section
-VII. Arrays are (K, n, n) over K frequencies; vec stacks columns.
+All have the form C = G^-1 X with X free of G at that frequency, so that Delta C = -G^-1 Delta G C,
+[rojas-asymptotic] Section VII. X may depend on a few numbers that all frequencies determine together: the
+zeros outside the circle, or the first terms of H. Their variance stays bounded as the model order grows, so
+the asymptotic covariance leaves it out. The exact covariance of a model structure includes it, by
+`loop_gradient`. Arrays are (K, n, n) over K frequencies; vec stacks columns.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,20 +22,22 @@ from inputdesign_cli.design.loop_error.checks import (
     check_minimum_variance,
     check_model_reference,
 )
+from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.information.quadrature import Quadrature
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import join_roots, roots_in_z, unit_circle
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate
-from inputdesign_cli.plant.transfer import Rational, TransferMatrix, product_of
+from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
 
 class ControlLaw(Protocol):
     """What the design needs to know of a control law."""
 
     @property
-    def target(self) -> TransferMatrix | None:
-        """T where the law gives it whatever the plant; None where it follows from the plant."""
+    def desired(self) -> DesiredLoop | None:
+        """T, and the zeros that it keeps. None if T follows from the noise."""
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
         """T = G C (I + G C)^-1, the loop that the true plant would give."""
@@ -41,7 +46,18 @@ class ControlLaw(Protocol):
         """C(G)."""
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
-        """d vec C / d vec H: (K, n^2, n^2); None where C ignores the noise model."""
+        """d vec C / d vec H: (K, n^2, n^2). None if C ignores the noise model."""
+
+    def loop_gradient(
+        self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
+    ) -> ComplexArray | None:
+        """dT (K, k, n, n) at the nodes as the parameters of the model move. None if T is fixed.
+
+        Args:
+            logarithmic: (K, k), tr(G^-1 dG).
+            relative_noise: (K, k, n, n), H^-1 dH.
+            rule: of means over [0, pi].
+        """
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """The controller can run on this plant: it is causal, stable, and finite on the circle.
@@ -90,36 +106,53 @@ def _transposed(matrix: NDArray) -> NDArray:
     return np.swapaxes(matrix, 1, 2)
 
 
-@dataclass(frozen=True)
-class _FixedLoop:
-    """Laws that give a loop T whatever the plant, and ignore the noise model."""
+class _DesiredLaw:
+    """Laws that state the loop T, and ignore the noise model."""
 
-    target: TransferMatrix
+    if TYPE_CHECKING:
+
+        @property
+        def desired(self) -> DesiredLoop:
+            """T, and the zeros that it keeps."""
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
         """See `ControlLaw`."""
-        return self.target.at(w)
+        return self.desired.whole.at(w)
+
+    def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
+        """C = G^-1 T (I - T)^-1."""
+        T = self.complementary(w)
+        return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> None:
         """See `ControlLaw`."""
         return
 
+    def loop_gradient(
+        self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
+    ) -> ComplexArray | None:
+        """See `ControlLaw`."""
+        return self.desired.gradient(logarithmic, rule)
+
     @cached_property
     def singularities(self) -> ComplexArray:
         """See `ControlLaw`."""
-        numerator, d = self.target.common_fraction()
+        whole = self.desired.whole
+        numerator, d = whole.common_fraction()
         zeros = [determinant_and_adjugate(N)[0] for N in (complement(numerator, d), numerator)]
-        return logarithmic_distance(join_roots([self.target.poles, *map(roots_in_z, zeros)]))
+        return logarithmic_distance(join_roots([whole.poles, *map(roots_in_z, zeros)]))
 
 
 @dataclass(frozen=True)
-class ModelReference(_FixedLoop):
+class ModelReference(_DesiredLaw):
     """C = G^-1 T (I - T)^-1: the loop from reference to output is T, [rojas-asymptotic] (18)."""
 
-    def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
+    target: TransferMatrix
+
+    @property
+    def desired(self) -> DesiredLoop:
         """See `ControlLaw`."""
-        T = self.target.at(w)
-        return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
+        return DesiredLoop(self.target)
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""
@@ -127,35 +160,25 @@ class ModelReference(_FixedLoop):
 
 
 @dataclass(frozen=True)
-class InternalModel(_FixedLoop):
+class InternalModel(_DesiredLaw):
     """C = (I - Q G)^-1 Q with Q = G^-1 T, T = b f I.
 
-    f is the filter, b the all-pass of the delay and of the zeros that G^-1 may not invert; b is held
-    at its nominal value, since it does not depend on G at a single frequency.
+    f is the filter with the delay of the plant, b the all-pass of the zeros that G^-1 may not invert.
     """
+
+    desired: DesiredLoop
 
     @classmethod
     def build(cls, plant: MatrixPlant, filter_: Rational) -> InternalModel:
-        """With the delay and the zeros outside the unit circle of the plant in b."""
+        """With the delay and the zeros outside the unit circle of the plant in the loop."""
         missing = max(plant.inverse_delay - delay_of(filter_.numerator), 0)
-        above: Array = np.eye(missing + 1)[-1]
-        below: Array = np.ones(1)
+        late = Rational(np.append(np.zeros(missing), filter_.numerator), filter_.denominator)
         outside = plant.zeros[np.abs(plant.zeros) > 1]
-        if outside.size:
-            # (q^-1 - 1/z0)*... of modulus one on the circle, poles at the mirrored zeros, gain one at DC.
-            below = np.asarray(np.poly(1 / np.conj(outside)).real, dtype=float)
-            blaschke = np.poly(outside).real
-            above = product_of([above, np.sum(below) / np.sum(blaschke) * blaschke])
-        return cls(TransferMatrix.diagonal(filter_, plant.outputs).scaled(Rational(above, (below,))))
-
-    def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        Q = np.linalg.inv(G) @ self.target.at(w)
-        return np.asarray(np.linalg.inv(sensitivity(Q @ G)) @ Q)
+        return cls(DesiredLoop(TransferMatrix.diagonal(late, plant.outputs), outside))
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""
-        check_circle(plant, self.target, key=key)
+        check_circle(plant, self.desired.whole, key=key)
 
 
 @dataclass(frozen=True)
@@ -165,7 +188,7 @@ class MinimumVariance:
     plant: MatrixPlant
 
     @property
-    def target(self) -> None:
+    def desired(self) -> None:
         """See `ControlLaw`."""
         return None
 
@@ -194,6 +217,17 @@ class MinimumVariance:
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
         """d vec C / d vec H with E held: its few terms are known far better than H pointwise."""
         return kronecker(_transposed(np.linalg.inv(self.unavoidable(w))), np.linalg.inv(G))
+
+    def loop_gradient(
+        self, logarithmic: Array, relative_noise: ComplexArray, rule: Quadrature
+    ) -> ComplexArray | None:
+        """dT = E H^-1 dH H^-1 - dE H^-1, with dE the first terms of dH, see `ControlLaw`."""
+        H, q = self.plant.noise_at(rule.nodes)[:, None], unit_circle(rule.nodes)
+        powers = q ** np.arange(self.delay)[:, None]
+        terms = np.einsum("dk,klab->dlab", rule.weights / powers, H @ relative_noise).real
+        dE = np.einsum("dk,dlab->klab", powers, terms)
+        E = self.unavoidable(rule.nodes)[:, None]
+        return np.asarray((E @ relative_noise - dE) @ np.linalg.inv(H))
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""

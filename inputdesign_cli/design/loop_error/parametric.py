@@ -4,8 +4,9 @@
 structure, [ljung-1999] Section 9.4.
 
 To first order in the error of the parameters, y - y0 = sum_l dtheta_l X_l (r - v) with
-X_l = S G dC_l S. Hence E||y - y0||^2 = tr(W P), W_lm = mean tr(X_l (Phi_r + Phi_v) X_m^*), where the
-covariance P is the inverse of an information matrix that is affine in the input spectrum.
+X_l = S G dC_l S = -S dG_l G^-1 T + dT_l, where dT_l is how the loop that the law aims at errs with the model.
+Hence E||y - y0||^2 = tr(W P), W_lm = mean tr(X_l (Phi_r + Phi_v) X_m^*). The covariance P is the inverse of
+an information matrix that is affine in the input spectrum.
 """
 
 from __future__ import annotations

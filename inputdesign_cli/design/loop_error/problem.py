@@ -42,7 +42,7 @@ class PowerLimit:
 
     @classmethod
     def of_output(cls, most: float, channel: int | None = None) -> PowerLimit:
-        """Of what the inputs cause at the outputs."""
+        """Of the part of the outputs that the inputs cause."""
         return cls("output", most, channel)
 
     @classmethod
@@ -65,7 +65,7 @@ class LoopErrorProblem:
     """E||y - y0||^2 of the loop with the controller designed on the model, and what the input may cost.
 
     Attributes:
-        estimated: the model in what is estimated, with the G and H of `plant`; None where that is every
+        estimated: the model in what is estimated, with the G and H of `plant`. None stands for every
             coefficient of `plant`.
         reference_variance: (n,) of the white noise behind the reference, one for each output.
         reference_filter: that colours it.
@@ -163,9 +163,12 @@ class LoopErrorProblem:
         """J_o: what the error of the noise model adds, whatever the input (zero if C ignores H)."""
         rule = self.rule(1, band=False)
         w, n = rule.nodes, self.plant.outputs
-        J = self._noise_propagation(w)
+        G = self.plant.plant_at(w)
+        J = self.law.noise_jacobian(G, w)
         if J is None:
             return 0.0
+        S = sensitivity(self.law.complementary(w))
+        J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ J
         identity = np.broadcast_to(np.eye(n, dtype=complex), (w.size, n, n))
         entering = kronecker(np.conj(self.entering(w)), identity)
         inverse = np.linalg.inv(self.plant.covariance).T @ identity
@@ -175,7 +178,7 @@ class LoopErrorProblem:
     def parametric(self) -> ParametricCriterion:
         """tr(W P) of the model structure."""
         plant, model, rule = self.plant, self.structure, self.rule(1, band=False)
-        X, relative = self._parameter_errors(rule.nodes)
+        X, relative = self._parameter_errors(rule)
         inverse = np.linalg.inv(plant.covariance)
         W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(rule.nodes), np.conj(X), rule.weights).real
         M0 = np.einsum(
@@ -184,28 +187,15 @@ class LoopErrorProblem:
         whitener = np.linalg.inv(np.linalg.cholesky(plant.covariance))
         return ParametricCriterion(W, M0, lambda w: np.asarray(whitener @ model.input_gradient(w)))
 
-    def _noise_propagation(self, w: ArrayLike) -> ComplexArray | None:
-        """d vec(S G Delta C S) / d vec H (K, n^2, n^2); None where C ignores H."""
-        G = self.plant.plant_at(w)
-        J = self.law.noise_jacobian(G, w)
-        if J is None:
-            return None
-        S = sensitivity(self.law.complementary(w))
-        return kronecker(np.swapaxes(S, 1, 2), S @ G) @ J
-
-    def _parameter_errors(self, w: Array) -> tuple[ComplexArray, ComplexArray]:
-        """X_l (K, k, n, n) of the loop, see `parametric`, and H^-1 dH_l."""
-        plant, model = self.plant, self.structure
+    def _parameter_errors(self, rule: Quadrature) -> tuple[ComplexArray, ComplexArray]:
+        """X_l (K, k, n, n) of the loop at the nodes, see `parametric`, and H^-1 dH_l."""
+        plant, model, w = self.plant, self.structure, rule.nodes
         dG, relative = model.plant_gradient(w), model.noise_gradient(w)
         G, T = plant.plant_at(w), self.law.complementary(w)
-        X = -sensitivity(T)[:, None] @ dG @ (np.linalg.inv(G) @ T)[:, None]
-        J = self._noise_propagation(w)
-        if J is not None:
-            dH = plant.noise_at(w)[:, None] @ relative
-            columns = np.swapaxes(dH, 2, 3).reshape(*dH.shape[:2], -1)
-            sent = np.einsum("kab,klb->kla", J, columns).reshape(dH.shape)
-            X = X + np.swapaxes(sent, 2, 3)
-        return X, relative
+        inverse = np.linalg.inv(G)
+        X = -sensitivity(T)[:, None] @ dG @ (inverse @ T)[:, None]
+        moved = self.law.loop_gradient(np.einsum("kab,klba->kl", inverse, dG), relative, rule)
+        return (X if moved is None else X + moved), relative
 
     def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
         """The best input of the model structure among all spectra within the limits."""

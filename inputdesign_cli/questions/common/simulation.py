@@ -35,6 +35,7 @@ from inputdesign_cli.questions.common.simulation_outcome import (
     fractions,
     gap_notes,
     input_entry,
+    length_notes,
     searched_notes,
     study_entry,
 )
@@ -98,6 +99,7 @@ class Delivered:
         record: (n, r), about its operating point; None if no excitation is needed.
         renewed: realises the spectrum anew in each run; None for a record that was given.
         alpha: of r_u, see the contract.
+        of_length: curves `bound` and `ellipses` for another number of samples than the results count.
         rivals: tries so many records with a search from several starts, where that finds other minima.
     """
 
@@ -105,6 +107,7 @@ class Delivered:
     record: Array | None
     renewed: Excitation | None
     alpha: float
+    of_length: Callable[[int], Mapping[str, Curves]] = lambda _: {}
     rivals: Callable[[int], Mapping[str, int]] | None = None
 
 
@@ -136,9 +139,11 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
     result = dict(results.result)
     true = nominal if plan.truth is None else plan.truth.experiment(nominal, result["power"]["output"])
     study = Study(nominal, true, plan.runs, plan.seed, units.step)
-    predicted = _predicted(plan, delivered, excitations[0].information(nominal))
+    counted, simulated = result["samples"], len(delivered.record)
+    foretold = results.curves if counted == simulated else delivered.of_length(simulated)
+    predicted = _predicted(plan, foretold, delivered.alpha, excitations[0].information(nominal))
     inputs: dict[str, Json] = {}
-    curves: dict[str, Curves] = {}
+    curves: dict[str, Curves] = {name: foretold[name] for name in ("ellipses",) if name in foretold}
     tables: dict[str, Table] = {}
     for excitation in excitations:
         name = excitation.name
@@ -163,7 +168,12 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
         searched = delivered.rivals(_SEARCHED)
         inputs["design"] |= {"searched": dict(searched)} if searched else {}
     result["simulation"] = study_entry(study, inputs, excitation="new" if plan.renewed else "record")
-    notes = [*gap_notes(units, inputs), *confidence_notes(result, inputs), *searched_notes(searched)]
+    notes = [
+        *length_notes(counted, simulated),
+        *gap_notes(units, inputs),
+        *confidence_notes(result, inputs),
+        *searched_notes(searched),
+    ]
     if notes:
         result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
@@ -207,9 +217,11 @@ def _flat(plan: Simulation, kind: Method, name: str, power: float, samples: int)
     return Redrawn.flat(name, kind, powers, band, samples, plan.units.step)
 
 
-def _predicted(plan: Simulation, delivered: Delivered, information: Array) -> PredictedError:
-    """What bound.csv says; where there is none, the r_u that the `information` gives."""
-    bound = delivered.results.curves.get("bound")
+def _predicted(
+    plan: Simulation, foretold: Mapping[str, Curves], alpha: float, information: Array
+) -> PredictedError:
+    """What the curve `bound` says; where there is none, the r_u that the `information` gives."""
+    bound = foretold.get("bound")
     if not isinstance(bound, BoundCurves):
         _, bound = bound_curves(plan.units, plan.entries, information, stated=False)
     panels = bound.panels
@@ -220,6 +232,6 @@ def _predicted(plan: Simulation, delivered: Delivered, information: Array) -> Pr
         w=np.concatenate([panel.frequency for panel in panels]) * plan.units.frequency,
         r_u=np.concatenate([panel.r_u for panel in panels]),
         r_adm=np.concatenate(admissible) if admissible else None,
-        alpha=delivered.alpha,
+        alpha=alpha,
         entries=np.repeat(np.array(places), sizes, axis=0) if places else None,
     )

@@ -136,6 +136,17 @@ def searched_notes(searched: Mapping[str, int]) -> list[str]:
     ]
 
 
+def length_notes(counted: int, simulated: int) -> list[str]:
+    """Say which length predictions are for, where records are longer or shorter than the design counts."""
+    if counted == simulated:
+        return []
+    return [
+        f"simulation: the design counts {counted} sample{'s' * (counted > 1)}, the simulated records have "
+        f"{simulated}. What the runs are compared with, and ellipses.png, are for {simulated} samples; "
+        f"bound.csv is for {counted}"
+    ]
+
+
 def gap_notes(units: Units, inputs: Mapping[str, Json]) -> list[str]:
     """The gap between what the design predicts on its own model and what the true system gives."""
     for name, entry in inputs.items():

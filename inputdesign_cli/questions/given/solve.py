@@ -29,6 +29,7 @@ from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.nyquist import nyquist_curves
+from inputdesign_cli.questions.common.of_length import curves_of_length
 from inputdesign_cli.questions.common.record import (
     RecordRequest,
     as_long,
@@ -213,7 +214,17 @@ class GivenTask:
             return Delivered(results, None, None, confidence.alpha)
         renewed, seen = self._renewed(len(record.samples)), self.foresight
         tried = None if seen is None else partial(seen.tried, record.samples, requirements)
-        return Delivered(results, record.samples, renewed, confidence.alpha, tried)
+        of_length = partial(
+            curves_of_length,
+            units,
+            experiment,
+            information,
+            white,
+            stated or unstated,
+            stated=bool(stated),
+            ellipses=self.ellipses,
+        )
+        return Delivered(results, record.samples, renewed, confidence.alpha, of_length, tried)
 
     def _result(
         self,

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
+from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.objectives import white_labels
@@ -17,6 +17,7 @@ from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound import bound_curves, equal_white
 from inputdesign_cli.questions.common.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.questions.common.nyquist import nyquist_curves
+from inputdesign_cli.questions.common.of_length import curves_of_length
 from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.questions.least_cost.outcome import Designed
 from inputdesign_cli.signal import Record
@@ -50,10 +51,8 @@ def illustrations(
     curves: dict[str, Curves] = {"spectrum": spectrum[1]}
     if not found.x.any():
         return tables, curves
-    white = design.white.informations[0] / (design.white.s if problem.goal == "factor" else 1.0)
-    asked = (*problem.requirements, *problem.side)
-    stated = model_errors(asked)
-    errors = stated or [replace(error, experiment=done.experiment) for error in unstated]
+    white, stated = _white(done), bool(model_errors(_asked(done)))
+    errors, asked = _errors(done, unstated), _asked(done)
     active = [found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)]
     with suppress(np.linalg.LinAlgError):  # a parameter that a T-optimal design does not excite
         tables["bound"], curves["bound"] = bound_curves(
@@ -64,7 +63,7 @@ def illustrations(
             equal=equal_white(design, done.experiment.samples, result["baseline"]["white"]["ratio"]),
             white_labels=white_labels(result),
             record=known if stated else as_long(),
-            stated=bool(stated),
+            stated=stated,
             active=active,
             of_several=done.plants is not None,
         )
@@ -78,3 +77,35 @@ def illustrations(
     if drawn is not None:
         curves["ellipses"] = drawn
     return tables, curves
+
+
+def illustrations_of_length(
+    units: Units, done: Designed, unstated: Sequence[ModelError], ellipses: Pairs | None, samples: int
+) -> dict[str, Curves]:
+    """The curves that depend on the length, for records of this many samples, see `curves_of_length`."""
+    return curves_of_length(
+        units,
+        done.experiment,
+        done.information,
+        _white(done) if done.design.problem.demands.definite else None,
+        _errors(done, unstated),
+        samples,
+        stated=bool(model_errors(_asked(done))),
+        ellipses=ellipses,
+    )
+
+
+def _asked(done: Designed) -> tuple[Requirement, ...]:
+    """What the design must meet."""
+    return (*done.design.problem.requirements, *done.design.problem.side)
+
+
+def _errors(done: Designed, unstated: Sequence[ModelError]) -> Sequence[OnModelError]:
+    """The bounds on the model error; where none is stated, r_u of every entry."""
+    return model_errors(_asked(done)) or [replace(error, experiment=done.experiment) for error in unstated]
+
+
+def _white(done: Designed) -> Array:
+    """M (k, k) of the white excitation that the design is compared with."""
+    white = done.design.white
+    return np.asarray(white.informations[0] / (white.s if done.design.problem.goal == "factor" else 1.0))

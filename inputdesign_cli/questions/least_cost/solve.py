@@ -37,7 +37,7 @@ from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.questions.least_cost.grid_method import GridMethod
-from inputdesign_cli.questions.least_cost.illustrations import illustrations
+from inputdesign_cli.questions.least_cost.illustrations import illustrations, illustrations_of_length
 from inputdesign_cli.questions.least_cost.infeasible import explain
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_result
 from inputdesign_cli.questions.least_cost.record_search import fitting_record, samples_of_record
@@ -186,7 +186,8 @@ class ConvexTask:
         renewed = redrawn(made.request, made.design, inputs, samples)
         seen, asked = self.foresight, done.problem.requirements
         tried = None if seen is None else partial(seen.tried, record.samples, asked)
-        return Delivered(results, record.samples, renewed, done.confidence.alpha, tried)
+        of_length = partial(illustrations_of_length, units, done, self.unstated, self.ellipses)
+        return Delivered(results, record.samples, renewed, done.confidence.alpha, of_length, tried)
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.

@@ -34,9 +34,9 @@ _CANDIDATES = 20
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
-    """The task, with all that can be wrong with its design already complained of.
+    """Build the task, and refuse what cannot be designed.
 
-    What speaks against its simulation alone is told to whoever asks for that.
+    Faults of the simulation alone are reported by `simulate`.
 
     Raises:
         SpecError: what this version does not design, and the diagnostics of `ControlLaw.check`.
@@ -45,7 +45,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     assert error is not None
     _check_supported(spec)
     plant = matrix_plant(spec, spec.plant, spec.noise, "plant")
-    name, law = _law(spec, error, plant)
+    name, law = _law(spec, error, plant, "plant.B")
     check_invertible(plant, key="plant.B")
     law.check(plant, key=f"{KEY}.control.{name}")
     coloured = error.reference.filter
@@ -73,17 +73,17 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         },
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
-    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, problem))
+    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, error, problem))
 
 
-def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, ControlLaw]:
+def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tuple[str, ControlLaw]:
     """The key of the control law, and the law."""
     control = error.control
     if control.minimum_variance:
         return "minimum_variance", MinimumVariance(plant)
     if control.internal_model is not None:
         # The delay and the zeros to be kept are read off the inverse, so it must exist first.
-        check_invertible(plant, key="plant.B")
+        check_invertible(plant, key=key)
         return "internal_model", InternalModel.build(plant, _transfer(spec, control.internal_model))
     target = control.model_reference
     assert target is not None
@@ -166,7 +166,7 @@ def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalS
     )
 
 
-def _trial(spec: Spec, problem: LoopErrorProblem) -> LossTrial:
+def _trial(spec: Spec, error: ClosedLoopError, problem: LoopErrorProblem) -> LossTrial:
     simulation = spec.simulation or Simulation()
     for name in simulation.compare:
         if name != "white":
@@ -181,8 +181,9 @@ def _trial(spec: Spec, problem: LoopErrorProblem) -> LossTrial:
         true = matrix_plant(
             spec, simulation.plant or spec.plant, simulation.noise or spec.noise, "simulation.plant"
         )
+    law = _law(spec, error, true, "simulation.plant")[1]
     return LossTrial(
-        replace(problem, plant=true), simulation.runs, simulation.seed, "white" in simulation.compare
+        replace(problem, plant=true, law=law), simulation.runs, simulation.seed, "white" in simulation.compare
     )
 
 

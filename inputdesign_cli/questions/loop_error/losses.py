@@ -1,4 +1,4 @@
-"""What the runs of a loop-error study lost -> the entry `simulation` and its histogram."""
+"""Losses of the runs of a loop-error study -> the entry `simulation` and its histogram."""
 
 from __future__ import annotations
 
@@ -42,6 +42,16 @@ def loss_results(
         }
     means = {name: theory[name].mean for name in losses}
     return found, {"loss": LossCurves(losses, means)} if losses else {}
+
+
+def unstable_notes(studies: Mapping[str, LossStudy], runs: int) -> list[str]:
+    """Say for each input how many controllers made the true loop unstable."""
+    return [
+        f"simulation: with the input {name}, {study.unstable} of {runs} controllers made the true loop "
+        "unstable. Their losses are infinite; the means are those of the other runs"
+        for name, study in studies.items()
+        if study.unstable
+    ]
 
 
 def _entry(theory: LossTheory, study: LossStudy, information: Array) -> Entry:

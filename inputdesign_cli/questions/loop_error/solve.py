@@ -12,7 +12,7 @@ from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.outcome.results import Results, typed
 from inputdesign_cli.questions.common.plain_signal import signal_entry, signal_results
-from inputdesign_cli.questions.loop_error.losses import loss_results
+from inputdesign_cli.questions.loop_error.losses import loss_results, unstable_notes
 from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms, design_result, spectrum_results
 from inputdesign_cli.questions.loop_error.signal import (
     LoopErrorSignalSettings,
@@ -56,14 +56,15 @@ class LoopErrorTask:
         """The same with the entry `simulation` and the histogram of the loss.
 
         Raises:
-            SpecError: `not-supported` for true systems that are not ARX, or minimum-variance control.
+            SpecError: `not-supported` for true systems that are not ARX, or minimum-variance control; see
+                `ControlLaw.check` for what a controller designed on the true plant could not do.
             InaccurateError: see `solve`.
         """
         trial = self.trial
         _check_simulated(self.problem, trial.problem)
         design, results = self._solved()
         begun = time.perf_counter()
-        samples = self.terms.samples
+        samples = self.signal.samples
         inputs = {"design": design_lines(design, samples)}
         if trial.white:
             inputs["white"] = white_lines(design, samples)
@@ -80,6 +81,9 @@ class LoopErrorTask:
         }
         timing = {**results.result["timing_s"], "simulation": time.perf_counter() - begun}
         result = {**results.result, "simulation": study, "timing_s": timing}
+        notes = unstable_notes(studies, trial.runs)
+        if notes:
+            result["notes"] = [*result.get("notes", []), *notes]
         return replace(results, outcome=typed(result), curves={**results.curves, **curves})
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
@@ -103,7 +107,7 @@ class LoopErrorTask:
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
-    if true.law.target is None:
+    if true.law.desired is None:
         raise bad_spec(
             "not-supported",
             "this version simulates model-reference and internal-model control only",
@@ -125,3 +129,4 @@ def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
             hint="write A and B only, and simulation.noise: {variance: ..}",
             key="plant" if true.plant is nominal.plant else "simulation",
         )
+    true.law.check(true.plant, key="simulation.plant")

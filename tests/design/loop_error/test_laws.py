@@ -96,8 +96,8 @@ def test_internal_model_keeps_zeros_outside_and_the_delay_in_the_loop():
     w = np.linspace(0, np.pi, 50)
     f = 0.4 / np.abs(1 - 0.6 * np.exp(-1j * w))
     np.testing.assert_allclose(np.abs(law.complementary(w)[:, 0, 0]), f, rtol=1e-12)
-    assert law.target.delay == 2
-    at_zero = np.polynomial.polynomial.polyval(1 / 2.0, law.target.numerator[0, 0])
+    assert law.desired.whole.delay == 2
+    at_zero = np.polynomial.polynomial.polyval(1 / 2.0, law.desired.whole.numerator[0, 0])
     assert abs(at_zero) < 1e-12
     # A stable filter inverse: G^-1 T has no pole outside.
     np.testing.assert_allclose(law.complementary(np.zeros(1))[0, 0, 0], 1.0, rtol=1e-12)

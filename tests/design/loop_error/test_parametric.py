@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import LoopErrorProblem, MinimumVariance, ModelReference, PowerLimit
+from inputdesign_cli.design.loop_error import (
+    InternalModel,
+    LoopErrorProblem,
+    MinimumVariance,
+    ModelReference,
+    PowerLimit,
+)
 from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
 from inputdesign_cli.plant import Rational, TransferMatrix
@@ -99,6 +105,50 @@ def test_w_of_minimum_variance_includes_the_noise_model():
         error = sensitivity(S) - MinimumVariance(plant).complementary(w)
         square = np.einsum("kab,kbc,kac,k->", error, entering, np.conj(error), rule.weights).real
         assert square / step**2 == pytest.approx(Wmatrix[index, index], rel=2e-3, abs=1e-9)
+
+
+FILTER = Rational.build([0.4], [1, -0.6])
+KEPT = {
+    "no zero outside": [[[0, 1.0, -0.5]]],
+    "one zero": [[[0, 1.0, -1.5]]],
+    "a pair and a delay": [[[0, 0, 1.0, -2.0, 3.0]]],
+    "a double zero": [[[0, 1.0, 3.0, 2.25]]],
+    "inside and outside": [[[0, 0.5, -1.0, 0.4]]],
+    "of two channels": [[[0, 1.0], [0, 0, 1.8]], [[0, 1.0], [0, 0.9, 0.3]]],
+}
+
+
+def with_zeros(B):
+    n = len(B)
+    return matrix_plant(A=[[1, -0.8], [1, -0.5]][:n], B=B, covariance=0.1 * np.eye(n) + 0.02)
+
+
+@pytest.mark.parametrize("name", [*KEPT, "minimum variance", "minimum variance, coloured"])
+def test_w_includes_what_the_law_has_from_the_model_as_a_whole(name):
+    """The controller designed on a model that is slightly off: its own zeros outside, its own first terms."""
+    if name in KEPT:
+        plant = with_zeros(KEPT[name])
+
+        def law_of(model):
+            return InternalModel.build(model, FILTER)
+    else:
+        colour = {"C": [[1, 0.3]], "D": [[1, 0.5]]} if "coloured" in name else {}
+        plant = matrix_plant(A=[[1, -0.7, 0.2]], B=[[[0, 0, 0, 1.0, 0.4]]], covariance=[[0.1]], **colour)
+        law_of = MinimumVariance
+    problem = LoopErrorProblem(plant, law_of(plant), (PowerLimit("input", 1.0),), np.ones(plant.outputs))
+    rule, step = problem.rule(1), 1e-5
+    w, identity = rule.nodes, np.eye(plant.outputs)
+    G, entering = plant.plant_at(w), problem.entering(w)
+
+    def loop(index, off):
+        model = moved(plant, index, off)
+        C = law_of(model).controller(model.plant_at(w), w)
+        return np.linalg.solve(identity + G @ C, G @ C)
+
+    size = range(plant.theta.size)
+    X = np.array([(loop(index, step) - loop(index, -step)) / (2 * step) for index in size])
+    expected = np.einsum("lkab,kbc,mkac,k->lm", X, entering, np.conj(X), rule.weights).real
+    np.testing.assert_allclose(problem.parametric().W, expected, rtol=1e-6, atol=1e-7 * expected.max())
 
 
 def value_of(problem, criterion, density):
