@@ -105,6 +105,7 @@ def proceed(
     with computing(directory, quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.campaign.memory import held, read_memory
+        from inputdesign_cli.campaign.pictures import with_earlier_pictures
         from inputdesign_cli.campaign.rounds import advanced, withdrawn
         from inputdesign_cli.runs.record import SPEC
         from inputdesign_cli.specification import parse_spec
@@ -126,6 +127,8 @@ def proceed(
                 )
                 part = tasks.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
+            if not figures:
+                results = with_earlier_pictures(results, directory)
         renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
     code = _EXIT[results.result["status"]]
     if code:

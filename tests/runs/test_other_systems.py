@@ -23,14 +23,19 @@ for name in ("fork", "forkpty", "getuid", "geteuid", "getgid", "getegid", "killp
 from inputdesign_cli.__main__ import main
 """
 DESIGN = BARE + "sys.argv[0] = 'idesign'\nmain()\n"
-HOLD = BARE + """
+HOLD = (
+    BARE
+    + """
 from pathlib import Path
 from inputdesign_cli.runs.replacing import workplace
 with workplace(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()
 """
-WRITE = BARE + """
+)
+WRITE = (
+    BARE
+    + """
 from pathlib import Path
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.runs import replacing
@@ -41,6 +46,7 @@ try:
 except OutputError as error:
     print(error.diagnostics[0].code)
 """
+)
 
 
 def python(program: str, *arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -52,7 +58,9 @@ def python(program: str, *arguments: str | Path, cwd: Path) -> subprocess.Comple
 
 def test_a_spec_is_solved_twice_into_one_directory(tmp_path):
     for _ in range(2):
-        done = python(DESIGN, "solve", SPECS / "first_order.yaml", "-o", tmp_path / "run", "--no-figures", cwd=tmp_path)
+        done = python(
+            DESIGN, "solve", SPECS / "first_order.yaml", "-o", tmp_path / "run", "--no-figures", cwd=tmp_path
+        )
         assert done.returncode == 0, done.stderr
     assert "result.json" in os.listdir(tmp_path / "run")
     assert os.listdir(tmp_path) == ["run"]
