@@ -161,4 +161,4 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing is told of requests: the terminal is the user's."""
+        """Print nothing about requests: the terminal is the user's."""

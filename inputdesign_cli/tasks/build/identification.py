@@ -17,7 +17,7 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.convex import build_convex
-from inputdesign_cli.tasks.build.foreseen import build_foreseen
+from inputdesign_cli.tasks.build.foreseen import build_foreseen, build_nominal_covariance
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.knowledge import build_knowledge
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
@@ -54,6 +54,7 @@ def build_identification(spec: Spec) -> Identification:
     return Identification(
         header=build_header(spec),
         nominal=nominal,
+        nominal_covariance=build_nominal_covariance(spec, nominal),
         assessable=bool(spec.accuracy.requirements),
         operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
