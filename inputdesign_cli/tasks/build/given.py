@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.findings.limits_not_kept import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
@@ -32,7 +33,6 @@ from inputdesign_cli.tasks.build.system import (
     record_step,
 )
 from inputdesign_cli.tasks.given import GivenExcitation, GivenTask
-from inputdesign_cli.tasks.result.given_limits import StatedLimits
 
 _REFUSED = ("spectrum", "energy")
 # Keys of signals that mean something for a record that the tool makes.
