@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from inputdesign_cli.errors import DataError, IdesignError, OutputError
-from inputdesign_cli.runs.results import Results
-from inputdesign_cli.runs.run_directory import read_run, write_run
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.run_directory import read_run, write_run
 from inputdesign_cli.sweep.layout import at_work
 from inputdesign_cli.sweep.running import sweep
 from tests.support.campaigns import SPEC, applied
@@ -147,7 +147,7 @@ def test_a_pipe_in_a_folder_of_work_is_not_waited_for(tmp_path):
     [".lock", ".process", ".worker-1", "sweep.json", "sweep.csv", "sweep.yaml", "result.json", "failure"],
 )
 def test_a_pipe_in_a_sweep_is_not_waited_for(tmp_path, monkeypatch, name):
-    monkeypatch.setattr("inputdesign_cli.tasks.solve", lambda spec: a_run())
+    monkeypatch.setattr("inputdesign_cli.questions.solve", lambda spec: a_run())
     spec = tmp_path / "s.yaml"
     spec.write_text(SPEC.split("campaign:")[0])
     out = tmp_path / "out"

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import get_args
 
 from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
 from inputdesign_cli.sweep.point import PointJob
