@@ -15,7 +15,11 @@ def read_regular(path: str | os.PathLike[str], most: int = -1) -> bytes:
             socket or a device.
         ValueError: the path holds what the operating system cannot name.
     """
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+    with open(path, "rb", opener=_without_waiting) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError(errno.EINVAL, "it is a pipe or a device, not a file", os.fspath(path))
         return file.read(most)
+
+
+def _without_waiting(name: str, flags: int) -> int:
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))  # Windows: files are no pipes

@@ -107,6 +107,7 @@ def proceed(
         from inputdesign_cli.outcome.record import SPEC
         from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
+        from inputdesign_cli.questions.campaign.pictures import with_earlier_pictures
         from inputdesign_cli.specification import parse_spec
         from inputdesign_cli.tasks.build.preparation import Preparation
 
@@ -126,6 +127,8 @@ def proceed(
                 )
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
+            if not figures:
+                results = with_earlier_pictures(results, directory)
         renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
     code = _EXIT[results.result["status"]]
     if code:

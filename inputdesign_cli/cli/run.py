@@ -11,6 +11,7 @@ import typer
 
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import OutputError
+from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.origin import Origin
@@ -175,7 +176,7 @@ def show(
         replaced: whether a run with other values stood there before.
     """
     if json_output and files:
-        typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
+        typer.echo(read_regular(files[-1]).decode(), nl=False)
     elif json_output:
         from inputdesign_cli.outcome.run_directory import finished_result
         from inputdesign_cli.outcome.text_formats import json_text

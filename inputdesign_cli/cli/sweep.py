@@ -15,6 +15,7 @@ from inputdesign_cli.cli.reading import name_of, standard_input
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 from inputdesign_cli.errors import STANDARD_STREAM
+from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
@@ -119,7 +120,7 @@ def sweep(
     for why in () if quiet else done.damaged:
         typer.echo(f"note: {why}; the point was computed again", err=True)
     if json_output:
-        typer.echo((directory / "sweep.json").read_text(encoding="utf-8"), nl=False)
+        typer.echo(read_regular(directory / "sweep.json").decode(), nl=False)
     elif not quiet:
         typer.echo(_summary(done))
     if done.statuses.get("error") or done.statuses.get("lost"):

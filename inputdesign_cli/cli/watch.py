@@ -16,6 +16,7 @@ from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Override
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain
 from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
+from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.live.board import Board
@@ -85,7 +86,7 @@ def _follow_spec(
     followed, files = Followed(spec.name), [spec]
     while True:
         before, started = stamp(files), time.monotonic()
-        lines = spec.read_text(encoding="utf-8", errors="replace").splitlines() if spec.is_file() else []
+        lines = read_regular(spec).decode(errors="replace").splitlines() if spec.is_file() else []
         board.show(followed.computing().page)
         try:
             with _given_up_when_saved(files, before):

@@ -42,5 +42,12 @@ def executor(jobs: int, cluster: str | None, worker_timeout: float | None, *, qu
     if cluster is not None:
         tell = (lambda text: None) if quiet else (lambda text: typer.echo(text, err=True))
         return Cluster(cluster, worker_timeout=worker_timeout, tell=tell)
-    count = jobs or len(os.sched_getaffinity(0))
+    count = jobs or _cores()
     return Processes(count) if count > 1 else InProcess()
+
+
+def _cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -15,6 +15,7 @@ _PATIENCE = 5.0  # seconds that it may take
 # Lookups and finalizers may drop an interruption, too.
 _MOMENT = 0.05  # seconds until it is raised again
 _waiting_since: list[float] = []
+_HAS_ALARM = hasattr(signal, "SIGALRM")  # not on Windows: what is dropped there stays dropped
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
@@ -32,9 +33,10 @@ def interrupt(number: int, frame: FrameType | None) -> None:
         else:
             interrupt(number, frame)
 
-    signal.signal(signal.SIGALRM, later)
-    signal.setitimer(signal.ITIMER_REAL, _MOMENT)
-    if not (_imports(frame) and _has_patience()):
+    if _HAS_ALARM:
+        signal.signal(signal.SIGALRM, later)
+        signal.setitimer(signal.ITIMER_REAL, _MOMENT)
+    if not (_HAS_ALARM and _imports(frame) and _has_patience()):
         _came.append(number)
         raise _end(number)
 
@@ -83,7 +85,7 @@ def bare_interruptions() -> Iterator[None]:
             raise _end(_came[-1]) from None
         raise
     finally:
-        if _came or _waiting_since:
+        if _HAS_ALARM and (_came or _waiting_since):
             signal.signal(signal.SIGALRM, signal.SIG_IGN)  # one that is on its way would come after the end
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 

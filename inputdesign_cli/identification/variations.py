@@ -1,8 +1,8 @@
 """What a plant that is linear and stays the same does without: an input whose gain changes, or its speed.
 
 In place of G u stands G (u + x f), with a signal f that is made of the same input: the input itself after a
-part of the record, a power of it, its sign, the direction of its last move. Prediction errors are linear in
-u, so that those of f alone are the gradient with respect to x, whatever the structure. Where x is not zero
+part of the record, or times a ramp; a power of it, its sign, the direction of its last move. Prediction
+errors are linear in u, so that their response to f is the gradient with respect to x. Where x is not zero
 there is no single G: small changes of u see another one in each state of the plant, such as early and late,
 or near the middle of the range and far from it.
 
@@ -164,8 +164,10 @@ def _one_way(
 
 
 def _changes(name: str, x: Array) -> Iterator[_Tried]:
-    """The gain of samples x (N,) is another after a part of the record."""
+    """Yield a gain of samples x (N,) that rises evenly, and gains that jump during the record."""
     time = np.arange(x.size) / x.size
+    phrase = f"a gain of {name} that rises or falls evenly during the record"
+    yield f"{name} rising", phrase, "change", (time - 0.5) * x, (-0.5, 0.5)
     for part, share in _PARTS.items():
         phrase = f"another gain of {name} after {part} of the record"
         yield f"{name} after {part}", phrase, "change", np.where(time >= share, x, 0.0), (0.0, 1.0)

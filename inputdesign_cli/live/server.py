@@ -114,7 +114,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """One of three answers, or none."""
-        asked = urlsplit(self.path)
+        try:
+            asked = urlsplit(self.path)
+        except ValueError:  # such as http://[::1
+            self._answer("text/plain", "this is no address\n", HTTPStatus.BAD_REQUEST)
+            return
         if not self._from_here():
             self._answer("text/plain", "this page is for the machine that it runs on\n", HTTPStatus.FORBIDDEN)
         elif asked.path == self.path_prefix:
@@ -157,4 +161,4 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing is told of requests: the terminal is the user's."""
+        """Print nothing about requests: the terminal is the user's."""

@@ -8,8 +8,6 @@ leaves, only while files are moved one by one; and a lock, which ends with its p
 from __future__ import annotations
 
 import ctypes
-import errno
-import fcntl
 import os
 import shutil
 import stat
@@ -17,9 +15,9 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import IO
 
 from inputdesign_cli.errors import OutputError
+from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, listed_files
 
 _PATIENCE = 10.0  # seconds that another writer is waited for
@@ -57,8 +55,8 @@ def _begun(target: Path, held: ExitStack) -> Path:
         work = inside if target.exists() else beside
         try:
             work.mkdir()
-            if held.enter_context(_locked(work)):
-                return work
+            held.enter_context(_locked(work))
+            return work
         except (FileExistsError, FileNotFoundError):
             # Neither a link nor a file of that name goes away by waiting.
             if time.monotonic() > due or (os.path.lexists(work) and not _is_folder(work)):
@@ -75,7 +73,8 @@ def heal(target: Path) -> None:
     for work in _places(target):
         # Whoever else sees to it may be faster.
         with suppress(FileNotFoundError), ExitStack() as held:
-            if _is_folder(work) and held.enter_context(_locked(work)):
+            if _is_folder(work):
+                held.enter_context(_locked(work))
                 _clear(work, target)
 
 
@@ -96,8 +95,11 @@ def put_in_place(names: list[str], owned: Collection[str], work: Path, target: P
 
 
 def sync(path: Path) -> None:
-    """Wait until a file, or the entries of a directory, are on the disc."""
-    handle = os.open(path, os.O_RDONLY)
+    """Wait until a file, or the entries of a directory where the system allows that, are on the disc."""
+    folder = path.is_dir()
+    if folder and not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(path, os.O_RDONLY if folder else os.O_RDWR)
     try:
         os.fsync(handle)
     finally:
@@ -163,6 +165,8 @@ def _same(one: Path, other: Path) -> bool:
 
 def _exchange() -> Callable[[Path, Path], None] | None:
     """What exchanges two folders in one step (raises `OSError`), or None where the system cannot."""
+    if not hasattr(os, "geteuid"):  # Windows
+        return None
     try:
         call = ctypes.CDLL(None, use_errno=True).renameat2
     except (OSError, AttributeError):
@@ -182,25 +186,20 @@ def _move(names: Iterable[str], source: Path, destination: Path) -> None:
 
 
 @contextmanager
-def _locked(work: Path) -> Iterator[bool]:
-    """Hold the lock of a folder of work; False where its owner has removed it in the meantime."""
-    with open(work / "lock", "w", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW)) as lock:
-        due = time.monotonic() + _PATIENCE
-        while not _claimed(lock):
-            if time.monotonic() > due:
+def _locked(work: Path) -> Iterator[None]:
+    """Hold the lock of a folder of work.
+
+    Raises:
+        FileNotFoundError: its owner has removed it in the meantime.
+        OutputError: `output-busy`.
+    """
+    try:
+        with locked(work / "lock", _PATIENCE) as held:
+            if not held:
                 message = f"another process is writing into {work.parent}"
                 hint = "wait for it, or choose another directory with -o"
                 raise OutputError.because("output-busy", message, hint)
-            time.sleep(0.02)
-        yield os.path.exists(lock.name) and os.path.samestat(os.fstat(lock.fileno()), os.stat(lock.name))
-
-
-def _claimed(lock: IO[str]) -> bool:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError as error:
-        if error.errno not in (errno.ENOLCK, errno.ENOTSUP):  # a file system without locks
-            raise
-    return True
+            yield
+    finally:  # Windows keeps a folder that has an open file in it
+        with suppress(OSError):
+            work.rmdir()

@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification.loading import parse_spec, read_tree
 from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
@@ -63,7 +64,7 @@ class SpecTemplate:
 
     def digest(self, data: dict[str, Plain]) -> str:
         """SHA-256 of what a variant says and of the contents of every file that it names."""
-        contents = {n: hashlib.sha256((self.folder / n).read_bytes()).hexdigest() for n in self.files(data)}
+        contents = {n: hashlib.sha256(read_regular(self.folder / n)).hexdigest() for n in self.files(data)}
         return fingerprint({"spec": data, "files": contents} if contents else data)
 
     def files(self, data: dict[str, Plain]) -> list[str]:

@@ -5,7 +5,7 @@
     sweep.csv            one row a point
     points/<key>/        the run directory of a point that has a result
     failures/<key>.json  why a point has none
-    .lock, .workers      locks; they hold as long as their processes live
+    .lock, .worker-<id>  locks; they hold as long as their processes live. .process names who holds .lock
 
 A point is done when its directory or its failure stands: both appear in one step. `<key>` is a hash of
 the resolved spec, of the files that it names, of the command and of the version of this package.
@@ -14,23 +14,24 @@ the resolved spec, of the files that it names, of the command and of the version
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import shutil
+import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import PAGE, RESULT, is_page, is_plain, unreadable
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.regular_file import read_regular
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
-LOCK, WORKERS = ".lock", ".workers"
+LOCK, OWNER, WORKER = ".lock", ".process", ".worker-"
+_ENDLESS = -1.0  # seconds, in the words of `locked`
 
 
 @dataclass(frozen=True)
@@ -147,33 +148,33 @@ def opened(root: Path) -> Iterator[Layout]:
                 message = f"{root} already has {', '.join(foreign[:4])}, and no {SUMMARY} of an earlier sweep"
                 hint = "choose another directory with -o"
                 raise OutputError.because("output-not-a-sweep", message, hint)
-            lock = held.enter_context((root / LOCK).open("a+", encoding="utf-8"))
-            _claim(lock, root)
-            with (root / WORKERS).open("a") as workers:
+            if not held.enter_context(locked(root / LOCK)):
+                raise _taken(root)
+            replace_text(root / OWNER, str(os.getpid()))
+            for worker in root.glob(f"{WORKER}*"):
                 # Processes of a killed sweep hold it until they have noticed, which takes no time.
-                fcntl.flock(workers, fcntl.LOCK_EX)
+                with locked(worker, _ENDLESS):
+                    worker.unlink(missing_ok=True)
             layout = Layout(root)
             layout.clear()
         yield layout
 
 
-def _claim(lock: IO[str], root: Path) -> None:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        lock.seek(0)
-        owner = lock.read().strip()
-        message = f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}"
-        hint = "wait for it, or choose another directory with -o"
-        raise OutputError.because("sweep-locked", message, hint) from None
-    lock.truncate(0)
-    lock.write(str(os.getpid()))
-    lock.flush()
+def _taken(root: Path) -> OutputError:
+    owner = ""
+    with contextlib.suppress(OSError):
+        owner = read_regular(root / OWNER, 20).decode(errors="replace").strip()
+    message = f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}"
+    return OutputError.because("sweep-locked", message, "wait for it, or choose another directory with -o")
 
 
 @contextlib.contextmanager
 def at_work(root: Path) -> Iterator[None]:
     """Held by a process that writes a point, so that no other sweep begins before it has ended."""
-    with (root / WORKERS).open("a") as workers:
-        fcntl.flock(workers, fcntl.LOCK_SH)
-        yield
+    lock = root / f"{WORKER}{uuid.uuid4().hex}"
+    with locked(lock):
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                lock.unlink()

@@ -12,6 +12,7 @@ from typing import get_args
 
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
 from inputdesign_cli.sweep.point import PointJob
@@ -52,7 +53,7 @@ class Plan:
         if with_files:
             with suppress(SpecError):
                 names = [*self.draft.included, *self.draft.files(self.draft.variant(overrides))]
-                files = {name: (self.draft.folder / name).read_bytes() for name in names}
+                files = {name: read_regular(self.draft.folder / name) for name in names}
         return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
 
     def resolved(self, index: int) -> str | None:

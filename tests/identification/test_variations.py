@@ -6,6 +6,7 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import Moves, identify, that_matter
+from inputdesign_cli.identification.adequacy import DIRECTED_LEVEL, LEVEL, SHIFT_LEVEL
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
 from tests.support.records import shifted, simulated
@@ -29,6 +30,7 @@ def estimated(u, y):
 @pytest.mark.parametrize(
     ("name", "signal"),
     [
+        ("u rising", lambda u: (np.arange(u.size) / u.size - 0.5) * u),
         ("u after half", lambda u: np.where(np.arange(u.size) >= u.size / 2, u, 0.0)),
         ("u^2", np.square),
         ("u^3", lambda u: u**3),
@@ -45,7 +47,7 @@ def test_of_arx_it_is_the_score_test_of_a_regression(name, signal):
     y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u) + scipy.signal.lfilter([1], [1, -1.5, 0.7], e)
     found = identify(SYSTEMS["arx"], u[:, None], y[:, None], rest=True)
     f = signal(u)
-    if "after" not in name:
+    if "after" not in name and name != "u rising":
         f = f - np.polyval(np.polyfit(u, f, 1), u)
     own = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
     b1, b2 = found.theta[2:]
@@ -70,6 +72,20 @@ def test_a_gain_that_doubles_half_way_is_found_with_both_values():
     true = scipy.signal.freqz([0, 0.2], [1, -0.8], w)[1]
     assert np.abs(before / true) == pytest.approx([1.0, 1.0], abs=0.04)
     assert np.abs(after / true) == pytest.approx([1.3, 1.3], abs=0.04)
+
+
+def test_a_gain_that_rises_evenly_is_found_with_both_ends():
+    u = np.random.default_rng(1).standard_normal(800)
+    found = estimated(u, through(np.linspace(0.85, 1.15, 800) * u))
+    one = varying(found)["u rising"]
+    assert one.test in found.failed
+    assert one.test.probability == min(other.test.probability for other in varying(found).values())
+    model = one_channel([0, 0.2], F=[1, -0.8], D=[1, -0.7]).at(found.theta)
+    w = np.array([0.01, 0.1])
+    begin, end = (model.plant_at(w) + one.moves(model, w))[..., 0, 0]
+    true = scipy.signal.freqz([0, 0.2], [1, -0.8], w)[1]
+    assert np.abs(begin / true) == pytest.approx([0.85, 0.85], abs=0.04)
+    assert np.abs(end / true) == pytest.approx([1.15, 1.15], abs=0.04)
 
 
 def backlash(u, width):
@@ -105,7 +121,8 @@ def test_an_input_of_two_values_has_no_powers():
     model = one_channel([0, 0.2], F=[1, -0.8], D=[1, -0.7])
     u[400:] += 0.5
     found = identify(model, u[:, None], y[:, None], lengths=(400, 400))
-    assert {name for name in varying(found) if "after" not in name} == {"direction of y"}
+    changes = {name for name in varying(found) if "after" in name} | {"u rising"}
+    assert varying(found).keys() - changes == {"direction of y"}
     assert not found.failed
 
 
@@ -194,3 +211,19 @@ def test_what_matters_shares_a_level_among_its_like():
     assert [tried[i].test.probability * among < 0.005 for i in changes] == [True] * len(changes)
     assert changes
     assert not set(that_matter(tried, near)) & set(changes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "runs"), [("arx", 600), ("bj", 150)])
+def test_right_models_fail_no_more_often_than_the_level_allows(name, runs):
+    """All single parameters share DIRECTED_LEVEL, and all tests together the sum of the levels."""
+    rng = np.random.default_rng(11)
+    model = SYSTEMS[name]
+    u, y = data(name, 300, rng, runs=runs)
+    found = [identify(model, u[i], y[i], start=model.theta, rest=True) for i in range(runs)]
+    directed = sum(any(one.test in f.failed for one in f.directed) for f in found)
+    every = sum(bool(f.failed) for f in found)
+    assert scipy.stats.binomtest(directed, runs, DIRECTED_LEVEL, "greater").pvalue > 1e-2
+    assert scipy.stats.binomtest(every, runs, DIRECTED_LEVEL + LEVEL + SHIFT_LEVEL, "greater").pvalue > 1e-2
+    rising = [varying(f)["u rising"].test.probability for f in found]
+    assert scipy.stats.kstest(rising, "uniform").pvalue > 1e-3

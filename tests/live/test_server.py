@@ -6,9 +6,10 @@ import socket
 import struct
 import threading
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 from inputdesign_cli.errors import OutputError
@@ -141,3 +142,70 @@ def test_a_port_that_is_taken_is_told(served):
     with pytest.raises(OutputError) as caught, serving(Board(), address.port):
         pass
     assert caught.value.diagnostics[0].code == "port-taken"
+
+
+def malformed() -> list[bytes]:
+    """Requests that are none: broken targets, versions and headers, and random bytes in each place."""
+    rng = np.random.default_rng(1)
+    marks = [
+        b"[",
+        b"]",
+        b"//",
+        b"\x00",
+        b"%",
+        b"%zz",
+        b"\xff",
+        b"\x85",
+        b"@:",
+        b"?version=\xb2",
+        b" ",
+        b"\t",
+        b"\r",
+        b"#",
+    ]
+    targets = [
+        b"http://[::1",
+        b"//[",
+        b"http://]:x/",
+        b"*",
+        b"",
+        b"http://[v1.x]/",
+        b"http://a\xe2\x84\x80/",
+        b"/" * 70000,
+    ]
+    targets += [b"http://" + b"".join(rng.choice(marks, 4)) + b"/" for _ in range(60)]
+    requests = [b"GET " + target + b" HTTP/1.1\r\n\r\n" for target in targets]
+    versions = [b"HTTP/1.\xb2", b"HTTP/9", b"HTTP/-1.1", b"HTTP/1.1.1", b"FTP/1.0", b"HTTP/2.0", b"HTTP/"]
+    requests += [b"GET / " + version + b"\r\n\r\n" for version in versions]
+    headers = [
+        b"Host",
+        b": x",
+        b"Host: \xff\x00",
+        b" folded",
+        b"Content-Length: -1",
+        b"Expect: 100-continue",
+        b"A: " + b"x" * 70000,
+    ]
+    headers += [
+        b"\r\n".join(b"h%d: 1" % k for k in range(300)),
+        b'Content-Type: multipart/mixed; boundary="',
+        b"Sec-Fetch-Site: \xff",
+    ]
+    requests += [b"GET / HTTP/1.1\r\n" + header + b"\r\n\r\n" for header in headers]
+    requests += [rng.bytes(int(rng.integers(1, 200))) + b"\r\n\r\n" for _ in range(60)]
+    return [*requests, b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/1.1 x\r\n\r\n", b"TRACE / HTTP/1.1\r\n\r\n"]
+
+
+def test_no_malformed_request_reaches_the_terminal(served, capsys):
+    _, address = served
+    for request in malformed():
+        with (
+            socket.create_connection((address.hostname, address.port), timeout=10) as client,
+            suppress(ConnectionError),
+        ):
+            client.sendall(request)
+            client.shutdown(socket.SHUT_WR)
+            while client.recv(65536):
+                pass
+    assert ask(address, address.path)[0] == 200
+    assert capsys.readouterr() == ("", "")

@@ -89,3 +89,24 @@ def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
     own, more = plant([]), plant(["plant.B=[0, 0, 0, 0.001, 0.04]"])
     to_first_order = np.max(np.abs(more - own) / np.abs(own)) / 0.1
     assert entries["b3"]["moves"] == pytest.approx(to_first_order, rel=0.05)
+
+
+RISING = """
+plant: {B: [0, 0.2], F: [1, -0.8]}
+noise: {variance: 1.0}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.3}}
+spectrum: {type: white}
+"""
+
+
+def test_a_gain_that_rises_by_half_during_the_record_is_not_met(tmp_path):
+    rng = np.random.default_rng(1)
+    u, e = rng.standard_normal(400), 0.3 * rng.standard_normal(400)
+    verdicts = []
+    for half in (0.0, 0.25):
+        y = scipy.signal.lfilter([0, 0.2], [1, -0.8], np.linspace(1 - half, 1 + half, 400) * u) + e
+        columns = np.column_stack([u, y])
+        np.savetxt(tmp_path / "a.csv", columns, delimiter=",", header="u,y", comments="")
+        verdicts.append(assess(parse_spec(RISING), tmp_path / "a.csv").verdict)
+    assert verdicts == ["met", "undecided"]

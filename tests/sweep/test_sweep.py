@@ -36,7 +36,7 @@ def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
         assert f"order: {row['spectrum.order']}" in (run / "spec.yaml").read_text()
         assert "sweep" not in (run / "spec.yaml").read_text()
     assert {p.name for p in out.iterdir()} == {
-        "sweep.csv", "sweep.json", "sweep.yaml", "points", "curves.png", "map.png", ".lock", ".workers"
+        "sweep.csv", "sweep.json", "sweep.yaml", "points", "curves.png", "map.png", ".lock", ".process"
     }  # fmt: skip
     assert [(p.passed, p.computed) for p in seen] == [(i, i) for i in range(1, 7)]
 

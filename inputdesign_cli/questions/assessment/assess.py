@@ -216,16 +216,18 @@ def _from_nominal(
     task: Identification, found: Identified, question: ModelQuestion
 ) -> tuple[dict[str, Json], list[str]]:
     """How far the estimate is from the plant of the spec, and a note where that is far."""
-    asked = model_errors(question.requirements)
-    information, estimate = question.information, found.estimate
+    asked, estimate = model_errors(question.requirements), found.estimate
+    factor = estimate.factor
+    uncertain = np.linalg.inv(question.information) + factor.T @ task.nominal_covariance @ factor
     told, notes = from_nominal(
         task.header.units,
         task.nominal,
         found.model,
         estimate,
         asked or question.entries,
-        information,
+        np.asarray(np.linalg.inv(uncertain), dtype=float),
         asked=bool(asked),
+        nominal_covariance=task.nominal_covariance,
     )
     if task.foreseen is None or not task.foreseen(estimate.theta, estimate.covariance):
         return told, notes

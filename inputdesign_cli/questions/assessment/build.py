@@ -17,7 +17,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.blocks import blocks_of
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
-from inputdesign_cli.questions.building.foreseen import build_foreseen
+from inputdesign_cli.questions.building.foreseen import build_foreseen, build_nominal_covariance
 from inputdesign_cli.questions.building.knowledge import build_knowledge
 from inputdesign_cli.questions.building.model_error import (
     build_calibration,
@@ -58,6 +58,7 @@ def build_identification(spec: Spec) -> Identification:
     return Identification(
         header=build_header(spec),
         nominal=nominal,
+        nominal_covariance=build_nominal_covariance(spec, nominal),
         assessable=bool(spec.accuracy.requirements),
         operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),

@@ -72,6 +72,7 @@ class Identification:
 
     Attributes:
         nominal: the structure; its parameters are one of the starts.
+        nominal_covariance: (k, k), of its parameters, zero where the spec states none.
         assessable: whether any accuracy is asked for that data could meet or miss.
         operating_point: by channel, what the spec says that signals vary about.
         earlier: the prior as an estimate, which counts along; None where it has no values.
@@ -86,6 +87,7 @@ class Identification:
 
     header: Header
     nominal: Model
+    nominal_covariance: Array
     assessable: bool
     operating_point: Mapping[str, float]
     earlier: Earlier | None

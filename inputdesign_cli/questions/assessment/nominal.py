@@ -44,18 +44,22 @@ def from_nominal(
     information: Array,
     *,
     asked: bool = False,
+    nominal_covariance: Array | None = None,
 ) -> tuple[dict[str, Json], list[str]]:
     """What `assessment.nominal` says, and a note where the two are different plants.
 
     Args:
         nominal, estimated: of one structure.
         errors: what has r_u and a band, entry by entry; information (k, k) is in their coordinates.
+        information: the inverse covariance of the difference of the two.
         asked: whether they have an r_adm, below which a difference of G matters to nothing.
+        nominal_covariance: (k, k), how uncertain the plant of the spec is; None if it counts as known.
     """
     of_plant = np.flatnonzero(estimated.in_plant)
     away = (nominal.theta - estimate.theta)[of_plant]
-    scale = np.sqrt(np.diag(estimate.covariance))[of_plant]
-    correlation = estimate.covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
+    covariance = estimate.covariance + (0.0 if nominal_covariance is None else nominal_covariance)
+    scale = np.sqrt(np.diag(covariance))[of_plant]
+    correlation = covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
     statistic = float((away / scale) @ np.linalg.lstsq(correlation, away / scale, rcond=None)[0])
     found = [_apart(units, nominal, estimated, error, information, asked) for error in errors]
     worst = max((one for places in found for one in places), key=lambda one: one.share, default=None)

@@ -1,4 +1,4 @@
-"""Whether an estimate is one of the plants that `uncertainty` states, for which the design was made."""
+"""How uncertain the spec's own plant is, and whether an estimate is one of the plants that it allows."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.building.parameter_draws import reach
+from inputdesign_cli.questions.building.parameter_draws import reach, second_moments
 from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.specification import Spec
 
 # The ellipsoid of a stated covariance, and the deviations by which an estimate may be off.
 _CONFIDENCE, _OFF = 0.998, 3.0
+# An `estimate` block farther from the plant, in standard deviations, is about another one.
+_AWAY = 3.0
 
 Foreseen = Callable[[Array, Array], bool]
 
 
 def build_foreseen(spec: Spec, nominal: Model) -> Foreseen | None:
-    """Tells of parameters (k,) and their covariance (k, k); None without a stated region.
+    """Return the check of parameters (k,) and their covariance (k, k); None without a stated region.
 
     A parameter of G that is not drawn must be that of the spec, as far as the estimate tells.
     """
@@ -38,3 +40,23 @@ def build_foreseen(spec: Spec, nominal: Model) -> Foreseen | None:
         return bool(away @ np.linalg.solve(wide @ wide.T + own, away) <= 1.0)
 
     return foreseen
+
+
+def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
+    """Return the covariance (k, k) of the parameters of the spec's own plant; zero where it states none.
+
+    It is that of `uncertainty`, or else of the `estimate` block that identify wrote.
+    """
+    covariance = np.zeros((nominal.theta.size, nominal.theta.size))
+    if spec.uncertainty is not None:
+        moments = second_moments(spec, spec.uncertainty, build_experiment(spec))
+        covariance[: len(moments), : len(moments)] = moments
+    elif spec.estimate is not None:
+        names = list(nominal.names)
+        rows = [row for row, name in enumerate(spec.estimate.parameters) if name in names]
+        own = [names.index(list(spec.estimate.parameters)[row]) for row in rows]
+        stated = np.array(spec.estimate.covariance, dtype=float)[np.ix_(rows, rows)]
+        away = np.array(list(spec.estimate.parameters.values()))[rows] - nominal.theta[own]
+        if np.all(np.abs(away) <= _AWAY * np.sqrt(np.diag(stated))):
+            covariance[np.ix_(own, own)] = stated
+    return covariance

@@ -5,6 +5,7 @@
     plan_01.csv, ..        what was to be applied in every part
     record_01.csv, ..      what was recorded; record_01_as_given.csv is the file of the user
     model_01.yaml, ..      the estimate after so many records
+    .lock                  held by the process that decides
     result.json            under `campaign` all decisions, and digests of all that they are made by
 
 A decision replaces the directory as a run replaces another: whatever kills the writer, it holds the state
@@ -13,17 +14,16 @@ before or after.
 
 from __future__ import annotations
 
-import fcntl
-import os
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC, load_result, unreadable
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
@@ -43,6 +43,7 @@ _HINTS = {
 }
 _KEPT = re.compile(r"(plan|record|model)_\d\d+(_as_given)?\.[a-z0-9]+")
 _RECORDS = "record_*"
+_LOCK = ".lock"
 
 
 @dataclass(frozen=True)
@@ -152,27 +153,18 @@ def _read(directory: Path, withdrawing: int | None) -> Memory:
 
 @contextmanager
 def held(directory: Path) -> Iterator[None]:
-    """Nobody else decides in this directory meanwhile.
+    """Keep other processes from deciding in this directory meanwhile.
 
     Raises:
-        DataError: `run-missing`.
-        OutputError: `output-busy`.
+        DataError: `run-missing`, `run-unreadable`.
+        OutputError: `output-busy`, `output-not-writable`.
     """
-    try:
-        handle = os.open(directory / RESULT, os.O_RDONLY | os.O_NOFOLLOW)
-    except OSError:
-        with _no_run(directory):
-            load_result(directory)  # says what is wrong
-        raise
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            current = os.path.samestat(os.fstat(handle), os.stat(directory / RESULT))
-        except OSError:
-            current = False
-        if not current:
+    with _no_run(directory):
+        load_result(directory)
+    with ExitStack() as stack:
+        with output_errors(directory):
+            alone = stack.enter_context(locked(directory / _LOCK))
+        if not alone:
             message = f"another process works on the campaign in {directory}"
             raise OutputError.because("output-busy", message, "wait for it, and see `idesign status` then")
         yield
-    finally:
-        os.close(handle)

@@ -1,13 +1,18 @@
-"""How a campaign went: rounds.csv, and the figures of the estimates and of what has been reached."""
+"""How a campaign went: rounds.csv, its figures, and the pictures of the last decision."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves
-from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.record import listed_files
+from inputdesign_cli.outcome.results import Json, Results, Table
+from inputdesign_cli.outcome.run_directory import output_errors
+from inputdesign_cli.regular_file import read_regular
 
 
 def history(rounds: Sequence[Mapping[str, Json]], end: int) -> tuple[Table, dict[str, Curves]]:
@@ -34,3 +39,22 @@ def history(rounds: Sequence[Mapping[str, Json]], end: int) -> tuple[Table, dict
         "estimates": EstimateCurves(samples, estimates, spreads),
     }
     return Table(columns), curves
+
+
+def with_earlier_pictures(results: Results, directory: Path) -> Results:
+    """Return the results with the pictures of the last decision, and a note that they are older.
+
+    Raises:
+        OutputError: a picture cannot be read.
+    """
+    names = [name for name in listed_files(directory) if name.endswith(".png")]
+    if not names:
+        return results
+    with output_errors(directory):
+        pictures = {name: read_regular(directory / name) for name in names}
+    note = (
+        f"{', '.join(names)} show the campaign before this decision, which was made with --no-figures: "
+        f"`idesign next {directory}` draws them anew"
+    )
+    result = {**results.result, "notes": [*results.result.get("notes", []), note]}
+    return replace(results, result=result, files={**results.files, **pictures})

@@ -1,0 +1,163 @@
+"""No file that a user can replace by a pipe is waited for: every place that opens one is known, and tried."""
+
+import ast
+import os
+import shutil
+import signal
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from inputdesign_cli.errors import DataError, IdesignError, OutputError
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.run_directory import read_run, write_run
+from inputdesign_cli.sweep.layout import at_work
+from inputdesign_cli.sweep.running import sweep
+from tests.support.campaigns import SPEC, applied
+from tests.support.commands import caller
+from tests.test_architecture import FILES, ROOT
+
+OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loadtxt", "genfromtxt", "cmp"}
+# Where a file is opened otherwise than by `read_regular`, how often, and why nothing waits there.
+OPENED = {
+    "regular_file.py": (2, "the function itself"),
+    "error_codes.py": (1, "a file of the package"),
+    "cli/init.py": (1, "a file of the package"),
+    "cli/examples.py": (1, "a file of the package"),
+    "cli/streams.py": (3, "the null device and the standard streams"),
+    "runs/origin.py": (1, "a comparison of plain files"),
+    "runs/replacing.py": (1, "files that were just written into a folder of its own"),
+    "runs/run_directory.py": (
+        2,
+        "a new file, which has the name of the process; a comparison of plain files",
+    ),
+    "sweep/point.py": (1, "a temporary folder of its own"),
+}
+# Functions of ours with one of these names read by `read_regular`.
+OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.tasks.build.files.text"}
+
+
+def opened(path: Path) -> int:
+    """How often a file of the package opens another one."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    ours = {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module in OURS
+        for alias in node.names
+    }
+    called = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    names = [f.attr for f in called if isinstance(f, ast.Attribute)]
+    names += [f.id for f in called if isinstance(f, ast.Name) and f.id not in ours]
+    return sum(name in OPENING for name in names)
+
+
+def test_every_place_that_opens_a_file_is_known():
+    found = {path.relative_to(ROOT).as_posix(): opened(path) for path in FILES}
+    assert {name: times for name, times in found.items() if times} == {
+        name: times for name, (times, _) in OPENED.items()
+    }
+
+
+@contextmanager
+def in_time(seconds: float = 20.0):
+    """Fail in place of waiting for ever."""
+
+    def end(*_):
+        raise AssertionError("something waits for a pipe")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def piped(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+
+
+KEPT = [
+    "result.json", "spec.yaml", "signal.csv", "plan_01.csv", "record_01.csv", "record_01_as_given.csv",
+    "model_01.yaml", "rounds.csv", "figures.json", ".lock",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """A campaign with one record, and the record of its next part."""
+    folder = tmp_path_factory.mktemp("campaign")
+    (folder / "s.yaml").write_text(SPEC)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+
+        class Captured:
+            def readouterr(self):
+                return "", ""
+
+        run = caller(patch, Captured())
+        assert run("campaign", "s.yaml", "-o", "c", "--no-figures", "--quiet")[0] == 0
+        assert run("next", "c", applied(folder / "c", folder / "r1.csv"), "--no-figures", "--quiet")[0] == 0
+    applied(folder / "c", folder / "r2.csv")
+    return folder
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_a_pipe_in_a_campaign_is_not_waited_for(campaign, tmp_path, monkeypatch, capsys, name):
+    shutil.copytree(campaign / "c", tmp_path / "c")
+    piped(tmp_path / "c" / name)
+    monkeypatch.chdir(tmp_path)
+    run = caller(monkeypatch, capsys)
+    for command in (["next", "c", campaign / "r2.csv", "--no-figures"], ["status", "c"], ["report", "c"]):
+        with in_time():
+            code, _, err = run(*command)
+        assert code in (0, 2), err
+        assert "Traceback" not in err
+
+
+def a_run() -> Results:
+    return Results({"format": 1, "title": "one", "status": "optimal"}, "title: one\n", "s", {}, {}, {})
+
+
+@pytest.mark.parametrize("name", ["result.json", "spec.yaml", "signal.csv", "report.html", "figures.json"])
+def test_a_pipe_in_a_run_is_not_waited_for(tmp_path, name):
+    write_run(a_run(), tmp_path / "a")
+    piped(tmp_path / "a" / name)
+    with in_time():
+        for use in (lambda: write_run(a_run(), tmp_path / "a"), lambda: read_run(tmp_path / "a")):
+            with suppress(DataError, OutputError):
+                use()
+
+
+def test_a_pipe_in_a_folder_of_work_is_not_waited_for(tmp_path):
+    write_run(a_run(), tmp_path / "a")
+    (tmp_path / "a" / ".run.partial").mkdir()
+    piped(tmp_path / "a" / ".run.partial" / "lock")
+    with in_time():
+        write_run(a_run(), tmp_path / "a")
+    assert read_run(tmp_path / "a")["title"] == "one"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [".lock", ".process", ".worker-1", "sweep.json", "sweep.csv", "sweep.yaml", "result.json", "failure"],
+)
+def test_a_pipe_in_a_sweep_is_not_waited_for(tmp_path, monkeypatch, name):
+    monkeypatch.setattr("inputdesign_cli.questions.solve", lambda spec: a_run())
+    spec = tmp_path / "s.yaml"
+    spec.write_text(SPEC.split("campaign:")[0])
+    out = tmp_path / "out"
+    sweep(spec, ["experiment.samples=100,200"], directory=out)
+    key = min(path.name for path in (out / "points").iterdir())
+    (out / "failures").mkdir(exist_ok=True)
+    place = {"result.json": f"points/{key}/result.json", "failure": f"failures/{key}.json"}
+    piped(out / place.get(name, name))
+    with in_time():
+        with suppress(IdesignError):
+            sweep(spec, ["experiment.samples=100,200"], directory=out)
+        with at_work(out):
+            pass
