@@ -16,7 +16,7 @@ from inputdesign_cli.version import __version__
 if TYPE_CHECKING:
     from inputdesign_cli.figures.plots import figure
     from inputdesign_cli.specification import Spec, from_control, load_spec, parse_spec
-    from inputdesign_cli.sweep.running import sweep
+    from inputdesign_cli.sweeps.notebook import sweep
     from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, to_control, validate
 
 
@@ -50,7 +50,7 @@ _HOME = {
     "assess": "inputdesign_cli.tasks",
     "identify": "inputdesign_cli.tasks",
     "validate": "inputdesign_cli.tasks",
-    "sweep": "inputdesign_cli.sweep.running",
+    "sweep": "inputdesign_cli.sweeps.notebook",
 }
 
 

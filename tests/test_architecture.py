@@ -19,7 +19,7 @@ ORDER = [
     {"runs"},
     {"monte_carlo"},
     {"tasks"},
-    {"sweep", "campaign", "figures", "wizard"},
+    {"sweeps", "campaign", "figures", "wizard"},
     {"report"},
     {"live"},
     {"cli", "__main__"},
@@ -139,7 +139,7 @@ def test_no_two_files_need_each_other():
 
 # Who may know the spec: those that read or write it, those that turn it into objects or hand it to those, and
 # the page of a report that restates it in words.
-SPEC_ROOMS = {"specification", "sweep", "wizard", "cli"}
+SPEC_ROOMS = {"specification", "sweeps", "wizard", "cli"}
 SPEC_FILES = {"tasks/__init__.py", "report/question.py"}
 
 

@@ -24,7 +24,7 @@ from inputdesign_cli.report.sources import citations
 from inputdesign_cli.runs.objectives import OBJECTIVES, objective
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import read_run
-from inputdesign_cli.sweep.kept import run_flaw
+from inputdesign_cli.sweeps.kept import run_flaw
 
 MOST_ROWS = 200
 _SHOWN = (

@@ -14,7 +14,7 @@ from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.live.pages import Followed, message_page
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.runs.run_directory import write_run
-from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweeps.running import run_sweep
 from inputdesign_cli.tasks import explore
 from tests.support.browser import clipped, needs_browser, started, violations
 from tests.support.campaigns import applied
@@ -90,7 +90,7 @@ def places(runs, record, tmp_path_factory):
         write_run(found, made[name])
     for name, (settings, rows) in SWEEPS.items():
         made[name] = folder / name
-        sweep(runs / "open.yaml", settings, directory=made[name])
+        run_sweep(runs / "open.yaml", settings, directory=made[name])
         table = made[name] / "sweep.csv"
         lines = table.read_text().splitlines()[rows]
         pending = ",".join(["800", "pending", *[""] * (lines[0].count(",") - 1)])

@@ -12,8 +12,8 @@ from inputdesign_cli.runs.origin import digest
 from inputdesign_cli.runs.record import SPEC
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import read_run
-from inputdesign_cli.sweep.layout import Layout
-from inputdesign_cli.sweep.point import FAILURES
+from inputdesign_cli.sweeps.layout import Layout
+from inputdesign_cli.sweeps.point import FAILURES
 
 # Values and bounds are written to all digits; a gap may be of a bound that was rounded up to the value.
 _ROUNDING = 1e-6
