@@ -1,8 +1,9 @@
-"""What each error code means: `error_codes.yaml`, read when somebody asks."""
+"""Explain the codes of errors: `error_codes.yaml`, read when somebody asks."""
 
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -28,15 +29,19 @@ def explanations() -> dict[str, Explanation]:
     return {code: Explanation(**entry) for code, entry in yaml.safe_load(content).items()}
 
 
-def explanation(code: str) -> str:
-    """The explanation of a code as text for a terminal.
+def explanation(code: str, known: Mapping[str, Explanation]) -> str:
+    """Return the explanation of a code as text for a terminal.
+
+    Args:
+        code: what is asked for.
+        known: all codes there are.
 
     Raises:
-        SpecError: There is no such code; the hint names a similar one.
+        SpecError: there is no such code; the hint names a similar one.
     """
-    known = explanations().get(code)
-    if known is None:
-        near = difflib.get_close_matches(code, explanations(), n=1)
+    if code not in known:
+        near = difflib.get_close_matches(code, known, n=1)
         hint = f'did you mean "{near[0]}"?' if near else "`idesign explain` lists all codes"
-        raise bad_spec("unknown-code", f"there is no error code {code!r}", hint=hint)
-    return f"{code}: {known.title}\n\n{known.text}\n\nWhat to do: {known.remedy}"
+        raise bad_spec("unknown-code", f"there is no code {code!r}", hint=hint)
+    found = known[code]
+    return f"{code}: {found.title}\n\n{found.text}\n\nWhat to do: {found.remedy}"

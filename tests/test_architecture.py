@@ -11,13 +11,15 @@ ROOT = Path(inputdesign_cli.__file__).parent
 
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
 ORDER = [
-    {"arrays", "errors", "error_codes", "expressions", "version", "regular_file", "compute"},
+    {"arrays", "errors", "finding", "error_codes", "expressions", "version", "regular_file", "compute"},
     {"diagnostics"},
     {"specification", "plant"},
     {"spectrum", "information", "accuracy"},
     {"design", "signal", "identification"},
+    {"outcome"},
     {"runs"},
     {"monte_carlo"},
+    {"findings"},
     {"tasks"},
     {"sweeps", "campaign", "figures", "wizard"},
     {"report"},
@@ -259,7 +261,8 @@ def test_results_are_plain_data():
     assert imported_rooms(ROOT / "runs" / "curves.py") == set()
     taken = {module for module, _ in imports(ROOT / "runs" / "results.py")}
     assert {module for module in taken if module.startswith("inputdesign_cli")} == {
-        "inputdesign_cli.runs.curves"
+        "inputdesign_cli.runs.curves",
+        "inputdesign_cli.outcome",
     }
 
 

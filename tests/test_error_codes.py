@@ -85,7 +85,7 @@ def test_no_code_is_explained_twice():
 
 
 def test_explaining():
-    assert explanation("not-monic").startswith("not-monic: ")
+    assert explanation("not-monic", explanations()).startswith("not-monic: ")
     with pytest.raises(SpecError) as caught:
-        explanation("not-monik")
+        explanation("not-monik", explanations())
     assert caught.value.diagnostics[0].hint == 'did you mean "not-monic"?'

@@ -19,7 +19,7 @@ from inputdesign_cli.campaign.unchanged import digests
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.curves import Curves, SignalCurves
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.results import Json, Results, Table, typed
 from inputdesign_cli.runs.text_formats import csv_columns, csv_text
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 
@@ -80,7 +80,7 @@ def advanced(
     if not notes:
         return decided
     told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
-    return replace(decided, result={**decided.result, "notes": list(told)})
+    return replace(decided, outcome=typed({**decided.result, "notes": list(told)}))
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
@@ -129,7 +129,7 @@ def _again(
         told = _refuted(memory.directory, records, past.done, decision.rules.end)
         decision = replace(decision, notes=(told, *decision.notes))
     results = _decided(decision, campaign, files)
-    return replace(results, result={**results.result, "made_from": list(memory.made_from)})
+    return replace(results, outcome=typed({**results.result, "made_from": list(memory.made_from)}))
 
 
 def _refuted(directory: Path, records: Sequence[Mapping[str, Json]], done: int, end: int) -> str:
@@ -277,5 +277,5 @@ def _decided(decision: Decision, campaign: Mapping[str, Json], files: dict[str, 
     result |= {"status": decision.state, "samples": done, "campaign": more}
     result |= {"notes": notes} if notes else {}
     return Results(
-        result, decision.header.resolved_spec, decision.header.units.time_unit, tables, curves, files
+        typed(result), decision.header.resolved_spec, decision.header.units.time_unit, tables, curves, files
     )

@@ -8,7 +8,7 @@ from typing import Any
 
 def error_codes(incomplete: str) -> list[tuple[str, str]]:
     """The codes that `idesign explain` knows, with their titles."""
-    from inputdesign_cli.error_codes import explanations
+    from inputdesign_cli.findings import explanations
 
     known = sorted(explanations().items())
     return [(code, entry.title) for code, entry in known if code.startswith(incomplete)]

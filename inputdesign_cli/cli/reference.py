@@ -1,4 +1,4 @@
-"""`idesign explain` and `idesign schema`: what error codes mean, and what a spec may hold."""
+"""`idesign explain` and `idesign schema`: what codes mean, and what a spec may hold."""
 
 from __future__ import annotations
 
@@ -15,21 +15,24 @@ def explain(
     code: Annotated[
         str | None,
         typer.Argument(
-            metavar="[CODE]", help="The code of an error; without it, all codes.", autocompletion=error_codes
+            metavar="[CODE]",
+            help="The code of an error or of a finding; without it, all codes.",
+            autocompletion=error_codes,
         ),
     ] = None,
 ) -> None:
-    """Explain an error code.
+    """Explain the code of an error or of a finding.
 
     Says what it means and what to do about it.
     """
-    from inputdesign_cli.error_codes import explanation, explanations
+    from inputdesign_cli.error_codes import explanation
+    from inputdesign_cli.findings import explanations
 
     if code is None:
         known = sorted(explanations().items())
         typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
     else:
-        typer.echo(explanation(code))
+        typer.echo(explanation(code, explanations()))
 
 
 def schema() -> None:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from html import escape
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.outcome import Information, Outcome, read_plain, write_plain
 from inputdesign_cli.runs.curves import Curves, SpectrumCurves
 
 Array = NDArray[np.float64]
@@ -30,31 +32,51 @@ class Table:
     columns: Mapping[str, Array]
 
 
+def typed(result: Result) -> Outcome:
+    """Return a result that was put together as plain data with its types."""
+    return read_plain(Outcome, result)
+
+
 @dataclass(frozen=True)
 class Results:
-    """One run: the result and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
+    """One run: the outcome and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
 
-    result: Result
+    outcome: Outcome
     resolved_spec: str  # YAML text of the spec with all overrides applied
     time_unit: str = "s"
     tables: Mapping[str, Table] = field(default_factory=dict)
     curves: Mapping[str, Curves] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)  # file name ("model.yaml") -> content
 
+    @cached_property
+    def result(self) -> Result:
+        """The outcome as plain data: the content of result.json."""
+        plain: Result = write_plain(self.outcome)
+        return plain
+
     @property
     def parameters(self) -> tuple[str, ...]:
-        """(k,): names of what is estimated."""
-        return tuple(self.result["information"]["parameters"])
+        """Names of the k parameters that are estimated."""
+        return self._informed.parameters
 
     @property
     def information(self) -> Array:
-        """(k, k): the information matrix of the experiment."""
-        return np.array(self.result["information"]["matrix"], dtype=float)
+        """The information matrix (k, k) of the experiment."""
+        return self._informed.matrix
 
     @property
     def covariance(self) -> Array:
-        """(k, k): its inverse."""
-        return np.array(self.result["information"]["covariance"], dtype=float)
+        """The covariance (k, k) of the estimates: the inverse of the information matrix."""
+        found = self._informed.covariance
+        if found is None:
+            raise AttributeError("this experiment leaves a parameter undetermined: there is no covariance")
+        return found
+
+    @property
+    def _informed(self) -> Information:
+        if self.outcome.information is None:
+            raise AttributeError("this run has no information matrix")
+        return self.outcome.information
 
     @property
     def signal(self) -> Array:
@@ -87,19 +109,21 @@ class Results:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the head of the result."""
-        rows = [("status", self.result.get("status", "")), ("samples", self.result.get("samples", ""))]
-        objective = self.result.get("objective", {})
-        rows += [(str(objective.get("kind", "objective")), _digits(objective.get("value", "")))]
-        rows += [("proved bound", _digits(objective[key])) for key in _BOUNDS if key in objective]
-        deviations = self.result.get("information", {}).get("standard_deviation", {})
-        rows += [(f"standard deviation of {name}", _digits(value)) for name, value in deviations.items()]
+        found = self.outcome
+        rows = [("status", found.status or ""), ("samples", str(found.samples or ""))]
+        if found.objective is not None:
+            of = found.objective
+            rows += [(of.kind, f"{of.value:.6g}")]
+            bounds = (of.lower_bound, of.upper_bound)
+            rows += [("proved bound", f"{bound:.6g}") for bound in bounds if bound is not None]
+        deviations = None if found.information is None else found.information.standard_deviation
+        rows += [(f"standard deviation of {name}", f"{sd:.6g}") for name, sd in (deviations or {}).items()]
         cells = "".join(
             f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in rows
         )
-        return f"<b>{escape(str(self.result.get('title', '')))}</b><table>{cells}</table>"
+        return f"<b>{escape(found.title or '')}</b><table>{cells}</table>"
 
 
-_BOUNDS = ("lower_bound", "upper_bound")
 # Frequencies are written with three digits, say: so much of what lies around a line is the line.
 _SAME_LINE = 1e-3
 
@@ -109,7 +133,3 @@ def _room(frequency: Array) -> Array:
     apart = np.abs(frequency[:, None] - frequency)
     np.fill_diagonal(apart, np.inf)
     return np.minimum(frequency, apart.min(axis=1))
-
-
-def _digits(value: Json) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

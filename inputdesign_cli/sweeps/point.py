@@ -19,7 +19,7 @@ from inputdesign_cli.errors import (
     OutputError,
 )
 from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.results import Json, typed
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweeps.layout import Layout, at_work
@@ -99,7 +99,7 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
             results = run_verb(job.verb, spec)
         seconds = time.perf_counter() - started
         timing = {**results.result.get("timing_s", {}), "point": seconds}
-        results = replace(results, result={**results.result, "timing_s": timing})
+        results = replace(results, outcome=typed({**results.result, "timing_s": timing}))
         from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 

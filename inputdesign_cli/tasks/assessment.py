@@ -21,7 +21,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.runs.curves import Curves
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.results import Json, Results, Table, typed
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import (
@@ -162,7 +162,7 @@ def judge(
 
 def _without_top_up(judged: Results, why: str) -> Results:
     was = judged.result
-    return replace(judged, result={**was, "assessment": {**was["assessment"], "no_top_up": why}})
+    return replace(judged, outcome=typed({**was, "assessment": {**was["assessment"], "no_top_up": why}}))
 
 
 def _rivals(units: Units, found: Identified, question: ModelQuestion) -> list[str]:
@@ -190,7 +190,7 @@ def _remarks(task: Identification, found: Identified, topped: Results) -> list[s
 def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Json]) -> Results:
     """The results of the identification with the verdict."""
     return replace(
-        identification, result={**identification.result, "status": verdict, "assessment": assessment}
+        identification, outcome=typed({**identification.result, "status": verdict, "assessment": assessment})
     )
 
 
@@ -205,7 +205,7 @@ def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     assessment = {**judged.result["assessment"], "frequency_response": told}
     shown = replace(
         judged,
-        result={**judged.result, "assessment": assessment},
+        outcome=typed({**judged.result, "assessment": assessment}),
         tables={**judged.tables, "frequency_response": table},
         curves={**judged.curves, "frequency_response": curves},
     )
@@ -236,7 +236,9 @@ def _with_notes(results: Results, notes: Sequence[str]) -> Results:
     """The same with further notes."""
     if not notes:
         return results
-    return replace(results, result={**results.result, "notes": [*results.result.get("notes", []), *notes]})
+    return replace(
+        results, outcome=typed({**results.result, "notes": [*results.result.get("notes", []), *notes]})
+    )
 
 
 def _experiments(question: ModelQuestion, both: Array) -> int | None:
@@ -279,7 +281,7 @@ def _topped_up(judged: Results, topped: Results, needed: Callable[[Array], int |
     }
     return replace(
         topped,
-        result=result,
+        outcome=typed(result),
         tables={**topped.tables, **_of_data(judged.tables)},
         curves={**topped.curves, **_of_data(judged.curves)},
         files={**topped.files, **judged.files},

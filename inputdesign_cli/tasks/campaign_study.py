@@ -13,7 +13,7 @@ from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.results import Results, typed
 from inputdesign_cli.tasks.campaign import Oracle, Planner, Rules, Schedule
 from inputdesign_cli.tasks.campaign_trials import CampaignJob, Ended, energy_of, run_campaigns
 from inputdesign_cli.tasks.convex import ConvexTask
@@ -89,7 +89,10 @@ def studied(study: CampaignStudy, results: Results, executor: Executor | None) -
     result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
     tables, curves = campaigns_curves(ways, oracle)
     return replace(
-        results, result=result, tables={**results.tables, **tables}, curves={**results.curves, **curves}
+        results,
+        outcome=typed(result),
+        tables={**results.tables, **tables},
+        curves={**results.curves, **curves},
     )
 
 

@@ -19,7 +19,7 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.results import Json, Results, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit import audit
@@ -175,7 +175,7 @@ class ConvexTask:
             "signal": time.perf_counter() - checked,
         }
         units = self.header.units
-        results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        results = Results(typed(result), self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, done.confidence.alpha)
         samples, inputs = record.samples.shape

@@ -17,7 +17,7 @@ from inputdesign_cli.identification.explore import Fits, Found, answers_output, 
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.curves import ResponseCurves
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.results import Json, Results, Table, typed
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.exploration import build_explored, spec_text, warned
@@ -109,7 +109,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     }
     complete = replace(
         results,
-        result=result,
+        outcome=typed(result),
         resolved_spec=warned(text, reasons, loop=bool(loops)),
         curves={**results.curves, **structure_curves(found)},
     )
@@ -134,15 +134,21 @@ class _Response:
         result = explored.result
         return replace(
             explored,
-            result={
-                **result,
-                "exploration": {
-                    **result["exploration"],
-                    "frequency_response": self.told,
-                    **({"nonlinearity": silent_entry(self.silent)} if self.silent else {}),
-                },
-                "notes": [*result.get("notes", []), *response_note(self.told), *silent_notes(self.silent)],
-            },
+            outcome=typed(
+                {
+                    **result,
+                    "exploration": {
+                        **result["exploration"],
+                        "frequency_response": self.told,
+                        **({"nonlinearity": silent_entry(self.silent)} if self.silent else {}),
+                    },
+                    "notes": [
+                        *result.get("notes", []),
+                        *response_note(self.told),
+                        *silent_notes(self.silent),
+                    ],
+                }
+            ),
             tables={**explored.tables, "frequency_response": self.table},
             curves={**explored.curves, "frequency_response": self.curves},
         )
@@ -218,7 +224,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         "timing_s": {"validation": time.perf_counter() - started},
     }
     return Exploration(
-        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
+        Results(typed(result), header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
         reasons,
     )
 

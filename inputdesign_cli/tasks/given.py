@@ -16,11 +16,13 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.findings.limits_not_kept import StatedLimits, limits_not_kept
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
+from inputdesign_cli.outcome import Powers, read_plain
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.objectives import white_labels
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.results import Json, Results, Table, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
@@ -31,7 +33,6 @@ from inputdesign_cli.tasks.record import RecordRequest, as_long, given_record, l
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
-from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
 from inputdesign_cli.tasks.result.nyquist import nyquist_curves
 from inputdesign_cli.tasks.result.record_notes import record_notes
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
@@ -193,9 +194,7 @@ class GivenTask:
             drawn = signal_curves(self.record, units, experiment, record)
             tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(self.record, units, record)
-        signal = result.get("signal", {})
         notes = result.pop("notes", [])
-        notes += broken_limits(self.limits, experiment.samples, excitation.power, signal)
         notes += record_notes(self.record, experiment.samples, record, {}) if record is None else []
         if record is not None and np.isfinite(record.worst_ratio):
             start = begun_anywhere(experiment, record.samples, self.record.step, requirements)
@@ -208,7 +207,12 @@ class GivenTask:
         if notes:
             result["notes"] = notes
         result["timing_s"] = {"analysis": time.perf_counter() - started}
-        results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        outcome = typed(result)
+        broken = limits_not_kept(
+            self.limits, experiment.samples, read_plain(Powers, excitation.power), outcome.signal
+        )
+        outcome = outcome.saying(broken)
+        results = Results(outcome, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, confidence.alpha)
         renewed, seen = self._renewed(len(record.samples)), self.foresight

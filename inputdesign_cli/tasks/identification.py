@@ -16,7 +16,7 @@ from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, TransferMatrix
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.results import Results, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
@@ -224,7 +224,7 @@ def identification_results(task: Identification, found: Identified, started: flo
         result["notes"] = notes
     result["timing_s"] = {"identification": time.perf_counter() - started}
     files = {"model.yaml": model_text(header.units, found.model, estimate).encode()}
-    return Results(result, header.resolved_spec, header.units.time_unit, tables, curves, files)
+    return Results(typed(result), header.resolved_spec, header.units.time_unit, tables, curves, files)
 
 
 def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:

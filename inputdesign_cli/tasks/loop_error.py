@@ -10,7 +10,7 @@ from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem,
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.results import Results, typed
 from inputdesign_cli.tasks.loop_error_signal import (
     LoopErrorSignalSettings,
     design_lines,
@@ -80,7 +80,7 @@ class LoopErrorTask:
         }
         timing = {**results.result["timing_s"], "simulation": time.perf_counter() - begun}
         result = {**results.result, "simulation": study, "timing_s": timing}
-        return replace(results, result=result, curves={**results.curves, **curves})
+        return replace(results, outcome=typed(result), curves={**results.curves, **curves})
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
         started = time.perf_counter()
@@ -94,7 +94,7 @@ class LoopErrorTask:
         tables, curves = spectrum_results(self.terms, design)
         table, record = signal_results(header.units, signal.samples)
         return design, Results(
-            result,
+            typed(result),
             header.resolved_spec,
             header.units.time_unit,
             {**tables, "signal": table},

@@ -10,7 +10,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.runs.curves import SignalCurves, SpectrumCurves
-from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.results import Curves, Json, Results, Table, typed
 from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
 from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
 from inputdesign_cli.signal.shift_register import register_length
@@ -82,7 +82,7 @@ def make_signal(asked: ReadyMade) -> Results:
             "band": [edge / asked.sample_time for edge in one.band],
         }
     return Results(
-        {"format": 1, "status": "made", "signal": entry},
+        typed({"format": 1, "status": "made", "signal": entry}),
         "",
         asked.time_unit,
         {"signal": Table({f"time_{asked.time_unit}": time, **channels})},

@@ -22,7 +22,7 @@ from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
 from inputdesign_cli.runs.curves import Curves, MomentsCurves
-from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.runs.results import Results, Table, typed
 from inputdesign_cli.tasks.regressors import RegressorRecord, RegressorSettings, realise_regressors
 from inputdesign_cli.tasks.result.plain_signal import signal_results
 from inputdesign_cli.tasks.result.regression import (
@@ -125,7 +125,7 @@ class RegressionTask:
             )
             inputs[name] = self._tried(trial, regression, Phi, noise, executor)
         study = {"runs": trial.runs, "seed": trial.seed, "inputs": inputs}
-        return replace(results, result={**results.result, "simulation": study})
+        return replace(results, outcome=typed({**results.result, "simulation": study}))
 
     def _tried(
         self,
@@ -159,7 +159,7 @@ class RegressionTask:
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
         curves["moments"] = moments
         result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
-        return record, Results(result, terms.header.resolved_spec, units.time_unit, tables, curves)
+        return record, Results(typed(result), terms.header.resolved_spec, units.time_unit, tables, curves)
 
     def _free(self) -> MomentsDesign:
         regression, target, energy = self.terms.regression, self.terms.target, self.terms.energy

@@ -25,7 +25,7 @@ from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_tr
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.runs.curves import BoundCurves, Curves
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.results import Json, Results, Table, typed
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal.settings import LEVELLED, Method
 from inputdesign_cli.tasks.result.bound import bound_curves
@@ -168,7 +168,10 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
         result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
     return replace(
-        results, result=result, tables={**results.tables, **tables}, curves={**results.curves, **curves}
+        results,
+        outcome=typed(result),
+        tables={**results.tables, **tables},
+        curves={**results.curves, **curves},
     )
 
 

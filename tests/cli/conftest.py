@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import specification, tasks
-from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.runs.results import Results, Table, typed
 from tests.support.command_line import RESULT
 from tests.support.commands import caller
 
@@ -37,7 +37,7 @@ def verbs(monkeypatch):
         return Stated(path)
 
     def results(spec):
-        return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
+        return Results(typed(RESULT), "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
     monkeypatch.setattr(specification, "load_spec", load_spec)
     monkeypatch.setattr(import_module("inputdesign_cli.sweeps.verbs"), "load_spec", load_spec)

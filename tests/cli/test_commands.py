@@ -12,8 +12,9 @@ import inputdesign_cli
 from inputdesign_cli import tasks
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.init import KINDS
-from inputdesign_cli.error_codes import explanation, explanations
+from inputdesign_cli.error_codes import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.findings import explanations
 from tests.support.command_line import RESULT, diagnostic
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
@@ -200,9 +201,9 @@ def test_explain(run):
     assert code == 0
     names = [line.split()[0] for line in out.splitlines() if not line.startswith(" ")]
     assert set(names) == set(explanations())
-    assert all(len(explanation(name)) > 40 for name in names)
+    assert all(len(explanation(name, explanations())) > 40 for name in names)
     for name in (names[0], "yaml-syntax"):
-        assert run("explain", name) == (0, explanation(name) + "\n", "")
+        assert run("explain", name) == (0, explanation(name, explanations()) + "\n", "")
     code, _, err = run("explain", "no-such-code")
     assert code == 2
     assert "no-such-code" in err

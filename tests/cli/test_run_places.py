@@ -13,7 +13,7 @@ from inputdesign_cli import tasks
 from inputdesign_cli.cli import main
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.runs.origin import Origin, check_place
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.results import Results, typed
 from inputdesign_cli.runs.run_directory import write_run
 
 SPEC = """\
@@ -177,7 +177,7 @@ def test_a_place_that_cannot_be_is_refused_before_anything_is_computed(
     Path("a.yaml").write_text(DESIGN)
     Path("d.csv").write_text("u,y\n" + "1,1\n0,1\n" * 50)
     Path("file").write_text("mine")
-    result = Results({"format": 1, "title": "x"}, "title: x\n")
+    result = Results(typed({"format": 1, "title": "x"}), "title: x\n")
     write_run(result, other, origin=Origin([tmp_path / "b.yaml"]))
     write_run(result, edited, origin=Origin([tmp_path / "a.yaml"]))
     (edited / "spec.yaml").write_text("title: mine\n")
@@ -210,7 +210,7 @@ def test_a_run_that_came_in_the_meantime_is_not_replaced(analyse, monkeypatch, t
 
     def slowly(stated):
         origin = Origin([tmp_path / "b.yaml"])
-        write_run(Results({"format": 1, "title": "x"}, "title: x\n"), tmp_path / "r", origin=origin)
+        write_run(Results(typed({"format": 1, "title": "x"}), "title: x\n"), tmp_path / "r", origin=origin)
         return true(stated)
 
     monkeypatch.setattr(tasks, "analyse", slowly)
@@ -220,7 +220,7 @@ def test_a_run_that_came_in_the_meantime_is_not_replaced(analyse, monkeypatch, t
 
 def test_a_spec_that_was_replaced_by_a_top_up_is_known_again(tmp_path):
     """The spec.yaml of a run may say something else than was asked."""
-    place, top_up = tmp_path / "r", Results({"format": 1, "title": "x"}, "title: top-up\n")
+    place, top_up = tmp_path / "r", Results(typed({"format": 1, "title": "x"}), "title: top-up\n")
     one, copy, other = (tmp_path / name for name in ("a.yaml", "copy.yaml", "d.csv"))
     write_run(top_up, place, origin=Origin([one, other], "title: x\n"))
     check_place(place, Origin([copy, other], "title: x\n"), "title: x\n")
@@ -292,7 +292,7 @@ def test_places_that_cannot_be_are_refused_before_anything_is_computed(run, verb
 
 def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
     files, spec = [tmp_path / "a.yaml", tmp_path / "d.csv"], SPEC.format("a")
-    judged = Results({"format": 1, "assessment": {"verdict": "missed"}}, spec)
+    judged = Results(typed({"format": 1, "assessment": {"verdict": "missed", "met": False}}), spec)
     write_run(judged, tmp_path / "run", origin=Origin(files, judges=True))
     check_place(tmp_path / "run", Origin(files, judges=True), spec)
     with pytest.raises(OutputError, match="would lose it") as raised:

@@ -16,7 +16,7 @@ from inputdesign_cli.figures.plots import draw, draw_all
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import TYPE_SIZE
 from inputdesign_cli.runs.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.results import Results, typed
 from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound
 
 
@@ -133,7 +133,7 @@ def test_a_single_sample_is_a_dot(page):
 
 @pytest.mark.parametrize(("kind", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
 def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kind, begins):
-    results = Results({}, "", curves={"bound": CURVES["bound"]})
+    results = Results(typed({}), "", curves={"bound": CURVES["bound"]})
     drawn = draw_all(results, kind)
     assert list(drawn) == [f"bound.{kind}"]
     assert drawn[f"bound.{kind}"].startswith(begins)

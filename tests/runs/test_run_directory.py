@@ -15,7 +15,7 @@ import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.runs import replacing
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.results import Results, typed
 from inputdesign_cli.runs.run_directory import read_run, write_run
 from tests.support.run_directories import a_run, marks, names, write_with_figures
 
@@ -54,7 +54,7 @@ def test_read_run_returns_what_was_written(tmp_path):
     write_with_figures(a_run("first"), tmp_path / "a")
     result = read_run(tmp_path / "a")
     assert result["title"] == "first"
-    assert result["objective"] == {"value": 5.0}
+    assert result["objective"] == {"kind": "least_cost", "value": 5.0}
     assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png", "figures.json"}
 
 
@@ -260,7 +260,7 @@ def test_a_disc_that_fills_up_while_writing(tmp_path, monkeypatch):
 
 
 def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
-    bad = Results(result={"format": 1, "value": np.nan}, resolved_spec="")
+    bad = Results(typed({"format": 1, "value": np.nan}), resolved_spec="")
     with pytest.raises(ValueError, match=r"result\.value"):
         write_with_figures(bad, tmp_path / "a")
     assert names(tmp_path) == set()

@@ -15,7 +15,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs import replacing
-from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.runs.results import Results, Table, typed
 from inputdesign_cli.runs.run_directory import read_run, write_run
 
 STEPS = ("open", "os.", "shutil.")
@@ -23,7 +23,7 @@ STEPS = ("open", "os.", "shutil.")
 
 def a_run(mark: str) -> Results:
     tables = {name: Table({"u1": np.full(4, float(len(mark)))}) for name in ("signal", mark)}
-    return Results({"format": 1, "title": mark}, f"title: {mark}\n", tables=tables)
+    return Results(typed({"format": 1, "title": mark}), f"title: {mark}\n", tables=tables)
 
 
 def kill_at(step: int) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from inputdesign_cli.runs.curves import OptimalityCurves, SignalCurves
-from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.runs.results import Results, Table, typed
 from inputdesign_cli.runs.run_directory import write_run
 
 
@@ -17,7 +17,7 @@ def a_run(mark: str, *, optimality: bool = False) -> Results:
         curves["optimality"] = OptimalityCurves(w, np.array([0.5, 1.0, 0.5]), np.array([1.0]))
         tables["optimality"] = Table({"frequency_rad_per_s": w, "ratio": curves["optimality"].ratio})
     return Results(
-        result={"format": 1, "title": mark, "objective": {"value": np.float64(number)}},
+        typed({"format": 1, "title": mark, "objective": {"kind": "least_cost", "value": np.float64(number)}}),
         resolved_spec=f"title: {mark}\n",
         tables=tables,
         curves=curves,

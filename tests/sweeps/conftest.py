@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
-from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.runs.results import Results, Table, typed
 from tests.support.sweep_files import SPEC
 
 
@@ -40,7 +40,7 @@ def stub(monkeypatch):
             "power": {"input": [value]},
             "baseline": {"white": {"cost": 3 * value}},
         }
-        return Results(result, spec.to_yaml(), tables={"signal": Table({"u1": np.arange(3.0)})})
+        return Results(typed(result), spec.to_yaml(), tables={"signal": Table({"u1": np.arange(3.0)})})
 
     monkeypatch.setattr("inputdesign_cli.tasks.solve", solve)
     return calls

@@ -10,7 +10,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
-from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.runs.results import Results, Table, typed
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 
 BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}"
@@ -76,11 +76,11 @@ def test_the_most_extreme_number_is_the_farthest_from_one():
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_no_result_holds_a_number_that_is_none(value):
     good = Results(
-        {"cost": 1.0, "power": {"input": [1.0]}}, "", "s", {"spectrum": Table({"phi": np.ones(2)})}
+        typed({"cost": 1.0, "power": {"input": [1.0]}}), "", "s", {"spectrum": Table({"phi": np.ones(2)})}
     )
     assert finite(good, ("", 0.0)) is good
     for bad in (
-        replace(good, result={"cost": 1.0, "power": {"input": [value]}}),
+        replace(good, outcome=typed({"cost": 1.0, "power": {"input": [value]}})),
         replace(good, tables={"spectrum": Table({"phi": np.array([1.0, value])})}),
     ):
         with pytest.raises(InaccurateError) as found:

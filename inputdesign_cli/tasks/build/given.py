@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.findings.limits_not_kept import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
@@ -35,7 +36,6 @@ from inputdesign_cli.tasks.build.system import (
 )
 from inputdesign_cli.tasks.build.uncertainty import build_plants
 from inputdesign_cli.tasks.given import GivenExcitation, GivenTask
-from inputdesign_cli.tasks.result.given_limits import StatedLimits
 from inputdesign_cli.tasks.robust import Plants
 
 _REFUSED = ("spectrum", "energy")

@@ -14,7 +14,7 @@ from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.runs.curves import Curves, DeviationCurves, DeviationPanel, ResponseCurves
-from inputdesign_cli.runs.results import Array, Json, Results, Table
+from inputdesign_cli.runs.results import Array, Json, Results, Table, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
@@ -143,7 +143,7 @@ def measured_results(
         notes += assessment.get("undecided", [])
     result |= {"notes": notes} if notes else {}
     result["timing_s"] = {"measurement": seconds}
-    return Results(result, header.resolved_spec, units.time_unit, tables, drawn)
+    return Results(typed(result), header.resolved_spec, units.time_unit, tables, drawn)
 
 
 def _deviations(

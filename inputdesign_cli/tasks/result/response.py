@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.response import Goal, ResponseDesign, ResponseLines, ResponseProblem
+from inputdesign_cli.findings.limits_not_kept import StatedLimits, limits_not_kept
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.monte_carlo.response import ResponseStudy
 from inputdesign_cli.runs.curves import DeviationCurves, DeviationPanel, SpectrumCurves
-from inputdesign_cli.runs.results import Array, Json, Results, Table
+from inputdesign_cli.runs.results import Array, Json, Results, Table, typed
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.tasks.record import RecordRequest
-from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import hermitian_columns
 from inputdesign_cli.tasks.result.status import proof_status
@@ -169,7 +169,7 @@ def response_results(
     entry = signal_entry(request, units, terms.experiment, plan.record)
     entry |= {"worst_ratio": plan.record.worst_ratio, "start_shift": plan.shift}
     result["signal"] = entry
-    notes = _notes(terms, plan, result)
+    notes = _notes(terms, plan)
     if notes:
         result["notes"] = notes
     signals, drawn = signal_curves(request, units, terms.experiment, plan.record)
@@ -178,8 +178,12 @@ def response_results(
     deviations, curves = _deviations(terms, plan)
     for i in range(units.outputs):
         deviations[f"noise_spectrum{'' if units.outputs == 1 else f'_{i + 1}'}"] = terms.lines.noise[:, i]
+    outcome = typed(result)
+    if terms.goal == "given" and outcome.power is not None:
+        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
+        outcome = outcome.saying(limits_not_kept(stated, plan.length, outcome.power, None))
     return Results(
-        result,
+        outcome,
         terms.header.resolved_spec,
         units.time_unit,
         {"deviations": Table(deviations), "spectrum": Table(spectrum), **signals},
@@ -220,7 +224,7 @@ def _deviations(
     return columns, DeviationCurves(tuple(panels))
 
 
-def _notes(terms: ResponseTerms, plan: Planned, result: dict[str, Json]) -> list[str]:
+def _notes(terms: ResponseTerms, plan: Planned) -> list[str]:
     """What a user should know before applying the record."""
     notes = []
     if plan.shift > _SHIFTED:
@@ -241,9 +245,6 @@ def _notes(terms: ResponseTerms, plan: Planned, result: dict[str, Json]) -> list
             f"the record has {plan.length} of the {terms.asked} samples: {times} whole periods of "
             f"{terms.grid.period}"
         )
-    if terms.goal == "given":
-        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
-        notes += broken_limits(stated, plan.length, result["power"], {})
     return notes
 
 
@@ -271,7 +272,7 @@ def study_results(
     timing = {**results.result["timing_s"], "simulation": time.perf_counter() - begun}
     return replace(
         results,
-        result={**results.result, "simulation": told, "timing_s": timing},
+        outcome=typed({**results.result, "simulation": told, "timing_s": timing}),
         tables={**results.tables, "deviations": Table(columns)},
         curves={**results.curves, "deviations": curves},
     )

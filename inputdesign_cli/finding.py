@@ -1,0 +1,93 @@
+"""Findings: what speaks for or against data, a model or a design, with a stable code and a severity.
+
+A kind of finding is declared once, in the file that decides when it holds and what it says. Verdict, trust
+and exit code follow from the severities, here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+
+class Severity(StrEnum):
+    """How much a finding weighs, from a remark to a contradiction."""
+
+    NOTE = "note"
+    """Good to know; it changes no verdict."""
+    DOUBT = "doubt"
+    """A reason to look again before numbers are trusted; it changes no verdict."""
+    UNDECIDED = "undecided"
+    """Neither met nor missed can be said."""
+    REFUTED = "refuted"
+    """The data contradict the model, so that nothing can be said of its accuracy."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was found.
+
+    Attributes:
+        code: stable name, explained by `idesign explain CODE`.
+        severity: what it means for a verdict.
+        message: one or two plain sentences: what is the case, where, and what to do.
+        where: the key, channel, parameter or file that it is about; empty for all of it.
+        figures: its numbers and names as plain data.
+    """
+
+    code: str
+    severity: Severity
+    message: str
+    where: str = ""
+    figures: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}), hash=False)
+
+
+KINDS: dict[str, FindingKind] = {}
+"""Every kind that was declared, by its code."""
+
+
+@dataclass(frozen=True)
+class FindingKind:
+    """A kind of finding: its code, its usual severity, and its explanation.
+
+    Attributes:
+        title: a phrase of a few words.
+        text: what it means and how it is found.
+        remedy: what to do about it.
+    """
+
+    code: str
+    severity: Severity
+    title: str
+    text: str
+    remedy: str
+
+    def __post_init__(self) -> None:
+        if self.code in KINDS:
+            raise ValueError(f"two kinds of findings have the code {self.code}")
+        KINDS[self.code] = self
+
+    def found(
+        self, message: str, *, where: str = "", severity: Severity | None = None, **figures: object
+    ) -> Finding:
+        """Return a finding of this kind.
+
+        Args:
+            message: its sentence.
+            where: what it is about.
+            severity: where the case at hand weighs more or less than usual.
+            figures: its numbers and names.
+        """
+        return Finding(self.code, severity or self.severity, message, where, figures)
+
+
+def undecided(findings: Iterable[Finding]) -> bool:
+    """Return whether findings forbid the verdicts "met" and "missed"."""
+    return any(one.severity in (Severity.UNDECIDED, Severity.REFUTED) for one in findings)
+
+
+def trusted(findings: Iterable[Finding]) -> bool:
+    """Return whether nothing found speaks against trusting a model."""
+    return not any(one.severity is not Severity.NOTE for one in findings)

@@ -1,0 +1,24 @@
+"""What speaks for or against data, a model or a design: one kind of finding in one file.
+
+A file says when its finding holds and what its sentence is. It is found by its place: nothing else lists it.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from inputdesign_cli import error_codes
+from inputdesign_cli.error_codes import Explanation
+from inputdesign_cli.finding import KINDS, FindingKind
+
+
+def kinds() -> dict[str, FindingKind]:
+    """Return every kind of finding by its code."""
+    for module in iter_modules(__path__):
+        import_module(f"{__name__}.{module.name}")
+    return dict(sorted(KINDS.items()))
+
+
+def explanations() -> dict[str, Explanation]:
+    """Return what every code means, those of errors first and those of findings after them."""
+    found = {code: Explanation(kind.title, kind.text, kind.remedy) for code, kind in kinds().items()}
+    return {**error_codes.explanations(), **found}

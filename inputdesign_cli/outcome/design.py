@@ -1,0 +1,187 @@
+"""What is said of a designed or given excitation: objective, cost, powers, accuracy and information."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.outcome.codec import others
+
+Deviations = Mapping[str, float]
+"""Standard deviations by the names of the parameters."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """The value that the delivered design attains, with what is proved of all others.
+
+    `value` is recomputed from the spectrum. `lower_bound` (`upper_bound` of what is maximised) holds for this
+    type of spectrum, `any_spectrum_bound` for every spectrum, `any_structure_bound` for all moments.
+    """
+
+    kind: str
+    value: float
+    lower_bound: float | None = None
+    upper_bound: float | None = None
+    relative_gap: float | None = None
+    any_spectrum_bound: float | None = None
+    any_structure_bound: float | None = None
+    any_record_bound: float | None = None
+
+
+@dataclass(frozen=True)
+class Powers:
+    """Mean squares of input, output and excitation, one for each channel."""
+
+    input: tuple[float, ...] | None = None
+    output: tuple[float, ...] | None = None
+    excitation: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Shares of estimates within r_adm with their 95 % limits, where alpha was calibrated.
+
+    `exact` and `linear` are shares of `draws` from asymptotic theory, `kept` that of simulated `runs`.
+    `asked` and `chi_squared_alpha` say what was asked for and which alpha is replaced.
+    """
+
+    draws: int
+    exact: float
+    exact_limits: tuple[float, float]
+    linear: float
+    runs: int | None = None
+    kept: float | None = None
+    kept_limits: tuple[float, float] | None = None
+    asked: float | None = None
+    chi_squared_alpha: float | None = None
+    excess: float | None = None
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """The largest r_u/r_adm over all frequencies (rad per time unit), where it stands, and alpha of r_u."""
+
+    alpha: float
+    worst_ratio: float | None = None
+    worst_frequency: float | None = None
+    active_frequencies: Array | None = None
+    confidence: Coverage | None = None
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The controller of a loop and the margins that are kept; times in the user's unit, phase in degrees."""
+
+    nominal_peak: float | None = None
+    max_sensitivity: float | None = None
+    gain_margin: float | None = None
+    phase_margin: float | None = None
+    Kp: float | None = None
+    Ti: float | None = None
+    Td: float | None = None
+    others: Mapping[str, object] = others()
+
+
+@dataclass(frozen=True)
+class RequirementMet:
+    """A requirement with its largest ratio to what is admitted (1: just met), and its frequency."""
+
+    name: str
+    worst_ratio: float
+    frequency: float | None = None
+    entry: str | None = None
+    norm: str | None = None
+    loop: Loop | None = None
+
+
+@dataclass(frozen=True)
+class Information:
+    """The information matrix (k, k) of the experiment in raw parameters, and its inverse."""
+
+    parameters: tuple[str, ...]
+    matrix: Array
+    covariance: Array | None = None
+    standard_deviation: Deviations | None = None
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """The type of a spectrum, and what that type says of itself."""
+
+    type: str
+    details: Mapping[str, object] = others()
+
+
+@dataclass(frozen=True)
+class White:
+    """White excitation that meets the same accuracy, or that exhausts the same limits."""
+
+    cost: float | None = None
+    power: Powers | None = None
+    ratio: float | None = None
+    samples: float | None = None
+    value: float | None = None
+    within_limits: bool | None = None
+    excitation_power: float | None = None
+    mean_squared_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What the design is compared with."""
+
+    white: White | None = None
+
+
+@dataclass(frozen=True)
+class LimitUse:
+    """A limit with what the design uses of it.
+
+    Limits on the density of a spectrum have a `kind`, a `worst_ratio` and its `frequency`.
+    """
+
+    name: str
+    binding: bool
+    channel: int | None = None
+    max: float | None = None
+    min: float | None = None
+    value: float | None = None
+    kind: str | None = None
+    worst_ratio: float | None = None
+    frequency: float | None = None
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How the design was found."""
+
+    method: str
+    tolerance: float | None = None
+    rounds: int | None = None
+    cuts: int | None = None
+    any_spectrum_gap: float | None = None
+    ended_by: str | None = None
+    details: Mapping[str, object] = others()
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Other parameters that explain data nearly as well: -2 log likelihood is `excess` higher.
+
+    Their G differs by up to `ratio` times the `measure`, at `frequency` (rad per time unit).
+    """
+
+    theta: Mapping[str, float]
+    excess: float
+    ratio: float | None = None
+    measure: str | None = None
+    frequency: float | None = None
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """Other minima that a simulated record of the design leaves."""
+
+    rivals: tuple[Rival, ...] = ()

@@ -1,0 +1,82 @@
+"""The outcome of a question: what `result.json` holds, typed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Self
+
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.outcome.assessment import Assessment
+from inputdesign_cli.outcome.campaign import Campaign
+from inputdesign_cli.outcome.codec import others
+from inputdesign_cli.outcome.design import (
+    Baseline,
+    Foreseen,
+    Information,
+    LimitUse,
+    ModelError,
+    Objective,
+    Powers,
+    RequirementMet,
+    Solver,
+    Spectrum,
+)
+from inputdesign_cli.outcome.estimate import Identification
+from inputdesign_cli.outcome.exploration import Exploration, Validation
+from inputdesign_cli.outcome.loop_error import ClosedLoopError
+from inputdesign_cli.outcome.regression import MeanSquaredError, Moments, Sensitivity
+from inputdesign_cli.outcome.response import MeasuredLines
+from inputdesign_cli.outcome.robust import Robust
+from inputdesign_cli.outcome.signal import Signal
+from inputdesign_cli.outcome.simulation import Simulation
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What was asked and found, section by section; sections that a question does not have are None.
+
+    `notes` are the messages of the `findings`. `provenance` has what the writer of a run adds: environment,
+    digests, and the names of its files.
+    """
+
+    format: int = 1
+    title: str | None = None
+    status: str | None = None
+    objective: Objective | None = None
+    cost: float | None = None
+    samples: int | None = None
+    power: Powers | None = None
+    model_error: ModelError | None = None
+    requirements: tuple[RequirementMet, ...] | None = None
+    limits: tuple[LimitUse, ...] | None = None
+    information: Information | None = None
+    spectrum: Spectrum | None = None
+    baseline: Baseline | None = None
+    robust: Robust | None = None
+    foreseen: Foreseen | None = None
+    signal: Signal | None = None
+    frequency_response: MeasuredLines | None = None
+    closed_loop_error: ClosedLoopError | None = None
+    mean_squared_error: MeanSquaredError | None = None
+    moments: Moments | None = None
+    sensitivity: Sensitivity | None = None
+    identification: Identification | None = None
+    assessment: Assessment | None = None
+    exploration: Exploration | None = None
+    validation: Validation | None = None
+    simulation: Simulation | None = None
+    campaign: Campaign | None = None
+    solver: Solver | None = None
+    findings: tuple[Finding, ...] | None = None
+    notes: tuple[str, ...] | None = None
+    timing_s: Mapping[str, float] | None = None
+    provenance: Mapping[str, object] = others()
+
+    def saying(self, findings: Iterable[Finding]) -> Self:
+        """Return the same outcome with further findings and their notes."""
+        more = tuple(findings)
+        if not more:
+            return self
+        messages = tuple(one.message for one in more)
+        return replace(self, findings=(*(self.findings or ()), *more), notes=(*(self.notes or ()), *messages))

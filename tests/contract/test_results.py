@@ -1,0 +1,66 @@
+"""The contract of `result.json`: what 04bdf145 wrote for the shipped specs is still there, field by field.
+
+Further fields are welcome; a missing one, another type or another number is a broken promise. Where a number
+was mended since, `results.json` has the new one.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.contract.condensed import condensed
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+EXPECTED = json.loads((HERE / "results.json").read_text())
+QUICK = {"analyse-first_order_given", "simulate-first_order", "simulate-regression", "identify-process"}
+CLOSE = 2e-6
+# Proofs stop where they are good enough, and that depends on the order of additions.
+ROUGH = {
+    *("lower_bound", "relative_gap", "any_spectrum_gap", "any_spectrum_bound", "any_structure_bound"),
+    *("cuts", "rounds", "steps", "nodes", "active_frequencies", "spectral_factor_residual"),
+}
+DATA = [HERE / "data/w1_5.csv", "--operating-point", "u1=45,y1=82"]
+OTHERS = {
+    "explore-buck": ["explore", ROOT / "docs/data/buck_converter/buck_id.csv"],
+    "identify-process": ["identify", "--spec", HERE / "data/w1.yaml", *DATA],
+    "assess-process": ["assess", HERE / "data/w1.yaml", *DATA],
+}
+
+
+def command(name):
+    if name in OTHERS:
+        return OTHERS[name]
+    verb, spec = name.split("-", 1)
+    runs = ["--set", "simulation.runs=20"] if verb == "simulate" else []
+    return [verb, ROOT / f"specs/{spec}.yaml", *runs]
+
+
+def differences(expected, found, where):
+    if isinstance(expected, dict) and isinstance(found, dict):
+        for key in expected:
+            if key not in found:
+                yield f"{where}.{key} is missing"
+            elif key not in ROUGH:
+                yield from differences(expected[key], found[key], f"{where}.{key}")
+    elif isinstance(expected, list) and isinstance(found, list) and len(expected) == len(found):
+        for index, pair in enumerate(zip(expected, found, strict=True)):
+            yield from differences(*pair, f"{where}[{index}]")
+    elif isinstance(expected, float) and isinstance(found, int | float):
+        if abs(found - expected) > CLOSE * max(abs(expected), 1e-9):
+            yield f"{where} is {found}, not {expected}"
+    elif expected != found:
+        yield f"{where} is {found}, not {expected}"
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in EXPECTED]
+)
+def test_results_hold_what_they_held(name, tmp_path):
+    run = [sys.executable, "-m", "inputdesign_cli", *map(str, command(name)), "-o", str(tmp_path / "run")]
+    subprocess.run([*run, "--no-figures", "--quiet"], cwd=ROOT, check=False, capture_output=True)
+    found = condensed(json.loads((tmp_path / "run/result.json").read_text()))
+    assert list(differences(EXPECTED[name], found, name)) == []

@@ -1,0 +1,106 @@
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Literal, get_args, get_type_hints
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain, write_plain
+from inputdesign_cli.outcome.codec import NULL, others
+from inputdesign_cli.runs.text_formats import plain
+
+
+@dataclass(frozen=True)
+class Part:
+    name: Literal["a", "b"]
+    value: float
+
+
+@dataclass(frozen=True)
+class Whole:
+    parts: tuple[Part, ...]
+    pair: tuple[int, float]
+    matrix: Array
+    response: ComplexArray
+    by_name: Mapping[str, Part]
+    empty: float | None = None
+    unstable: float | None = field(default=None, metadata=NULL)
+    several: float | tuple[float | None, ...] | None = None
+    rest: Mapping[str, object] = others()
+
+
+PLAIN = {
+    "parts": [{"name": "a", "value": 1.0}],
+    "pair": [3, 0.5],
+    "matrix": [[1.0, 2.0], [3.0, 4.0]],
+    "response": [{"re": 1.0, "im": -2.0}],
+    "by_name": {"x": {"name": "b", "value": 2.0}},
+    "unstable": None,
+    "several": [1.0, None],
+    "unknown_key": {"kept": [1, "2"]},
+}
+
+
+def test_plain_data_come_back_as_they_were():
+    assert plain(write_plain(read_plain(Whole, PLAIN))) == PLAIN
+
+
+def test_values_have_the_types_of_their_fields():
+    whole = read_plain(Whole, PLAIN)
+    assert whole.parts == (Part("a", 1.0),)
+    assert whole.response[0] == 1.0 - 2.0j
+    assert whole.matrix.shape == (2, 2)
+    assert whole.empty is None
+    assert whole.rest == {"unknown_key": {"kept": [1, "2"]}}
+
+
+def test_numbers_of_numpy_are_read_as_plain_ones():
+    read = read_plain(Part, {"name": "a", "value": np.float64(2.0)})
+    assert type(read.value) is float
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("parts", [{"name": "c", "value": 1.0}]),
+        ("parts", [{"name": "a"}]),
+        ("parts", {"name": "a"}),
+        ("pair", [1]),
+        ("pair", [True, 1.0]),
+        ("matrix", [["x"]]),
+        ("by_name", [1]),
+        ("several", "text"),
+    ],
+)
+def test_what_has_another_form_is_an_error_that_names_the_place(key, value):
+    with pytest.raises(OutcomeError, match=f"result.{key}"):
+        read_plain(Whole, {**PLAIN, key: value})
+
+
+@given(
+    st.dictionaries(st.sampled_from(list(PLAIN)), st.recursive(st.none() | st.floats() | st.text(), st.lists))
+)
+def test_whatever_is_written_there_nothing_else_is_raised(changes):
+    with suppress(OutcomeError):
+        read_plain(Whole, {**PLAIN, **changes})
+
+
+def sections(kind, seen):
+    """Every dataclass that a result is made of."""
+    for hint in get_type_hints(kind).values():
+        todo = [hint]
+        while todo:
+            one = todo.pop()
+            todo += get_args(one)
+            if is_dataclass(one) and one not in seen:
+                seen.add(one)
+                sections(one, seen)
+    return seen
+
+
+def test_a_section_has_one_field_at_most_for_keys_of_other_names():
+    for section in sections(Outcome, {Outcome}):
+        assert sum("others" in entry.metadata for entry in fields(section)) <= 1, section
