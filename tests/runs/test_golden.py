@@ -8,13 +8,8 @@ import pytest
 from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
 from inputdesign_cli.runs.golden import compare
 from inputdesign_cli.runs.golden_file import load_golden
-<<<<<<< HEAD
-from inputdesign_cli.runs.results import Results
-from inputdesign_cli.sweeps.verbs import execute
-=======
 from inputdesign_cli.runs.results import Results, typed
 from inputdesign_cli.sweeps.verbs import execute
->>>>>>> aa1c1dd4
 
 SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
 
@@ -99,13 +94,8 @@ def test_what_is_not_there_does_not_agree(tmp_path, results, notes):
 
 
 def test_execute_runs_the_verb_with_the_overrides(tmp_path, monkeypatch):
-<<<<<<< HEAD
-    monkeypatch.setattr("inputdesign_cli.sweeps.verbs.load_spec", lambda *a: a)
-    verb = lambda spec: Results(result={"spec": spec}, resolved_spec="")  # noqa: E731
-=======
     monkeypatch.setattr("inputdesign_cli.sweeps.verbs.load_spec", lambda *a: a)
     verb = lambda spec: Results(typed({"spec": spec}), resolved_spec="")  # noqa: E731
->>>>>>> aa1c1dd4
     monkeypatch.setattr("inputdesign_cli.tasks.analyse", verb)
     golden = load_golden(written(tmp_path, GOOD))
     expected = (tmp_path / "sub" / "b.yaml", ["experiment.samples=10", "spectrum={type: white}"])
