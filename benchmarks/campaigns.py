@@ -17,11 +17,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from inputdesign_cli import load_spec, parse_spec
+from inputdesign_cli.questions.campaign.build import build_campaign
+from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.outcome import way_entry
+from inputdesign_cli.questions.campaign.study import oracle_of, tried, ways_of
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.campaign import build_campaign
-from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
-from inputdesign_cli.tasks.campaign_study import oracle_of, tried, ways_of
-from inputdesign_cli.tasks.result.campaign_study import way_entry
 
 ILL1 = (
     "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.9], variance: 1.0}\n"

@@ -25,8 +25,8 @@ import numpy as np
 from inputdesign_cli import parse_spec
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.tasks.build.convex import build_convex
-from inputdesign_cli.tasks.result.robust import robust_result
+from inputdesign_cli.questions.least_cost.build import build_convex
+from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 
 PLANTS = {
     "Box-Jenkins, first order": (

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from inputdesign_cli import parse_spec, tasks
+from inputdesign_cli import parse_spec, questions
 from inputdesign_cli.wizard.composing import compose
 
 
@@ -192,7 +192,7 @@ def measure(name, runs):
     changes = {"solver.any_spectrum": False, "signal.candidates": 1}
     if spec.uncertainty is not None:
         changes |= {"uncertainty.scenarios": 10, "uncertainty.fresh": 0}
-    found = tasks.solve(spec.with_(**changes))
+    found = questions.solve(spec.with_(**changes))
     step = spec.sample_time
     offset = float(spec.signal.offset or 0.0)
     u, judged = found.signal - offset, spec.with_(**{"solver.any_spectrum": False})
@@ -210,7 +210,7 @@ def measure(name, runs):
             applied, y = campaign(one, spec, u, values, rng)
             rows = np.c_[step * np.arange(u.shape[0]), applied, y]
             np.savetxt(log, rows, delimiter=",", header=header, comments="")
-            assessed = tasks.assess(judged, log, operating_point=point)
+            assessed = questions.assess(judged, log, operating_point=point)
             model = assessed.results.files["model.yaml"]
             fitted = parse_spec(model.decode(), design=False).plant.named_parameters
             shares.append(asked(one, step, [p.value for p in fitted], values))

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.style import BLUE, DASHED, GREY, ORANGE, frequency_axis, rendered
-from inputdesign_cli.runs.run_directory import replace_text
+from inputdesign_cli.outcome.run_directory import replace_text
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.runs.results import Table
-from inputdesign_cli.runs.text_formats import csv_text, read_csv
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.text_formats import csv_text, read_csv
 from pages import Terminal, filled, keep, write
 
 STEP, GAIN, LAG = 0.02, 8.0, 0.575

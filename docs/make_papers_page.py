@@ -13,9 +13,9 @@ import tempfile
 from itertools import zip_longest
 from pathlib import Path
 
-from inputdesign_cli.runs.golden import Row, compare
-from inputdesign_cli.runs.golden_file import Golden, load_golden
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.outcome.golden import Row, compare
+from inputdesign_cli.outcome.golden_file import Golden, load_golden
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.specification import load_spec
 from inputdesign_cli.sweeps.running import run_sweep
 from inputdesign_cli.sweeps.verbs import run_verb

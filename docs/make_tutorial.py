@@ -17,8 +17,8 @@ import scipy.optimize
 import scipy.signal
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.runs.results import Table
-from inputdesign_cli.runs.text_formats import csv_text, read_csv
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.text_formats import csv_text, read_csv
 from pages import DOCS, Terminal, filled, keep, write
 
 LOG = DOCS / "data" / "tclab" / "two_heaters.txt"

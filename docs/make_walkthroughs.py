@@ -20,12 +20,12 @@ import scipy.signal
 from inputdesign_cli import load_spec
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.runs.record import load_result
-from inputdesign_cli.runs.results import Table
-from inputdesign_cli.runs.text_formats import csv_text, read_csv
-from inputdesign_cli.tasks.build.campaign import build_campaign
-from inputdesign_cli.tasks.campaign import ratio_of
-from inputdesign_cli.tasks.campaign_trials import energy_of
+from inputdesign_cli.outcome.record import load_result
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.text_formats import csv_text, read_csv
+from inputdesign_cli.questions.campaign.build import build_campaign
+from inputdesign_cli.questions.campaign.schedule import ratio_of
+from inputdesign_cli.questions.campaign.trials import energy_of
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

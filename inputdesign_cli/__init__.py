@@ -15,9 +15,9 @@ from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:
     from inputdesign_cli.figures.plots import figure
+    from inputdesign_cli.questions import analyse, assess, identify, simulate, solve, to_control, validate
     from inputdesign_cli.specification import Spec, from_control, load_spec, parse_spec
     from inputdesign_cli.sweeps.notebook import sweep
-    from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, to_control, validate
 
 
 __all__ = [
@@ -41,15 +41,15 @@ _HOME = {
     "Spec": "inputdesign_cli.specification",
     "figure": "inputdesign_cli.figures.plots",
     "from_control": "inputdesign_cli.specification",
-    "to_control": "inputdesign_cli.tasks",
+    "to_control": "inputdesign_cli.questions",
     "load_spec": "inputdesign_cli.specification",
     "parse_spec": "inputdesign_cli.specification",
-    "solve": "inputdesign_cli.tasks",
-    "simulate": "inputdesign_cli.tasks",
-    "analyse": "inputdesign_cli.tasks",
-    "assess": "inputdesign_cli.tasks",
-    "identify": "inputdesign_cli.tasks",
-    "validate": "inputdesign_cli.tasks",
+    "solve": "inputdesign_cli.questions",
+    "simulate": "inputdesign_cli.questions",
+    "analyse": "inputdesign_cli.questions",
+    "assess": "inputdesign_cli.questions",
+    "identify": "inputdesign_cli.questions",
+    "validate": "inputdesign_cli.questions",
     "sweep": "inputdesign_cli.sweeps.notebook",
 }
 

@@ -12,7 +12,7 @@ from inputdesign_cli.compute.threads import ONE_THREAD
 os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 
 from inputdesign_cli import load_spec
-from inputdesign_cli.tasks.build.system import build_experiment
+from inputdesign_cli.questions.building.system import build_experiment
 
 SPECS = Path(__file__).parent.parent / "specs"
 # New objects before the collector of cycles looks at them: by itself it does so every 700.

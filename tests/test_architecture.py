@@ -261,7 +261,7 @@ def test_results_are_plain_data():
     assert imported_rooms(ROOT / "runs" / "curves.py") == set()
     taken = {module for module, _ in imports(ROOT / "runs" / "results.py")}
     assert {module for module in taken if module.startswith("inputdesign_cli")} == {
-        "inputdesign_cli.runs.curves",
+        "inputdesign_cli.outcome.curves",
         "inputdesign_cli.outcome",
     }
 

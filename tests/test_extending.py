@@ -11,11 +11,11 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.questions.building import requirements as builders
+from inputdesign_cli.questions.task import build_task
 from inputdesign_cli.specification import loading
 from inputdesign_cli.specification.models import accuracy as words
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.tasks.build import requirements as builders
-from inputdesign_cli.tasks.build.task import build_task
 
 PAGE = (Path(__file__).parent.parent / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
 SAMPLES, VARIANCE, ORDER = 200, 0.5, 6
@@ -53,7 +53,7 @@ def total_variance(monkeypatch):
     )
     table = dict(builders.BUILDERS)
     names = {**vars(builders), "BUILDERS": table, "TotalVariance": requirement}
-    run_block("tasks/build/requirements.py", names)
+    run_block("questions/building/requirements.py", names)
     monkeypatch.setattr(builders, "BUILDERS", table)
 
 

@@ -50,12 +50,12 @@ def campaign(
     """
     place = Place(output, name_of(spec), [spec], overwrite)
     with computing(spec, quiet=quiet):
-        from inputdesign_cli import tasks
-        from inputdesign_cli.campaign.rounds import begun
+        from inputdesign_cli import questions
+        from inputdesign_cli.questions.campaign.directory import begun
 
         stated = read_spec(spec, overrides, confine)
         place = place.checked(stated)
-        results = begun(partial(tasks.next_round, stated), stated.resolve_path("."), place.directory)
+        results = begun(partial(questions.next_round, stated), stated.resolve_path("."), place.directory)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
@@ -103,10 +103,10 @@ def proceed(
     if regardless and withdraw is not None:
         raise typer.BadParameter("withdraw first, then say it without a record", param_hint="--regardless")
     with computing(directory, quiet=quiet):
-        from inputdesign_cli import tasks
-        from inputdesign_cli.campaign.memory import held, read_memory
-        from inputdesign_cli.campaign.rounds import advanced, withdrawn
-        from inputdesign_cli.runs.record import SPEC
+        from inputdesign_cli import questions
+        from inputdesign_cli.outcome.record import SPEC
+        from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
+        from inputdesign_cli.questions.campaign.memory import held, read_memory
         from inputdesign_cli.specification import parse_spec
         from inputdesign_cli.tasks.build.preparation import Preparation
 
@@ -114,7 +114,7 @@ def proceed(
         with computing(directory, quiet=quiet):
             memory = read_memory(directory, withdrawing=withdraw)
             stated = parse_spec(memory.spec, str(directory / SPEC), folder=memory.folder)
-            decide = partial(tasks.next_round, stated)
+            decide = partial(questions.next_round, stated)
             if withdraw is not None:
                 results = withdrawn(decide, memory, withdraw)
             elif data is None:
@@ -124,7 +124,7 @@ def proceed(
                 taken = Preparation(
                     columns=named(columns, "--columns", "u1=Heater 1,y1=4"), operating_point=point
                 )
-                part = tasks.recorded_part(stated, data, taken)
+                part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
         renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
     code = _EXIT[results.result["status"]]
@@ -134,14 +134,14 @@ def proceed(
 
 def status(directory: CampaignDirectory, json_output: Json = False) -> None:
     """Tell how a campaign stands: what has been reached, and what comes next."""
-    from inputdesign_cli.campaign.memory import read_memory
-    from inputdesign_cli.runs.text_formats import json_text
+    from inputdesign_cli.outcome.text_formats import json_text
+    from inputdesign_cli.questions.campaign.memory import read_memory
 
     memory = read_memory(directory)
     if json_output:
         typer.echo(json_text(dict(memory.campaign)), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
-    from inputdesign_cli.runs.record import load_result
+    from inputdesign_cli.outcome.record import load_result
 
     typer.echo(summary(load_result(directory), memory.time_unit, []))

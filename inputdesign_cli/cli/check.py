@@ -16,7 +16,7 @@ from inputdesign_cli.cli.terminal import aligned, status
 from inputdesign_cli.errors import EXIT_MISSED, DataError, IdesignError
 
 if TYPE_CHECKING:
-    from inputdesign_cli.runs.golden import Row
+    from inputdesign_cli.outcome.golden import Row
 
 HEADER = ("", "run", "quantity", "computed", "expected", "deviation", "tolerance", "source")
 
@@ -51,7 +51,7 @@ def check(
         stopped = error
     if junit is not None:
         from inputdesign_cli.cli.junit import junit_text
-        from inputdesign_cli.runs.run_directory import write_text
+        from inputdesign_cli.outcome.run_directory import write_text
 
         write_text(junit, junit_text(rows, seconds, stopped))
     if stopped is not None:
@@ -75,8 +75,8 @@ def _compare(
     Raises:
         IdesignError: a file, or a spec that it names, is not good.
     """
-    from inputdesign_cli.runs.golden import compare
-    from inputdesign_cli.runs.golden_file import load_golden
+    from inputdesign_cli.outcome.golden import compare
+    from inputdesign_cli.outcome.golden_file import load_golden
     from inputdesign_cli.sweeps.verbs import execute
 
     for golden in [load_golden(path) for path in files]:

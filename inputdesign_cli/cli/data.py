@@ -93,13 +93,13 @@ def identify(
         )
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     with computing(data[0], quiet=quiet):
-        from inputdesign_cli import tasks
-        from inputdesign_cli.runs.origin import check_counted_once
+        from inputdesign_cli import questions
+        from inputdesign_cli.outcome.origin import check_counted_once
 
         stated = read_spec(spec, overrides, confine, design=False)
         place = place.checked(stated)
         check_counted_once(spec, data)
-        results = tasks.identify(
+        results = questions.identify(
             stated,
             data,
             remove_means=remove_means,
@@ -144,13 +144,13 @@ def assess(
     """
     place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output, judges=True)
     with computing(data[0], quiet=quiet):
-        from inputdesign_cli import tasks
-        from inputdesign_cli.runs.origin import check_counted_once
+        from inputdesign_cli import questions
+        from inputdesign_cli.outcome.origin import check_counted_once
 
         stated = read_spec(spec, overrides, confine)
         place = place.checked(stated)
         check_counted_once(spec, data)
-        assessment = tasks.assess(
+        assessment = questions.assess(
             stated,
             data,
             remove_means=remove_means,

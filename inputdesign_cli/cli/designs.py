@@ -32,7 +32,7 @@ from inputdesign_cli.errors import STANDARD_STREAM
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
-    from inputdesign_cli.runs.results import Results
+    from inputdesign_cli.outcome.results import Results
     from inputdesign_cli.sweeps.verbs import Verb
 
 

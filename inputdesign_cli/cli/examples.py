@@ -40,7 +40,7 @@ def examples(
 
     They are the examples of the documentation; `idesign check` compares their results with golden values.
     """
-    from inputdesign_cli.runs.run_directory import output_errors, write_text
+    from inputdesign_cli.outcome.run_directory import output_errors, write_text
     from inputdesign_cli.specification.template import read_template
 
     found = {path.stem: path for path in sorted((shipped() / "specs").glob("*.yaml"))}

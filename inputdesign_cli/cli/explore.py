@@ -64,12 +64,12 @@ def explore(
     sources = [*([validate] if validate is not None else []), *data]
     place = Place(output, f"{data[0].stem}_{ending}", sources, overwrite, no_output)
     with computing(data[0], quiet=quiet):
-        from inputdesign_cli import tasks
+        from inputdesign_cli import questions
 
         prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span, without, data)
         model = None if validate is None else read_spec(validate, None, None, design=False)
         place = place.checked(model)
-        found = tasks.explore(data, prepared, model=model)
+        found = questions.explore(data, prepared, model=model)
     keep(
         found.results,
         place,

@@ -39,7 +39,7 @@ def init(
         hint = "choose another name, or overwrite it with --force"
         raise OutputError.because("output-exists", f"{file} exists already", hint)
     from inputdesign_cli.cli.reference import schema_text
-    from inputdesign_cli.runs.run_directory import write_text
+    from inputdesign_cli.outcome.run_directory import write_text
 
     write_text(file, text)
     if not (file.parent / SCHEMA).exists():

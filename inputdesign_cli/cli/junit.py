@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from inputdesign_cli.errors import IdesignError
 
 if TYPE_CHECKING:
-    from inputdesign_cli.runs.golden import Row
+    from inputdesign_cli.outcome.golden import Row
 
 Seconds = Mapping[tuple[str, str], float]
 

@@ -32,9 +32,9 @@ def report(
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
+        from inputdesign_cli.outcome.record import PAGE
+        from inputdesign_cli.outcome.run_directory import replace_text
         from inputdesign_cli.report.render import is_page, report_text
-        from inputdesign_cli.runs.record import PAGE
-        from inputdesign_cli.runs.run_directory import replace_text
 
         if str(output) == STANDARD_STREAM:
             typer.echo(report_text(directory))

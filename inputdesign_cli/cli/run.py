@@ -13,8 +13,8 @@ from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
-    from inputdesign_cli.runs.origin import Origin
-    from inputdesign_cli.runs.results import Results
+    from inputdesign_cli.outcome.origin import Origin
+    from inputdesign_cli.outcome.results import Results
     from inputdesign_cli.specification import Spec
 
 
@@ -42,7 +42,7 @@ class Place:
     @property
     def origin(self) -> Origin:
         """What the run is made from."""
-        from inputdesign_cli.runs.origin import Origin
+        from inputdesign_cli.outcome.origin import Origin
 
         return Origin(self.sources, self.asked, self.overwrite, self.judges)
 
@@ -54,7 +54,7 @@ class Place:
         """
         place = self if spec is None else replace(self, asked=spec.to_yaml())
         if not place.nowhere:
-            from inputdesign_cli.runs.origin import check_place
+            from inputdesign_cli.outcome.origin import check_place
 
             check_place(place.directory, place.origin, place.spared(place.asked))
         return place
@@ -68,7 +68,7 @@ class Place:
         Raises:
             OutputError: `output-is-the-spec`, it would say something else.
         """
-        from inputdesign_cli.runs.record import SPEC
+        from inputdesign_cli.outcome.record import SPEC
         from inputdesign_cli.specification import same_content
         from inputdesign_cli.specification.yaml.files import read_text
 
@@ -141,8 +141,8 @@ def renew(
         OutputError: as `write_run`.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.runs.origin import has_other_values
-        from inputdesign_cli.runs.run_directory import write_run
+        from inputdesign_cli.outcome.origin import has_other_values
+        from inputdesign_cli.outcome.run_directory import write_run
 
         drawings = {}
         if figures:
@@ -158,9 +158,9 @@ def renew(
 
 def _page(directory: Path) -> Path:
     """The page about the run in a directory, written anew."""
+    from inputdesign_cli.outcome.record import PAGE
+    from inputdesign_cli.outcome.run_directory import replace_text
     from inputdesign_cli.report.render import report_text
-    from inputdesign_cli.runs.record import PAGE
-    from inputdesign_cli.runs.run_directory import replace_text
 
     replace_text(directory / PAGE, report_text(directory))
     return directory / PAGE
@@ -177,8 +177,8 @@ def show(
     if json_output and files:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
     elif json_output:
-        from inputdesign_cli.runs.run_directory import finished_result
-        from inputdesign_cli.runs.text_formats import json_text
+        from inputdesign_cli.outcome.run_directory import finished_result
+        from inputdesign_cli.outcome.text_formats import json_text
 
         typer.echo(json_text(finished_result(results)), nl=False)
     elif not quiet:

@@ -14,7 +14,7 @@ from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
-    from inputdesign_cli.runs.results import Results
+    from inputdesign_cli.outcome.results import Results
 
 _ENDINGS = ("csv", "mat", "npz", "h", "png")
 _ROUNDING = 1e-12
@@ -98,7 +98,7 @@ def signal(
         raise typer.BadParameter(message, param_hint="--sample-time")
     if time_unit not in _TIME_UNITS:
         raise typer.BadParameter(f"it is one of {', '.join(_TIME_UNITS)}", param_hint="--time-unit")
-    from inputdesign_cli.tasks.ready_made import ReadyMade, make_signal
+    from inputdesign_cli.questions.ready_made import ReadyMade, make_signal
 
     swept = _pair(chirp, "--chirp") if chirp else None
     results = make_signal(
@@ -120,7 +120,7 @@ def signal(
     for file in files:
         _write(file, results)
     if json_output:
-        from inputdesign_cli.runs.text_formats import json_text
+        from inputdesign_cli.outcome.text_formats import json_text
 
         typer.echo(json_text(results.result), nl=False)
     elif not quiet:
@@ -184,9 +184,9 @@ def _levels(text: str, inputs: int) -> tuple[tuple[float, float], ...]:
 
 def _write(file: Path, results: Results) -> None:
     """One file of the kind that its ending tells."""
-    from inputdesign_cli.runs.run_directory import write_bytes
-    from inputdesign_cli.runs.signal_files import WRITERS
-    from inputdesign_cli.runs.text_formats import csv_text
+    from inputdesign_cli.outcome.run_directory import write_bytes
+    from inputdesign_cli.outcome.signal_files import WRITERS
+    from inputdesign_cli.outcome.text_formats import csv_text
 
     table, ending = results.tables["signal"], file.suffix.removeprefix(".").lower()
     if ending == "png":

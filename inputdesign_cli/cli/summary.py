@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from inputdesign_cli.cli.terminal import aligned
+from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.report.evidence import (
     campaign_facts,
     estimate_facts,
@@ -16,8 +18,6 @@ from inputdesign_cli.report.evidence import (
 )
 from inputdesign_cli.report.facts import GIVEN, facts, proofs
 from inputdesign_cli.report.numbers import BREAK, Rows
-from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.results import Result
 
 _NONE = Rows((), ())
 Line = tuple[str, str]

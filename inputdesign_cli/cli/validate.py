@@ -25,7 +25,7 @@ def validate(
     A valid spec can be read and is well posed. One that states nothing of a design (accuracy, limits,
     spectrum, ..) is checked for what `identify` needs. All problems of all files are reported at once.
     """
-    from inputdesign_cli.tasks import validate as check
+    from inputdesign_cli.questions import validate as check
 
     errors: list[IdesignError] = []
     estimated: list[Path] = []

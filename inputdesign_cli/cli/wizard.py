@@ -15,7 +15,7 @@ from inputdesign_cli.cli.terminal import complain, status
 from inputdesign_cli.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
-    from inputdesign_cli.runs.results import Result
+    from inputdesign_cli.outcome.results import Result
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.wizard.composing import Draft
     from inputdesign_cli.wizard.questions import Question
@@ -74,7 +74,7 @@ def wizard(
     if unanswered and terminal:
         draft, said = _asked(known, output, quiet), Answers()  # what is typed stands in no file
     with said.located(), computing(output, quiet=quiet, doing="thinking"):
-        from inputdesign_cli.runs.run_directory import write_text
+        from inputdesign_cli.outcome.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
         from inputdesign_cli.wizard.spectra import with_spectrum
 
@@ -95,12 +95,12 @@ def wizard(
 
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     with computing(file, quiet=quiet):
-        from inputdesign_cli import load_spec, tasks
+        from inputdesign_cli import load_spec, questions
         from inputdesign_cli.wizard.closing import to_log
         from inputdesign_cli.wizard.solving import verdict
 
         spec = load_spec(file)
-        results = tasks.solve(spec)
+        results = questions.solve(spec)
     place = Place(None, file.stem, [file], overwrite)
     keep(results, place, figures=True, json_output=False, quiet=True)
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
@@ -120,9 +120,9 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
 
 
 def _result(spec: Spec) -> Result:
-    from inputdesign_cli import tasks
+    from inputdesign_cli import questions
 
-    return tasks.solve(spec).result
+    return questions.solve(spec).result
 
 
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:

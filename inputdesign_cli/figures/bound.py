@@ -30,8 +30,8 @@ from inputdesign_cli.figures.style import (
     plot_admitted,
     positive,
 )
-from inputdesign_cli.runs.curves import BoundCurves, BoundPanel
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.curves import BoundCurves, BoundPanel
+from inputdesign_cli.outcome.results import Array
 
 # Ratios beyond this many times the limit, or the design, run out of the linear panel.
 _HIGHEST = 4.0

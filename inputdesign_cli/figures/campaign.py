@@ -20,7 +20,7 @@ from inputdesign_cli.figures.style import (
     page_of_pairs,
     plain_decades,
 )
-from inputdesign_cli.runs.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
+from inputdesign_cli.outcome.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
 
 COLUMNS = 3
 # Of few runs fine bins would show each run by itself.

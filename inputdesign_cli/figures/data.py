@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from inputdesign_cli.figures.style import BLACK, BLUE, DOTTED, GREY, ORANGE, legend_above, legend_over_all
-from inputdesign_cli.runs.curves import FitCurves, FitPanel, ResidualCurves
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.curves import FitCurves, FitPanel, ResidualCurves
+from inputdesign_cli.outcome.results import Array
 
 # A record up to the first length is drawn whole, of a longer one so many samples.
 _WHOLE, SHOWN = 600, 400

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, GREEN, log_axes, plot_admitted
-from inputdesign_cli.runs.curves import DeviationCurves, DeviationPanel
+from inputdesign_cli.outcome.curves import DeviationCurves, DeviationPanel
 
 
 def draw_deviations(page: Figure, curves: DeviationCurves, time_unit: str) -> None:

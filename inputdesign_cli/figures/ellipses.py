@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, legend_over_all, page_of_pairs
-from inputdesign_cli.runs.curves import Ellipse, EllipseCurves
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.curves import Ellipse, EllipseCurves
+from inputdesign_cli.outcome.results import Array
 
 COLUMNS = 3
 POINTS = 200

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures.apart import point
 from inputdesign_cli.figures.style import BLACK, legend_over_all
-from inputdesign_cli.runs.curves import OrderCurves
+from inputdesign_cli.outcome.curves import OrderCurves
 
 _LEAST_SHOWN = -20.0
 

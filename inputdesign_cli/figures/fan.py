@@ -15,7 +15,7 @@ from inputdesign_cli.figures.style import (
     legend_above,
     plain_decades,
 )
-from inputdesign_cli.runs.curves import FanCurves
+from inputdesign_cli.outcome.curves import FanCurves
 
 # More lines than these are one grey area.
 _MOST_LINES = 200

@@ -17,7 +17,7 @@ from inputdesign_cli.figures.style import (
     legend_above,
     log_axes,
 )
-from inputdesign_cli.runs.curves import ErrorCurves, MomentsCurves
+from inputdesign_cli.outcome.curves import ErrorCurves, MomentsCurves
 
 _OPAQUE = 0.8
 NUMBERED = 8  # rows up to which the entries are written into the cells

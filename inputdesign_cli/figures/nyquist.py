@@ -21,7 +21,7 @@ from inputdesign_cli.figures.style import (
     limiting_label,
     marked,
 )
-from inputdesign_cli.runs.curves import NyquistCurves
+from inputdesign_cli.outcome.curves import NyquistCurves
 
 _DISCS = 36
 # Of the plane, what is shown: so far around -1 and 0 the loop decides on its margins.

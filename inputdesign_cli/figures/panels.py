@@ -17,7 +17,7 @@ from inputdesign_cli.figures.style import (
     lowered,
     title_above,
 )
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.results import Array
 
 # How much higher a page is with a panel under one other, or under several.
 _TALL, _TALLER = 1.25, 1.4

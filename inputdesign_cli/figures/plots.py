@@ -21,9 +21,9 @@ from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
 from inputdesign_cli.figures.style import FILE_TYPES, FileType, painted, rendered
 from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands, draw_loss
-from inputdesign_cli.runs import curves as of
-from inputdesign_cli.runs.curves import Curves
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.outcome import curves as of
+from inputdesign_cli.outcome.curves import Curves
+from inputdesign_cli.outcome.results import Results
 
 # Each draws its curves on an empty page; the text is the unit of time.
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.runs.results import Array, Json
+from inputdesign_cli.outcome.results import Array, Json
 
 # Fewer points without a line are marks; of more points every so many are kept.
 _FEWEST, _MOST = 20, 400

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from inputdesign_cli.figures.apart import stroke
 from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, frequency_axis, legend_above, log_axes, lowered
-from inputdesign_cli.runs.curves import ResponseCurves, ResponsePanel
+from inputdesign_cli.outcome.curves import ResponseCurves, ResponsePanel
 
 
 def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:

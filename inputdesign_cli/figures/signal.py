@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import BLUE, DASHED, GREEN, GREY, ORANGE, legend_over_all, lowered
-from inputdesign_cli.runs.curves import PredictedPanel, SignalCurves
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.curves import PredictedPanel, SignalCurves
+from inputdesign_cli.outcome.results import Array
 
 SHOWN = 1000  # samples that a figure of this width can show one by one
 ROWS = 4  # channels that fit, of the record and of the outputs together

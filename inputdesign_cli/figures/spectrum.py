@@ -24,8 +24,8 @@ from inputdesign_cli.figures.style import (
     lowered,
     marked,
 )
-from inputdesign_cli.runs.curves import DirectionCurves, OptimalityCurves, SpectrumCurves
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.curves import DirectionCurves, OptimalityCurves, SpectrumCurves
+from inputdesign_cli.outcome.results import Array
 
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end

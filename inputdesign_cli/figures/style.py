@@ -27,7 +27,7 @@ from matplotlib.ticker import (
     NullLocator,
 )
 
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.results import Array
 
 FileType = Literal["png", "svg", "pdf"]
 FILE_TYPES: dict[str, FileType] = {"png": "png", "svg": "svg", "pdf": "pdf"}

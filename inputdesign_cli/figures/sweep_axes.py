@@ -11,7 +11,7 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from inputdesign_cli.figures.style import ORANGE, log_axes
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.results import Array
 
 # Values over a wider ratio are drawn on a logarithmic scale; keys from the second ratio on.
 LOG_FROM = 10.0

@@ -41,9 +41,9 @@ from inputdesign_cli.figures.sweep_axes import (
 )
 from inputdesign_cli.figures.sweep_moments import draw_moments, moment_entries
 from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable
-from inputdesign_cli.runs.objectives import OBJECTIVES, objective
-from inputdesign_cli.runs.results import Array
-from inputdesign_cli.runs.run_directory import output_errors, write_bytes
+from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
+from inputdesign_cli.outcome.results import Array
+from inputdesign_cli.outcome.run_directory import output_errors, write_bytes
 
 # What no design whatever does better.
 BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structure_bound": "any moments"}

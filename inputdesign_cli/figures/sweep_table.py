@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.results import Array, Json
+from inputdesign_cli.outcome.text_formats import csv_rows
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.results import Array, Json
-from inputdesign_cli.runs.text_formats import csv_rows
 
 # What a sweep is about, if its results have it: the first of these.
 QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")

@@ -11,7 +11,7 @@ from matplotlib.ticker import NullLocator
 from inputdesign_cli.figures.apart import stroke
 from inputdesign_cli.figures.style import BLACK, DASHED, legend_above, log_axes
 from inputdesign_cli.figures.sweep_axes import curve, mark_failures, plain_numbers
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.outcome.results import Array
 
 
 @dataclass(frozen=True)

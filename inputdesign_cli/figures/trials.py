@@ -27,7 +27,7 @@ from inputdesign_cli.figures.style import (
     plot_admitted,
     positive,
 )
-from inputdesign_cli.runs.curves import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
+from inputdesign_cli.outcome.curves import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
 
 COLUMNS = 2
 COLOURS = (BLUE, ORANGE, GREEN, GREY)

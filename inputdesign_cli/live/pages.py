@@ -8,10 +8,10 @@ from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.render import filled
 from inputdesign_cli.report.run_page import run_page
-from inputdesign_cli.runs.results import Json
 
 _AROUND = 2  # lines shown before and after one that is wrong
 

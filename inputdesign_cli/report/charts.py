@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.readings import readings
+from inputdesign_cli.outcome.curves import Curves
+from inputdesign_cli.outcome.curves_file import read_curves
+from inputdesign_cli.outcome.results import Json, Result
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.described import captioned, described
 from inputdesign_cli.report.numbers import spoken
-from inputdesign_cli.runs.curves import Curves
-from inputdesign_cli.runs.curves_file import read_curves
-from inputdesign_cli.runs.results import Json, Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

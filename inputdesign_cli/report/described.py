@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.figures.fan import MOST_NAMED
-from inputdesign_cli.runs import curves as of
-from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.outcome import curves as of
+from inputdesign_cli.outcome.curves import Curves
 
 OF_DATA = "data"  # what r_u of an estimate is called
 

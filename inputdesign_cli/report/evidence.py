@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from inputdesign_cli.outcome.results import Json, Result
 from inputdesign_cli.report.numbers import BREAK, Fact, Rows, listed, shown, spoken
-from inputdesign_cli.runs.results import Json, Result
 
 _SPREAD = "{:.4g} ± {:.2g}"
 # Below this share of its standard deviation the digits of an estimate say nothing, not even its order.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.results import Json, Result
+from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.report.numbers import Fact, enumerated, precise, shown, spoken
-from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.results import Json, Result
-from inputdesign_cli.runs.shares import per_cent
 
 # Gaps below this are told as such.
 _CLOSED = 1e-6

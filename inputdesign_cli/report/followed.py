@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import SupportsIndex
 
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.outcome.results import Json
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.outcome.results import Json
 
 BREAK = "\n"  # within a cell: what follows is a remark
 # A line of a table of facts: name, value, and a note that may be empty.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from inputdesign_cli.outcome.objectives import objective
 from inputdesign_cli.report.numbers import spoken
-from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.specification import PolynomialPlant, Spec, parse_spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum

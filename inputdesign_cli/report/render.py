@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome.record import RESULT, unreadable
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.hover import SCRIPT
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
-from inputdesign_cli.runs.record import RESULT, unreadable
-from inputdesign_cli.runs.results import Json
 from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:

@@ -8,6 +8,10 @@ from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor, InProcess
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.outcome.objectives import objective
+from inputdesign_cli.outcome.record import RESULT, unreadable
+from inputdesign_cli.outcome.results import Json, Result
+from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import run_charts
 from inputdesign_cli.report.evidence import (
@@ -25,10 +29,6 @@ from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
-from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.record import RESULT, unreadable
-from inputdesign_cli.runs.results import Json, Result
-from inputdesign_cli.runs.run_directory import read_run
 
 # Headings and the charts that belong under them; those of data and of simulated runs have their own.
 _SECTIONS = (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.report.question import Question
-from inputdesign_cli.runs.results import Result
 
 _LEAST_COSTLY = (
     "X. Bombois and G. Scorletti, Design of least costly identification experiments, Journal Européen des "

@@ -15,15 +15,15 @@ from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import bound_of, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, readable_chart
 from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import citations
-from inputdesign_cli.runs.objectives import OBJECTIVES, objective
-from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import read_run
 from inputdesign_cli.sweeps.kept import run_flaw
 
 MOST_ROWS = 200

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from inputdesign_cli.errors import Location, SpecError, bad_spec
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.specification.models.sweep import range_values
 from inputdesign_cli.specification.yaml.plain import plain

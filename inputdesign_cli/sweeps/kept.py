@@ -7,11 +7,11 @@ from math import isfinite
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome.origin import digest
+from inputdesign_cli.outcome.record import SPEC
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.origin import digest
-from inputdesign_cli.runs.record import SPEC
-from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import read_run
 from inputdesign_cli.sweeps.layout import Layout
 from inputdesign_cli.sweeps.point import FAILURES
 

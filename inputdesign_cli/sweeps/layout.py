@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import IO
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome.record import PAGE, RESULT, is_page, is_plain, unreadable
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.record import PAGE, RESULT, is_page, is_plain, unreadable
-from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import output_errors, replace_text
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, WORKERS = ".lock", ".workers"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweeps.grid import Grid, Settings, build_grid, parse_settings
 from inputdesign_cli.sweeps.point import PointJob

@@ -18,9 +18,9 @@ from inputdesign_cli.errors import (
     IdesignError,
     OutputError,
 )
-from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.results import Json, typed
-from inputdesign_cli.runs.text_formats import json_text
+from inputdesign_cli.outcome.provenance import environment
+from inputdesign_cli.outcome.results import Json, typed
+from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweeps.layout import Layout, at_work
 from inputdesign_cli.sweeps.verbs import Verb, run_verb
@@ -101,7 +101,7 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
         timing = {**results.result.get("timing_s", {}), "point": seconds}
         results = replace(results, outcome=typed({**results.result, "timing_s": timing}))
         from inputdesign_cli.figures.plots import draw_all
-        from inputdesign_cli.runs.run_directory import write_run
+        from inputdesign_cli.outcome.run_directory import write_run
 
         write_run(results, directory, draw_all(results, job.figures) if job.figures else {})
     except OutputError:

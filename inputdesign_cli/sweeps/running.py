@@ -22,11 +22,11 @@ from inputdesign_cli.errors import (
     OutputError,
     SpecError,
 )
-from inputdesign_cli.runs.origin import Origin
-from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import output_errors, replace_text
-from inputdesign_cli.runs.text_formats import json_text
+from inputdesign_cli.outcome.origin import Origin
+from inputdesign_cli.outcome.provenance import environment
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.run_directory import output_errors, replace_text
+from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.specification.yaml.writer import to_yaml
 from inputdesign_cli.sweeps.earlier import check_same_sweep
 from inputdesign_cli.sweeps.grid import Settings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.text_formats import csv_line, shortest
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.text_formats import csv_line, shortest
 from inputdesign_cli.sweeps.plan import Plan
 
 Read = Callable[[str], Mapping[str, Json] | None]

@@ -6,8 +6,8 @@ from typing import Literal
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
-from inputdesign_cli.runs.golden_file import Golden, GoldenRun
-from inputdesign_cli.runs.results import Result, Results
+from inputdesign_cli.outcome.golden_file import Golden, GoldenRun
+from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.specification import Spec, load_spec
 
 Verb = Literal["solve", "analyse", "simulate"]
@@ -24,15 +24,15 @@ def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Result
     Raises:
         IdesignError: as the verb does.
     """
-    from inputdesign_cli import tasks
+    from inputdesign_cli import questions
 
     match verb:
         case "solve":
-            return tasks.solve(spec)
+            return questions.solve(spec)
         case "analyse":
-            return tasks.analyse(spec)
+            return questions.analyse(spec)
         case "simulate":
-            return tasks.simulate(spec, executor=executor)
+            return questions.simulate(spec, executor=executor)
 
 
 def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.runs.results import Results
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.phrases import short
 

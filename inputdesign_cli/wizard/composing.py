@@ -77,15 +77,15 @@ class Draft:
         """Write the files that stand beside the spec, and try whether it is well posed.
 
         Raises:
-            IdesignError: as `tasks.validate` does, or a file cannot be written.
+            IdesignError: as `questions.validate` does, or a file cannot be written.
         """
-        from inputdesign_cli import tasks
-        from inputdesign_cli.runs.run_directory import write_bytes
+        from inputdesign_cli import questions
+        from inputdesign_cli.outcome.run_directory import write_bytes
 
         for name, content in self.files.items():
             write_bytes(self.folder / name, content)
         with in_their_words(self.said):
-            tasks.validate(self.spec())
+            questions.validate(self.spec())
 
 
 def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAnswer | None = None) -> Draft:

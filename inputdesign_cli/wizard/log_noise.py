@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import Noise, Spec
 from inputdesign_cli.wizard.means import DRIFTING, at_rest, drifts, names_resolution, noise_level
 from inputdesign_cli.wizard.phrases import short

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inputdesign_cli.runs.results import Json, Result
+from inputdesign_cli.outcome.results import Json, Result
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 

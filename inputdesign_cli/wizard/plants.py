@@ -146,7 +146,7 @@ def _of_numbers(text: str) -> PlantAnswer:
 
 def _stepped(path: Path, stem: str) -> PlantAnswer:
     """Gain, time constant and dead time estimated from a record that begins at rest."""
-    from inputdesign_cli import parse_spec, tasks
+    from inputdesign_cli import parse_spec, questions
     from inputdesign_cli.tasks.build.tables import read_columns
 
     found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
@@ -181,7 +181,7 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
         design=False,
     )
     point = {"u1": float(u[0]), "y1": float(np.mean(y[: max(begun, 1)]))}
-    identified = tasks.identify(structure, path, operating_point=point)
+    identified = questions.identify(structure, path, operating_point=point)
     model, failed = identified.files["model.yaml"], identified.result["identification"]["failed"]
     name, fitted = f"{stem}-model.yaml", parse_spec(model.decode(), design=False).plant
     assert fitted.kind == "continuous"
@@ -223,9 +223,9 @@ def _rejected(path: Path, failed: Sequence[str]) -> tuple[str, ...]:
 
 def _explored(path: Path, stem: str) -> PlantAnswer:
     """The model of `idesign explore`, in a file beside the spec."""
-    from inputdesign_cli import parse_spec, tasks
+    from inputdesign_cli import parse_spec, questions
 
-    found = tasks.explore([path])
+    found = questions.explore([path])
     name = f"{stem}-model.yaml"
     if "model.yaml" not in found.results.files:
         why = "; ".join(found.reasons) or "no model deserves trust"
@@ -258,7 +258,7 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
 
 def _is_process(spec: Spec) -> bool:
     """Whether rules of tuning know the plant."""
-    from inputdesign_cli.tasks.build.tuning import process_of
+    from inputdesign_cli.questions.building.tuning import process_of
 
     try:
         process_of(spec)
@@ -272,7 +272,7 @@ def _first_order(path: Path, explored: Spec) -> bytes | None:
 
     The noise may drift.
     """
-    from inputdesign_cli import parse_spec, tasks
+    from inputdesign_cli import parse_spec, questions
 
     step = explored.sample_time
     clock = f"sample_time: {step!r}\ntime_unit: {explored.time_unit}\n"
@@ -280,7 +280,7 @@ def _first_order(path: Path, explored: Spec) -> bytes | None:
     begun = f"{clock}plant: {{continuous: {process}, sample: zoh}}\n"
     for noise in _NOISES:
         try:
-            found = tasks.identify(parse_spec(begun + noise, design=False), path, remove_means=True)
+            found = questions.identify(parse_spec(begun + noise, design=False), path, remove_means=True)
         except IdesignError:
             continue
         if not found.result["identification"]["failed"]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.runs.results import Result
-from inputdesign_cli.runs.shares import per_cent
+from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.composing import LEAST
 from inputdesign_cli.wizard.margins import has_room_everywhere, margins_kept

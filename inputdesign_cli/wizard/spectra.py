@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from inputdesign_cli.runs.results import Result
-from inputdesign_cli.runs.shares import per_cent
+from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.composing import Draft
 from inputdesign_cli.wizard.faults import in_their_words

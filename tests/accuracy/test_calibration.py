@@ -13,8 +13,8 @@ from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
-from inputdesign_cli.tasks.build.task import build_task
-from inputdesign_cli.tasks.confidence import settled_alpha
+from inputdesign_cli.questions.common.confidence import settled_alpha
+from inputdesign_cli.questions.task import build_task
 
 SPECS = Path(__file__).parents[2] / "specs"
 FIR = """

@@ -5,8 +5,8 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from inputdesign_cli import specification, tasks
-from inputdesign_cli.runs.results import Results, Table, typed
+from inputdesign_cli import questions, specification
+from inputdesign_cli.outcome.results import Results, Table, typed
 from tests.support.command_line import RESULT
 from tests.support.commands import caller
 
@@ -42,8 +42,8 @@ def verbs(monkeypatch):
     monkeypatch.setattr(specification, "load_spec", load_spec)
     monkeypatch.setattr(import_module("inputdesign_cli.sweeps.verbs"), "load_spec", load_spec)
     for verb in ("solve", "analyse"):
-        monkeypatch.setattr(tasks, verb, results)
-    monkeypatch.setattr(tasks, "validate", lambda spec: None)
+        monkeypatch.setattr(questions, verb, results)
+    monkeypatch.setattr(questions, "validate", lambda spec: None)
     return calls
 
 
@@ -53,6 +53,6 @@ def failing(monkeypatch, verbs):
         def fail(spec):
             raise error
 
-        monkeypatch.setattr(tasks, verb, fail)
+        monkeypatch.setattr(questions, verb, fail)
 
     return install

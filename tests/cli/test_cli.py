@@ -9,10 +9,10 @@ import pytest
 import typer
 
 import inputdesign_cli
-from inputdesign_cli import tasks
+from inputdesign_cli import questions
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, InaccurateError, InfeasibleError, OutputError, SpecError
-from inputdesign_cli.runs.results import Results, typed
+from inputdesign_cli.outcome.results import Results, typed
 from tests.support.command_line import RESULT, diagnostic
 from tests.support.processes import running
 
@@ -52,7 +52,7 @@ def test_quiet_prints_nothing(run, verbs):
 
 def test_the_summary_of_a_result_with_nothing_in_it(run, verbs, monkeypatch):
     bare = Results(typed({"format": 1, "objective": {"kind": "D", "value": 59.2, "upper_bound": 59.3}}), "")
-    monkeypatch.setattr(tasks, "solve", lambda spec: bare)
+    monkeypatch.setattr(questions, "solve", lambda spec: bare)
     code, out, err = run("solve", "a.yaml")
     assert (code, err) == (0, "")
     assert "log det M" in out

@@ -9,7 +9,7 @@ import pytest
 import typer
 
 import inputdesign_cli
-from inputdesign_cli import tasks
+from inputdesign_cli import questions
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.init import KINDS
 from inputdesign_cli.error_codes import explanation
@@ -27,7 +27,7 @@ def test_validate_reports_all_files_at_once(run, verbs, monkeypatch):
         if spec.stem != "good":
             raise SpecError(diagnostic(spec.stem))
 
-    monkeypatch.setattr(tasks, "validate", validate)
+    monkeypatch.setattr(questions, "validate", validate)
     code, out, err = run("validate", "bad.yaml", "good.yaml", "worse.yaml")
     assert code == 2
     assert out == "good.yaml: valid\n"

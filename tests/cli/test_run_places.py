@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from inputdesign_cli import tasks
+from inputdesign_cli import questions
 from inputdesign_cli.cli import main
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.runs.origin import Origin, check_place
-from inputdesign_cli.runs.results import Results, typed
-from inputdesign_cli.runs.run_directory import write_run
+from inputdesign_cli.outcome.origin import Origin, check_place
+from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.run_directory import write_run
 
 SPEC = """\
 title: {}
@@ -159,7 +159,7 @@ def computing(monkeypatch):
         raise SystemExit(99)
 
     for verb in ("solve", "analyse", "simulate", "next_round", "identify", "assess", "explore"):
-        monkeypatch.setattr(tasks, verb, computed)
+        monkeypatch.setattr(questions, verb, computed)
     return begun
 
 
@@ -206,14 +206,14 @@ def test_a_run_of_the_same_file_that_is_replaced_is_told(run, tmp_path):
 
 def test_a_run_that_came_in_the_meantime_is_not_replaced(analyse, monkeypatch, tmp_path):
     spec = write(tmp_path / "a.yaml", "one")
-    true = tasks.analyse
+    true = questions.analyse
 
     def slowly(stated):
         origin = Origin([tmp_path / "b.yaml"])
         write_run(Results(typed({"format": 1, "title": "x"}), "title: x\n"), tmp_path / "r", origin=origin)
         return true(stated)
 
-    monkeypatch.setattr(tasks, "analyse", slowly)
+    monkeypatch.setattr(questions, "analyse", slowly)
     assert analyse(spec, "-o", "r") == (2, "output-other-run")
     assert (tmp_path / "r" / "spec.yaml").read_text() == "title: x\n"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.runs.curves import BoundPanel
+from inputdesign_cli.outcome.curves import BoundPanel
 from tests.support.curves import CURVES, G, W, bound, lines_by_label
 
 

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.campaign import draw_campaign
 from inputdesign_cli.figures.style import painted
-from inputdesign_cli.runs.curves import CampaignCurves
+from inputdesign_cli.outcome.curves import CampaignCurves
 
 
 @pytest.mark.parametrize("most", [1.02, 1.1, 1.64, 3.0, 7.0, 30.0, 2000.0])

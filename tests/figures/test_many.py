@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.trade import Trade, draw_trade
-from inputdesign_cli.runs.curves import BoundCurves, BoundPanel, OrderCurves, ResponseCurves
+from inputdesign_cli.outcome.curves import BoundCurves, BoundPanel, OrderCurves, ResponseCurves
 from tests.support.curves import SEEN, G, W, lines_by_label
 
 SIZES = np.array([2.0, 4.0])

@@ -15,8 +15,8 @@ from matplotlib.transforms import Bbox
 from inputdesign_cli.figures.plots import draw, draw_all
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import TYPE_SIZE
-from inputdesign_cli.runs.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
-from inputdesign_cli.runs.results import Results, typed
+from inputdesign_cli.outcome.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
+from inputdesign_cli.outcome.results import Results, typed
 from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli.runs.curves import ErrorBandCurves, FitCurves, FitPanel
+from inputdesign_cli.outcome.curves import ErrorBandCurves, FitCurves, FitPanel
 from tests.support.curves import BANDS, CURVES, G, W, Z, lines_by_label
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from inputdesign_cli.figures.plots import draw
-from inputdesign_cli.runs.curves import SpectrumCurves
+from inputdesign_cli.outcome.curves import SpectrumCurves
 from tests.support.curves import CURVES, DENSITY, lines_by_label
 
 

@@ -8,7 +8,7 @@ import scipy.stats
 from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify, information_begun_anywhere
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.questions.building.system import build_model
 
 GAIN, LAG, N, BEFORE = 2.0, 10.0, 500, 200
 IN_S = "{{continuous: {{gain: 2, time_constant: 10, dead_time: {delay}}}, sample: zoh}}"

@@ -8,7 +8,7 @@ import scipy.signal
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify
-from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.questions.building.system import build_model
 
 ARX = "sample_time: 1\nplant: {A: [1, -0.8], B: [0, 0.5]}\nnoise: {variance: 0.01}\n"
 LAG = (

@@ -10,7 +10,7 @@ from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.record_problem import evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.questions.building.system import build_model
 
 N = 40
 RICH = PolynomialModel.single(

@@ -12,9 +12,9 @@ from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.spectrum import MatrixFirBasis
-from inputdesign_cli.tasks.build.system import build_model
 from tests.support.plants import arrays, arx, box_jenkins
 from tests.support.records import shifted, simulated
 

@@ -7,8 +7,8 @@ from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.executor import InProcess
 from inputdesign_cli.compute.processes import StandingProcesses
 from inputdesign_cli.live.painters import Painters
+from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.report.charts import run_charts
-from inputdesign_cli.runs.run_directory import write_run
 from tests.support.pages import SPEC
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain, write_plain
 from inputdesign_cli.outcome.codec import NULL, others
-from inputdesign_cli.runs.text_formats import plain
+from inputdesign_cli.outcome.text_formats import plain
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
-from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.questions.building.system import build_model
 
 PLANT = "plant: {B: [0, 1], F: [1, -0.5]}\n"
 

@@ -3,7 +3,7 @@
 import pytest
 
 from inputdesign_cli import load_spec, solve
-from inputdesign_cli.runs.run_directory import write_run
+from inputdesign_cli.outcome.run_directory import write_run
 from tests.support.pages import LOOP, SPEC
 
 

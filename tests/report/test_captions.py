@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.compute.executor import InProcess
-from inputdesign_cli.report.charts import run_charts
-from inputdesign_cli.report.described import captioned
-from inputdesign_cli.runs.curves import (
+from inputdesign_cli.outcome.curves import (
     BoundCurves,
     BoundPanel,
     Curves,
@@ -20,8 +18,10 @@ from inputdesign_cli.runs.curves import (
     SignalCurves,
     SpectrumCurves,
 )
-from inputdesign_cli.runs.curves_file import curves_json
-from inputdesign_cli.runs.record import FIGURES
+from inputdesign_cli.outcome.curves_file import curves_json
+from inputdesign_cli.outcome.record import FIGURES
+from inputdesign_cli.report.charts import run_charts
+from inputdesign_cli.report.described import captioned
 from tests.support.curves import CURVES
 
 # What was told of figures of which nobody knows what they show.

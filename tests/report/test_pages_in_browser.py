@@ -12,10 +12,10 @@ import scipy.signal
 from inputdesign_cli import assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.live.pages import Followed, message_page
+from inputdesign_cli.outcome.run_directory import write_run
+from inputdesign_cli.questions import explore
 from inputdesign_cli.report.render import report_text
-from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.sweeps.running import run_sweep
-from inputdesign_cli.tasks import explore
 from tests.support.browser import clipped, needs_browser, started, violations
 from tests.support.campaigns import applied
 from tests.support.pages import SPEC

@@ -5,9 +5,9 @@ import pytest
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import FiniteRecord
+from inputdesign_cli.questions.common.record import worst_ratio
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
 from inputdesign_cli.spectrum import FirBasis
-from inputdesign_cli.tasks.record import worst_ratio
 from tests.support.random_plants import random_case
 
 EXTRA = {500: 0.10, 5000: 0.03}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.questions.ready_made import ReadyMade, make_signal
 from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
-from inputdesign_cli.tasks.ready_made import ReadyMade, make_signal
 
 
 def rng():

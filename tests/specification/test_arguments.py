@@ -9,7 +9,7 @@ import pytest
 
 from inputdesign_cli import Spec, from_control
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.questions.building.system import build_model
 
 STATES = control.ss([[0, 1], [0, -3.5]], [[0], [10.0]], [[1, 0]], [[0]])
 HEATER = control.tf([2.1], [180, 1])

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
 
 SPEC = """
 title: in parts

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.runs.curves import (
+from inputdesign_cli.outcome.curves import (
     BoundCurves,
     BoundPanel,
     CampaignCurves,

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.runs import replacing
-from inputdesign_cli.runs.results import Results, Table, typed
-from inputdesign_cli.runs.run_directory import read_run, write_run
+from inputdesign_cli.outcome import replacing
+from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.run_directory import read_run, write_run
 
 STEPS = ("open", "os.", "shutil.")
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from inputdesign_cli.runs.curves import OptimalityCurves, SignalCurves
-from inputdesign_cli.runs.results import Results, Table, typed
-from inputdesign_cli.runs.run_directory import write_run
+from inputdesign_cli.outcome.curves import OptimalityCurves, SignalCurves
+from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.run_directory import write_run
 
 
 def a_run(mark: str, *, optimality: bool = False) -> Results:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
-from inputdesign_cli.runs.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table, typed
 from tests.support.sweep_files import SPEC
 
 
@@ -42,5 +42,5 @@ def stub(monkeypatch):
         }
         return Results(typed(result), spec.to_yaml(), tables={"signal": Table({"u1": np.arange(3.0)})})
 
-    monkeypatch.setattr("inputdesign_cli.tasks.solve", solve)
+    monkeypatch.setattr("inputdesign_cli.questions.solve", solve)
     return calls

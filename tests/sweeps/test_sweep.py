@@ -92,10 +92,10 @@ def test_failures_are_rows_with_reasons(spec, stub, tmp_path):
 def test_a_failure_that_is_mended_leaves_no_trace(spec, stub, tmp_path, monkeypatch):
     out = tmp_path / "out"
     run_sweep(spec, ["experiment.samples=6,7"], directory=out)
-    from inputdesign_cli import tasks
+    from inputdesign_cli import questions
 
-    solve = tasks.solve
-    monkeypatch.setattr(tasks, "solve", lambda s: solve(s.model_copy(update={"experiment": six(s)})))
+    solve = questions.solve
+    monkeypatch.setattr(questions, "solve", lambda s: solve(s.model_copy(update={"experiment": six(s)})))
     assert run_sweep(spec, ["experiment.samples=6,7"], directory=out, rerun_failed=True).failures == 0
     assert list((out / "failures").iterdir()) == []
 
@@ -257,7 +257,7 @@ def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):
 
         raise OutputError(Diagnostic("output-full", "no space"))
 
-    monkeypatch.setattr("inputdesign_cli.runs.run_directory.write_run", full)
+    monkeypatch.setattr("inputdesign_cli.outcome.run_directory.write_run", full)
     with pytest.raises(OutputError):
         run_sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
     assert [row["status"] for row in rows(tmp_path / "out")] == ["pending", "pending"]

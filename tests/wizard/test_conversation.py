@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import tasks
+from inputdesign_cli import questions
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.wizard import conversation
 from inputdesign_cli.wizard.conversation import Conversation
@@ -89,7 +89,7 @@ def test_a_step_response_stands_beside_the_spec(tmp_path):
     (tmp_path / "step.csv").write_text("\n".join(["time,u,y", *rows]))
     talk = answered(Conversation({"plant": "step step.csv"}, "x", tmp_path))
     assert (tmp_path / "x-model.yaml").is_file()
-    tasks.validate(talk.draft.spec())
+    questions.validate(talk.draft.spec())
     talk = answered(Conversation({"plant": "step step.csv"}, "x", tmp_path), "converter")
     (tmp_path / "x-model.yaml").unlink()
     (tmp_path / "x-model.yaml").mkdir()

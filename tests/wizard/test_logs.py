@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.log_noise import log_noise_lines
 from tests.support.wishes import ENGINEER

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, tasks
+from inputdesign_cli import parse_spec, questions
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.spectra import with_spectrum
 from tests.wizard.test_wizard import ENGINEER
@@ -70,7 +70,7 @@ def test_gaps_are_told_without_exponents():
 def test_the_record_does_not_repeat():
     """A record that repeats every 120 samples would tell a dead time up to 600 s only."""
     spec = compose(ENGINEER, "x", Path()).spec().with_(uncertainty=None, **{"signal.candidates": 1})
-    found = tasks.solve(spec)
+    found = questions.solve(spec)
     u = found.tables["signal"].columns["u1"] - 40.0
     assert found.result["foreseen"] == {"rivals": []}
     correlations = [abs(u[lag:] @ u[:-lag]) / (u @ u) for lag in range(60, 480)]

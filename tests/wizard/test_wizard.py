@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, tasks
+from inputdesign_cli import parse_spec, questions
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.plants import TEMPLATES
@@ -43,7 +43,7 @@ def test_templates_are_specs_that_can_be_designed(name):
     answers = {**ENGINEER, "plant": name, "wish": WISHES[name], "time": DURATIONS.get(name, "1 h")}
     draft = compose(answers, "x", Path())
     spec = draft.spec().with_(uncertainty=None)
-    tasks.validate(spec)
+    questions.validate(spec)
     assert spec.closed_loop == (name == "tank")
     assert all("  #" in line or ":" in line for line in draft.text.splitlines()[1:])
 
@@ -133,7 +133,7 @@ def test_a_step_response_tells_the_plant_and_how_well(tmp_path):
     assert plant.gain == pytest.approx(2.0, rel=0.02)
     assert plant.time_constant == pytest.approx(180, rel=0.05)
     assert plant.dead_time == pytest.approx(25, abs=6)
-    tasks.validate(draft.spec().with_(**{"uncertainty.scenarios": 3}))
+    questions.validate(draft.spec().with_(**{"uncertainty.scenarios": 3}))
 
 
 @pytest.mark.parametrize(
@@ -226,8 +226,8 @@ def test_a_margin_that_is_kept_is_said():
         "accuracy: {loop: {controller: {pid: {Kp: 1.5, Ti: 180}}, max_sensitivity_db: 6}}\n"
         "objective: best_accuracy\nspectrum: {type: multisine, lines: 30}\nsolver: {any_spectrum: false}\n"
     )
-    result = tasks.solve(spec).result
-    said = " ".join(verdict(spec, result, lambda other: tasks.solve(other).result).sentences)
+    result = questions.solve(spec).result
+    said = " ".join(verdict(spec, result, lambda other: questions.solve(other).result).sentences)
     peak = 10.0 ** (6.0 / 20.0)
     assert f"a gain margin of {peak / (peak - 1.0):.3g}" in said
     assert f"a phase margin of {np.degrees(2.0 * np.arcsin(0.5 / peak)):.3g} degrees" in said

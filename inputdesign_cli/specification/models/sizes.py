@@ -1,7 +1,7 @@
 """How large the counts and the lists of a spec may be, and why: the one place that says so.
 
 Beyond these, memory or time runs out, or rounding has the last word; `docs/sizes.md` shows them with what was
-measured. What depends on several keys together is estimated where it is built (`tasks.build.demand`).
+measured. What depends on several keys together is estimated where it is built (`questions/building/demand.py`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The spec as a whole: the frozen object that tasks are built from."""
+"""The spec as a whole: the frozen object that questions are built from."""
 
 from __future__ import annotations
 

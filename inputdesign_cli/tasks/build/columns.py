@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.runs.units import Units
+from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.naming import named_columns, time_columns

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.identification import resolution_of
-from inputdesign_cli.runs.shares import per_cent
-from inputdesign_cli.runs.units import Units
+from inputdesign_cli.outcome.shares import per_cent
+from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.columns import (
     counted_unit,

@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.runs.shares import per_cent
+from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.tasks.build import rows
 from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
 

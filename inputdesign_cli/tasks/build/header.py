@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.runs.units import Header, Units
+from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.specification import Spec
 
 

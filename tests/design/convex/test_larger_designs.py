@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.design.convex.designs import solve_design
-from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.questions.task import build_task
 
 
 @pytest.mark.parametrize("seed", [1])

@@ -14,8 +14,8 @@ from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.information import Experiment
+from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
-from inputdesign_cli.tasks.build.system import build_model
 from tests.support.scenarios import alternatives, around, relative_of
 
 DENSE = np.linspace(0.0, np.pi, 4001)

@@ -6,7 +6,7 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.design.convex.white import least_white_power
 from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.questions.least_cost.build import build_convex
 
 COLOURED = """
 plant: {B: [0, %g], F: [1, 0.0]}

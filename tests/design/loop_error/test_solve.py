@@ -9,7 +9,7 @@ import pytest
 from inputdesign_cli import load_spec, simulate, solve, validate
 from inputdesign_cli.cli import main
 from inputdesign_cli.figures.plots import draw_all
-from inputdesign_cli.runs.run_directory import write_run
+from inputdesign_cli.outcome.run_directory import write_run
 
 CONTROL = "accuracy.closed_loop_error.control"
 SHORT = ("experiment.samples=1000", "signal.candidates=2")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.runs.units import Units
+from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.tasks.build.data import read_data
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation

@@ -5,9 +5,9 @@ import pytest
 import yaml
 
 from inputdesign_cli.identification.explore.processes import Process, process_models
+from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.system import build_model
-from inputdesign_cli.tasks.result.blocks import blocks_of
 
 
 @pytest.mark.parametrize("outputs", [1, 2])

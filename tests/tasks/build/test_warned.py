@@ -3,7 +3,7 @@
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.tasks.build.exploration import warned
+from inputdesign_cli.questions.exploration.build import warned
 
 TEXT = """# Written by `idesign explore` from title: odd.csv.
 title: "The next experiment after \\"odd\\""

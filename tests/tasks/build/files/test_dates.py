@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.runs.units import Units
+from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.tasks.build.data import read_data
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.log import read_log

@@ -1,1 +1,0 @@
-"""Campaigns on a real plant: a directory that remembers every plan, record and decision."""

@@ -1,0 +1,206 @@
+"""One run in the place of another: whole whenever the writer is killed, and put right by the next call.
+
+Everything happens in a folder of work, inside the directory of the run or, where that is yet to be made or is
+to be exchanged as a whole, beside it. It holds `new`, the files of the new run; `old`, those of the run that
+leaves, only while files are moved one by one; and a lock, which ends with its process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import fcntl
+import os
+import shutil
+import stat
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from inputdesign_cli.errors import OutputError
+from inputdesign_cli.outcome.record import RESULT, listed_files
+
+_PATIENCE = 10.0  # seconds that another writer is waited for
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # of Linux
+
+
+@contextmanager
+def workplace(target: Path) -> Iterator[Path]:
+    """A folder of work for `target`, held for this process alone, with an empty `new` in it.
+
+    What a killed process left is put right first; whatever happens, nothing of the work remains.
+
+    Raises:
+        OutputError: `output-busy`, another process writes into `target`.
+        OSError: the folder cannot be made.
+    """
+    with ExitStack() as held:
+        work = _begun(target, held)
+        try:
+            (work / "new").mkdir()
+            yield work
+        finally:
+            for place in _places(target):
+                _clear(place, target)
+
+
+def _begun(target: Path, held: ExitStack) -> Path:
+    """A new folder of work whose lock is held; others may be after it at the same time."""
+    inside, beside = _places(target)
+    due = time.monotonic() + _PATIENCE
+    while True:
+        heal(target)
+        # Inside a directory that exists: it may be a file system of its own (a mounted volume), and a file
+        # can be moved in one step only within one.
+        work = inside if target.exists() else beside
+        try:
+            work.mkdir()
+            if held.enter_context(_locked(work)):
+                return work
+        except (FileExistsError, FileNotFoundError):
+            # Neither a link nor a file of that name goes away by waiting.
+            if time.monotonic() > due or (os.path.lexists(work) and not _is_folder(work)):
+                raise
+
+
+def heal(target: Path) -> None:
+    """Put right what a killed process left in or beside `target`: it has the run before, or the next one.
+
+    Raises:
+        OutputError: `output-busy`.
+        OSError: a file cannot be moved.
+    """
+    for work in _places(target):
+        # Whoever else sees to it may be faster.
+        with suppress(FileNotFoundError), ExitStack() as held:
+            if _is_folder(work) and held.enter_context(_locked(work)):
+                _clear(work, target)
+
+
+def put_in_place(names: list[str], owned: Collection[str], work: Path, target: Path) -> None:
+    """Replace the files `owned` of `target` by `names` of the new run in `work`, the result last.
+
+    In one step where the system can exchange folders, else file by file: then, if anything fails, the end of
+    the `workplace` or the next call undoes it.
+    """
+    work, exchanged = _exchanged(owned, work, target)
+    if exchanged:
+        return
+    (work / "old").mkdir()
+    _move([RESULT, *(name for name in owned if name != RESULT)], target, work / "old")
+    sync(target)
+    _move(names, work / "new", target)
+    sync(target)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the entries of a directory, are on the disc."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _places(target: Path) -> tuple[Path, Path]:
+    return target / ".run.partial", target.parent / f".{target.name}.partial"
+
+
+def _is_folder(path: Path) -> bool:
+    """Not through a link: what is done here is not to reach other places."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def _clear(work: Path, target: Path) -> None:
+    """Remove a folder of work; files that were being moved go back where they came from."""
+    new, old = work / "new", work / "old"
+    if not _is_folder(work):
+        return
+    if _is_folder(new):
+        if _is_folder(old) and (new / RESULT).is_file():
+            _move([name for name in listed_files(new) if not os.path.lexists(new / name)], target, new)
+            _move(sorted(os.listdir(old), key=RESULT.__eq__), old, target)
+        # Without it the rest is never taken for what is to be moved back.
+        (new / RESULT).unlink(missing_ok=True)
+    shutil.rmtree(work, ignore_errors=True)
+
+
+def _exchanged(owned: Collection[str], work: Path, target: Path) -> tuple[Path, bool]:
+    """Where the folder of work is now, and whether its `new` and `target` were exchanged in one step.
+
+    The user's files are in both while that happens. A folder among them cannot be, so that it prevents it;
+    nor is a directory exchanged that belongs to somebody else, is the current one, or is mounted.
+    """
+    beside = _places(target)[1]
+    exchange = _exchange()
+    status = target.stat()
+    if exchange is None or os.path.samefile(target, os.curdir) or status.st_uid != os.geteuid():
+        return work, False
+    try:
+        work = work.rename(beside)
+        new = work / "new"
+        for entry in target.iterdir():
+            if entry.name not in owned:
+                os.link(entry, new / entry.name, follow_symlinks=False)
+        new.chmod(stat.S_IMODE(status.st_mode))
+        sync(new)
+        exchange(new, target)
+    except OSError:
+        return work, False
+    sync(target.parent)
+    for entry in new.iterdir():
+        # What the user has saved in the meantime.
+        if entry.name not in owned and not _same(entry, target / entry.name):
+            entry.replace(target / entry.name)
+    return work, True
+
+
+def _same(one: Path, other: Path) -> bool:
+    return os.path.lexists(other) and os.path.samestat(one.lstat(), other.lstat())
+
+
+def _exchange() -> Callable[[Path, Path], None] | None:
+    """What exchanges two folders in one step (raises `OSError`), or None where the system cannot."""
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError):
+        return None
+
+    def exchange(one: Path, other: Path) -> None:
+        if call(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE):
+            raise OSError(ctypes.get_errno(), "the folders cannot be exchanged")
+
+    return exchange
+
+
+def _move(names: Iterable[str], source: Path, destination: Path) -> None:
+    for name in names:
+        if os.path.lexists(source / name):
+            (source / name).rename(destination / name)
+
+
+@contextmanager
+def _locked(work: Path) -> Iterator[bool]:
+    """Hold the lock of a folder of work; False where its owner has removed it in the meantime."""
+    with open(work / "lock", "w", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW)) as lock:
+        due = time.monotonic() + _PATIENCE
+        while not _claimed(lock):
+            if time.monotonic() > due:
+                message = f"another process is writing into {work.parent}"
+                hint = "wait for it, or choose another directory with -o"
+                raise OutputError.because("output-busy", message, hint)
+            time.sleep(0.02)
+        yield os.path.exists(lock.name) and os.path.samestat(os.fstat(lock.fileno()), os.stat(lock.name))
+
+
+def _claimed(lock: IO[str]) -> bool:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno not in (errno.ENOLCK, errno.ENOTSUP):  # a file system without locks
+            raise
+    return True

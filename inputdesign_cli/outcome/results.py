@@ -1,0 +1,135 @@
+"""What a design, an analysis or a study hands to the record and the report: plain data, nothing to compute.
+
+`result` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
+are in rad per time unit, spectra in the convention of the contract (power = integral over the normalised
+circle / 2 pi).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.outcome import Information, Outcome, read_plain, write_plain
+from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
+
+Array = NDArray[np.float64]
+# Data as JSON has it. What is in a result is known by its path, not by its type.
+Json = Any
+Result = Mapping[str, Json]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one CSV file: header name (with its unit, `frequency_rad_per_s`) -> values (n,)."""
+
+    columns: Mapping[str, Array]
+
+
+def typed(result: Result) -> Outcome:
+    """Return a result that was put together as plain data with its types."""
+    return read_plain(Outcome, result)
+
+
+@dataclass(frozen=True)
+class Results:
+    """One run: the outcome and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
+
+    outcome: Outcome
+    resolved_spec: str  # YAML text of the spec with all overrides applied
+    time_unit: str = "s"
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    curves: Mapping[str, Curves] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)  # file name ("model.yaml") -> content
+
+    @cached_property
+    def result(self) -> Result:
+        """The outcome as plain data: the content of result.json."""
+        plain: Result = write_plain(self.outcome)
+        return plain
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the k parameters that are estimated."""
+        return self._informed.parameters
+
+    @property
+    def information(self) -> Array:
+        """The information matrix (k, k) of the experiment."""
+        return self._informed.matrix
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance (k, k) of the estimates: the inverse of the information matrix."""
+        found = self._informed.covariance
+        if found is None:
+            raise AttributeError("this experiment leaves a parameter undetermined: there is no covariance")
+        return found
+
+    @property
+    def _informed(self) -> Information:
+        if self.outcome.information is None:
+            raise AttributeError("this run has no information matrix")
+        return self.outcome.information
+
+    @property
+    def signal(self) -> Array:
+        """(n, r): the record to be applied, as signal.csv has it."""
+        _, *channels = self.tables["signal"].columns.values()
+        return np.stack(channels, axis=1)
+
+    @property
+    def bound(self) -> Mapping[str, Array]:
+        """The columns of bound.csv: frequency_rad_per_s, r_u, r_adm, .."""
+        return self.tables["bound"].columns
+
+    def spectrum(self, w: ArrayLike) -> NDArray[np.complex128]:
+        """(.., r, r): the spectrum at frequencies `w`, a number or an array (..), in rad per time unit.
+
+        A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
+        and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
+        is that of the line.
+        """
+        found, stated = cast(SpectrumCurves, self.curves["spectrum"]), np.asarray(w, dtype=float)
+        at, shape = stated.ravel(), (*stated.shape, *found.spectrum.shape[1:])
+        if found.lines:
+            nearest = np.abs(found.frequency - at[:, None]).argmin(axis=1)
+            on = np.abs(found.frequency[nearest] - at) <= _SAME_LINE * _room(found.frequency)[nearest]
+            powers = np.where(on[:, None, None], found.spectrum[nearest], 0.0)
+            return powers.reshape(shape).astype(complex)
+        flat = found.spectrum.reshape(len(found.frequency), -1)
+        columns = [np.interp(at, found.frequency, column, left=0.0, right=0.0) for column in flat.T]
+        return np.stack(columns, axis=1).reshape(shape).astype(complex)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the head of the result."""
+        found = self.outcome
+        rows = [("status", found.status or ""), ("samples", str(found.samples or ""))]
+        if found.objective is not None:
+            of = found.objective
+            rows += [(of.kind, f"{of.value:.6g}")]
+            bounds = (of.lower_bound, of.upper_bound)
+            rows += [("proved bound", f"{bound:.6g}") for bound in bounds if bound is not None]
+        deviations = None if found.information is None else found.information.standard_deviation
+        rows += [(f"standard deviation of {name}", f"{sd:.6g}") for name, sd in (deviations or {}).items()]
+        cells = "".join(
+            f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in rows
+        )
+        return f"<b>{escape(found.title or '')}</b><table>{cells}</table>"
+
+
+# Frequencies are written with three digits, say: so much of what lies around a line is the line.
+_SAME_LINE = 1e-3
+
+
+def _room(frequency: Array) -> Array:
+    """(n,): the frequency of each line, or its distance to the next one where that is less."""
+    apart = np.abs(frequency[:, None] - frequency)
+    np.fill_diagonal(apart, np.inf)
+    return np.minimum(frequency, apart.min(axis=1))

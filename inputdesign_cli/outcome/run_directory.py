@@ -1,0 +1,201 @@
+"""The run directory: written whole or not at all, and `result.json` last.
+
+Where `result.json` stands, the run is complete and every other file belongs to it. A reader may rely on
+that whatever happens to the writer: a full disc, an interrupt, a power cut.
+"""
+
+from __future__ import annotations
+
+import errno
+import filecmp
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import MappingProxyType
+
+from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome.curves_file import curves_json
+from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, not_a_run
+from inputdesign_cli.outcome.provenance import environment
+from inputdesign_cli.outcome.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files
+from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
+from inputdesign_cli.outcome.results import Json, Results
+from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain
+
+
+def finished_result(results: Results) -> dict[str, Json]:
+    """The content of `result.json` in JSON's own types, with `environment` and `spec_sha256` filled in.
+
+    `spec_sha256` is the digest of `spec.yaml` as it is written.
+
+    Raises:
+        ValueError, TypeError: The result holds a NaN, an infinity or a type that JSON lacks: a mistake of the
+            program.
+    """
+    result: dict[str, Json] = plain(results.result)
+    if not result.get("environment"):
+        result["environment"] = environment()
+    if not result.get("spec_sha256"):
+        result["spec_sha256"] = digest(results.resolved_spec)
+    return result
+
+
+def write_run(
+    results: Results,
+    directory: Path,
+    figures: Mapping[str, bytes] = MappingProxyType({}),
+    *,
+    origin: Origin | None = None,
+) -> list[Path]:
+    """Write a run directory and return the paths of its files, `result.json` last.
+
+    An earlier run in `directory` is replaced, including those of its files that the new run no longer
+    has, and the page about it; files that are not of a run are left alone. Whatever fails or kills the
+    writer, `directory` holds afterwards what it held before or the new run, at the latest after the next
+    call.
+
+    Args:
+        results: what a verb of the package returned.
+        directory: where to write it.
+        figures: file name ("bound.png") -> content, as `figures.plots.draw_all` draws them.
+        origin: what the run was made from; a run of something else is then not replaced.
+
+    Raises:
+        OutputError: `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a
+            file of the user's would be overwritten), `output-other-run`, `output-spec-changed`,
+            `output-signal-changed`, `output-busy`.
+    """
+    result = finished_result(results)
+    with output_errors(directory):
+        target = check_directory(directory)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if origin is not None:
+            result |= origin.entry(target, results.resolved_spec)
+        with workplace(target) as work:
+            if origin is not None and not origin.overwrite:
+                check_origin(origin, results.resolved_spec, target, shown=directory)
+            names = _write_files(results, result, work / "new", figures)
+            if work.parent == target:
+                owned = owned_files(target)
+                _keep_foreign(names, owned, work, target, shown=directory)
+                put_in_place(names, owned, work, target)
+            else:
+                (work / "new").rename(target)
+                sync(target.parent)
+    return [directory / name for name in names]
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a single text file, UTF-8.
+
+    Raises:
+        OutputError: `output-not-writable`, `output-full`.
+    """
+    with output_errors(path):
+        _write(path, text)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a single file.
+
+    Raises:
+        OutputError: `output-not-writable`, `output-full`.
+    """
+    with output_errors(path):
+        path.write_bytes(content)
+
+
+def replace_text(path: Path, text: str | Iterable[str]) -> None:
+    """Write a text file, or one that comes in pieces, so that it is whole whenever the writer is killed.
+
+    A reader finds the old one or the new one.
+
+    Raises:
+        OutputError: `output-not-writable`, `output-full`.
+    """
+    partial = path.with_name(f".{path.name}.partial-{os.getpid()}")
+    with output_errors(path):
+        try:
+            with partial.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
+                file.writelines([text] if isinstance(text, str) else text)
+                file.flush()
+                os.fsync(file.fileno())
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def read_run(directory: Path) -> dict[str, Json]:
+    """The content of `result.json` of a whole run.
+
+    Raises:
+        DataError: `run-missing` (no such directory, or no run in it), `run-incomplete` (one of its files is
+            gone), `run-unreadable` (`result.json` is not what `write_run` writes).
+    """
+    with output_errors(directory):
+        heal(Path(os.path.realpath(directory)))
+    result = load_result(directory)
+    missing = [name for name in result.get("files", ()) if not (directory / name).is_file()]
+    if missing:
+        message = f"{directory} lacks {', '.join(missing)}, which its {RESULT} lists"
+        raise DataError.because("run-incomplete", message, hint="run the spec again")
+    return result
+
+
+def _write_files(
+    results: Results, result: dict[str, Json], folder: Path, figures: Mapping[str, bytes]
+) -> list[str]:
+    """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
+    texts = {SPEC: results.resolved_spec}
+    texts |= {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
+    for name, text in texts.items():
+        _write(folder / name, text)
+    contents = {**results.files, **figures}
+    if results.curves:
+        contents[FIGURES] = curves_json(results.curves)
+    for name, content in contents.items():
+        (folder / name).write_bytes(content)
+    names = [*texts, *contents]
+    told = {"signal_sha256": digest(texts[SIGNAL])} if SIGNAL in texts else {}
+    _write(folder / RESULT, json_text({**result, **told, "files": names}))
+    names.append(RESULT)
+    for name in names:
+        sync(folder / name)
+    sync(folder)
+    return names
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, *, shown: Path) -> None:
+    """Refuse to write over files that are of no run, unless that changes nothing."""
+
+    def differs(name: str) -> bool:
+        return not filecmp.cmp(work / "new" / name, target / name, shallow=False)
+
+    foreign = [
+        name
+        for name in names
+        if name not in owned
+        and os.path.lexists(target / name)
+        and (not (target / name).is_file() or differs(name))
+    ]
+    if foreign:
+        raise not_a_run(foreign, shown)
+
+
+@contextmanager
+def output_errors(target: Path) -> Iterator[None]:
+    """Turn what the operating system refuses into an `OutputError`."""
+    try:
+        yield
+    except OSError as error:
+        code, message = "output-not-writable", f"{target} cannot be written: {error.strerror or error}"
+        hint = "choose another place, or change the permissions"
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            code, message = "output-full", f"there is no space left for {target}"
+            hint = "free some space, or choose a place on another disc"
+        raise OutputError.because(code, message, hint) from error

@@ -1,0 +1,139 @@
+"""Results as JSON and tables as CSV: exact to the last bit, and strict about what may stand in them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import orjson
+
+from inputdesign_cli.outcome.results import Array, Json, Table
+from inputdesign_cli.regular_file import read_regular
+
+
+def plain(value: Json, where: str = "result") -> Json:
+    """`value` in JSON's own types: arrays as nested lists, complex numbers as {"re", "im"}, tuples as lists.
+
+    Keys keep their order. `where` names the value in the diagnostic.
+
+    Raises:
+        ValueError: A NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
+        TypeError: A value or a key that has no place in JSON.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{where} is {value}: a result must be finite")
+        return value
+    if isinstance(value, complex):
+        return {"re": plain(value.real, f"{where}.re"), "im": plain(value.imag, f"{where}.im")}
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"{where} has the key {key!r}: keys must be text")
+        return {key: plain(item, f"{where}.{key}") for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
+    raise TypeError(f"{where} is of type {type(value).__name__}, which JSON cannot hold")
+
+
+def json_text(value: Json) -> str:
+    """`value` (anything that `plain` accepts) as JSON text with a final newline."""
+    return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv_text(table: Table) -> str:
+    """A header line and one line a row, the fewest digits from which reading gives back every bit.
+
+    Raises:
+        ValueError: A column that is not a real vector, or columns of different lengths.
+    """
+    columns = {name: np.asarray(values) for name, values in table.columns.items()}
+    for name, values in columns.items():
+        if values.ndim != 1 or values.dtype.kind not in "fiu":
+            raise ValueError(f"column {name} is no real vector, but {values.dtype} of shape {values.shape}")
+    if len({len(values) for values in columns.values()}) > 1:
+        lengths = ", ".join(f"{name}: {len(values)}" for name, values in columns.items())
+        raise ValueError(f"the columns of a table differ in length ({lengths})")
+    rows = zip(*(_shortest(values) for values in columns.values()), strict=True)
+    return csv_line(columns) + "".join(f"{','.join(row)}\n" for row in rows)
+
+
+def csv_line(cells: Iterable[str]) -> str:
+    """Write one line of a table; a cell with a comma, a quote or the end of a line in it stands in quotes.
+
+    Spreadsheets run a text that begins like a formula, so an apostrophe goes before it: `'=1+1`. Numbers stay
+    as they are.
+    """
+    buffer, end = io.StringIO(), "\r\n"  # the writer puts in quotes what holds a character of its end
+    csv.writer(buffer, lineterminator=end).writerow(map(_escaped, cells))
+    return f"{buffer.getvalue().removesuffix(end)}\n"
+
+
+# Apostrophes of the text itself count, so that taking one away gives back every text.
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|-inf", re.ASCII | re.IGNORECASE)
+
+
+def _escaped(cell: str) -> str:
+    return f"'{cell}" if _FORMULA.match(cell) and not _NUMBER.fullmatch(cell) else cell
+
+
+def _unescaped(cell: str) -> str:
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
+
+
+def shortest(value: float) -> str:
+    """The shortest text of a number from which it can be read back, a whole one without its point."""
+    return repr(value).removesuffix(".0")
+
+
+def _shortest(values: Array) -> list[str]:
+    """The shortest text of each of (n,) numbers, a whole one without its point."""
+    if not np.all(np.isfinite(values)):
+        return [shortest(value) for value in values.tolist()]
+    if not values.size:
+        return []
+    native = np.ascontiguousarray(
+        values, dtype=float if values.dtype.kind == "f" else values.dtype.newbyteorder("=")
+    )
+    text = orjson.dumps(native, option=orjson.OPT_SERIALIZE_NUMPY).decode()[1:-1]
+    return f"{text},".replace(".0,", ",").split(",")[:-1]
+
+
+def read_csv(path: Path) -> dict[str, Array]:
+    """The columns of a file that `csv_text` made: name -> (n,)."""
+    return csv_columns(read_regular(path))
+
+
+def csv_columns(content: bytes) -> dict[str, Array]:
+    """The columns of what `csv_text` made: name -> (n,).
+
+    Raises:
+        ValueError: it is no table of numbers.
+    """
+    header, *rows = csv_rows(content)
+    values = np.array(rows, dtype=float).reshape(len(rows), len(header))
+    return {name: values[:, i] for i, name in enumerate(header)}
+
+
+def csv_rows(content: bytes) -> list[list[str]]:
+    """Read the cells of each line of a table as `csv_line` was given them, its header first.
+
+    Raises:
+        ValueError: it is no table.
+    """
+    try:
+        lines = csv.reader(io.StringIO(content.decode(), newline=""))
+        return [[_unescaped(cell) for cell in line] for line in lines]
+    except csv.Error as error:
+        raise ValueError(str(error)) from error

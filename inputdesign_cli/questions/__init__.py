@@ -1,0 +1,261 @@
+"""The verbs: spec in, results out. A spec becomes a task once; nothing after that knows the spec.
+
+What a verb needs is imported when it is called, so that a command waits for nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import singledispatch
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+
+from inputdesign_cli.compute.time_limit import time_limit
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.questions.arithmetic import finite, most_extreme, sound_arithmetic
+from inputdesign_cli.specification import Spec, parse_spec
+
+if TYPE_CHECKING:
+    import control
+
+    from inputdesign_cli.compute.executor import Executor
+    from inputdesign_cli.questions.assessment.assess import Assessment
+    from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
+    from inputdesign_cli.questions.exploration.explore import Exploration
+    from inputdesign_cli.tasks.build.preparation import Preparation
+
+Files = str | Path | Sequence[str | Path]
+
+
+def solve(spec: Spec) -> Results:
+    """Design the experiment that the spec asks for; a given excitation is analysed.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+        InfeasibleError: no excitation meets what is asked.
+        InaccurateError: the proof did not close to the accuracy that is asked.
+    """
+    from inputdesign_cli.questions.task import build_task
+
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return finite(build_task(spec).solve(), most_extreme(spec.content))
+
+
+def analyse(spec: Spec) -> Results:
+    """What a given excitation buys, without designing anything.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    from inputdesign_cli.questions.task import build_analysis
+
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return finite(build_analysis(spec).solve(), most_extreme(spec.content))
+
+
+def validate(spec: Spec) -> None:
+    """Read, check and set up, but compute nothing: the design, or the estimation where none is asked for."""
+    from inputdesign_cli.questions.assessment.build import build_identification
+    from inputdesign_cli.questions.task import build_task
+
+    with _placed(spec):
+        build_task(spec) if spec.asks_for_design else build_identification(spec)
+
+
+def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
+    """Design the experiment, or take the given one, and try it many times on a simulated true system.
+
+    Args:
+        executor: where batches of runs are computed (default: in this process); the result does not depend
+            on it.
+
+    Raises:
+        SpecError: what this version does not simulate, and all that `solve` raises.
+    """
+    from inputdesign_cli.questions.task import build_task
+
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return finite(build_task(spec).simulate(executor), most_extreme(spec.content))
+
+
+def identify(
+    spec: Spec,
+    data: Files,
+    *,
+    remove_means: bool = False,
+    operating_point: Mapping[str, float] | None = None,
+    preparation: Preparation | None = None,
+    frequency_response: bool = False,
+) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
+
+    Args:
+        spec: its plant and noise; it need not ask for a design (`load_spec(.., design=False)`).
+        data: a data file, or several, which are estimated jointly.
+        remove_means: whether to take the means of u and y away, file by file.
+        operating_point: what to take away from a channel, by name: {"u1": 40, "y1": 52.3}.
+        preparation: what else to do to the records before.
+        frequency_response: whether to measure the frequency response without a model instead, at the lines of
+            `accuracy.frequency_response` where the spec has it.
+
+    Raises:
+        SpecError: the plant is not supported.
+        DataError: the file cannot be used, or the data do not determine the parameters.
+    """
+    from inputdesign_cli.questions.assessment.build import build_identification
+    from inputdesign_cli.questions.assessment.identify import identify as identify_records
+    from inputdesign_cli.questions.frequency_response.build import build_measurement
+    from inputdesign_cli.questions.frequency_response.measure import measure
+
+    with _placed(spec):
+        known = _prepared(preparation, operating_point, remove_means)
+        if frequency_response:
+            measured, _ = measure(build_measurement(spec), _paths(data), known)
+            return finite(measured, most_extreme(spec.content))
+        found = identify_records(build_identification(spec), _paths(data), known)
+        return finite(found, most_extreme(spec.content))
+
+
+def assess(
+    spec: Spec,
+    data: Files,
+    *,
+    remove_means: bool = False,
+    operating_point: Mapping[str, float] | None = None,
+    preparation: Preparation | None = None,
+) -> Assessment:
+    """Identify the model from real experiments, compare what the data buy with what is asked, and top up.
+
+    Args:
+        spec: what is asked.
+        data, remove_means, operating_point, preparation: see `identify`.
+
+    Raises:
+        SpecError: nothing is asked that data could meet; see `identify`.
+        DataError: a file cannot be used.
+    """
+    from inputdesign_cli.questions.assessment.assess import Assessment, assess as assess_records
+    from inputdesign_cli.questions.assessment.build import build_identification
+    from inputdesign_cli.questions.frequency_response.build import build_measurement
+    from inputdesign_cli.questions.frequency_response.measure import measure
+
+    with _placed(spec):
+        known = _prepared(preparation, operating_point, remove_means)
+        if spec.accuracy.frequency_response is not None:
+            results, judged = measure(build_measurement(spec), _paths(data), known, assess=True)
+            assert judged is not None  # the spec has lines
+            return Assessment(judged.verdict, finite(results, most_extreme(spec.content)))
+        return assess_records(build_identification(spec), _paths(data), known)
+
+
+def next_round(spec: Spec, past: Past) -> Decision:
+    """What comes next in a campaign after what has been done: the next part, or the end.
+
+    Raises:
+        SpecError: the spec has no campaign, or one that this version cannot do.
+        DataError: a record cannot be used.
+        InfeasibleError, InaccurateError: nothing can be planned.
+    """
+    from inputdesign_cli.questions.campaign.build import build_rounds, check_applied_in_parts
+    from inputdesign_cli.questions.campaign.rounds import decide
+
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        if not past.done:  # one that has begun goes on
+            check_applied_in_parts(spec)
+        return decide(build_rounds(spec), past)
+
+
+def recorded_part(spec: Spec, path: Path, preparation: Preparation) -> Part:
+    """A record of a part of a campaign, as it is kept.
+
+    Raises:
+        DataError: the file cannot be used.
+    """
+    from inputdesign_cli.questions.campaign.build import build_rounds
+    from inputdesign_cli.questions.campaign.rounds import read_part
+
+    with _placed(spec):
+        return read_part(build_rounds(spec), path, preparation)
+
+
+def explore(data: Files, preparation: Preparation | None = None, *, model: Spec | None = None) -> Exploration:
+    """Find a model in a log, without a spec; or judge a given model by it.
+
+    Args:
+        data: a data file, or several of the same experiment.
+        preparation: which column is which, and what to do to the record before.
+        model: to judge, as a spec (`load_spec(.., design=False)`).
+
+    Raises:
+        SpecError: the model cannot be judged.
+        DataError: the log cannot be used, or tells no model at all.
+        InaccurateError: the numbers of the log leave the range of double precision.
+    """
+    from inputdesign_cli.questions.exploration.build import model_to_judge, naming_model
+    from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
+    from inputdesign_cli.tasks.build.header import build_header
+    from inputdesign_cli.tasks.build.preparation import Preparation
+
+    prepared = preparation or Preparation()
+    if model is None:
+        with sound_arithmetic(most_extreme({})):
+            return explore_log(_paths(data), prepared)
+    with _placed(model), naming_model(model):
+        return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
+
+
+@singledispatch
+def to_control(model: Spec | Results) -> control.lti.LTI:
+    """G of a spec, or of what `identify` found, as a system of python-control; if sampled, in discrete time.
+
+    Raises:
+        SpecError: `not-supported` for dead times of a plant that is not sampled.
+    """
+    raise TypeError("to_control takes a spec, or the results of identify")
+
+
+@to_control.register(Spec)
+def _(model: Spec) -> control.lti.LTI:
+    from inputdesign_cli.questions.building.system import build_model
+    from inputdesign_cli.questions.control_systems import system_of
+
+    with _placed(model):
+        return system_of(build_model(model), model.sample_time)
+
+
+@to_control.register(Results)
+def _(model: Results) -> control.lti.LTI:
+    spec = parse_spec(model.resolved_spec, design=False)
+    found = model.files.get("model.yaml")
+    blocks = {} if found is None else yaml.safe_load(found)
+    return to_control(spec.with_(**{key: blocks[key] for key in ("plant", "noise") if key in blocks}))
+
+
+def _paths(data: Files) -> list[Path]:
+    return [Path(data)] if isinstance(data, str | Path) else [Path(one) for one in data]
+
+
+def _prepared(
+    preparation: Preparation | None, operating_point: Mapping[str, float] | None, remove_means: bool
+) -> Preparation:
+    from inputdesign_cli.tasks.build.preparation import Preparation
+
+    given = preparation or Preparation()
+    point = {**given.operating_point, **(operating_point or {})}
+    detrend = "constant" if remove_means and given.detrend == "none" else given.detrend
+    return replace(given, operating_point=point, detrend=detrend)
+
+
+@contextmanager
+def _placed(spec: Spec) -> Iterator[None]:
+    """Errors with the lines of the spec that they concern, those of arithmetic too."""
+    try:
+        with sound_arithmetic(most_extreme(spec.content)):
+            yield
+    except IdesignError as error:
+        raise spec.place(error) from error

@@ -1,0 +1,1 @@
+"""Estimate a model from records, and judge whether they meet what is asked."""

@@ -1,0 +1,152 @@
+"""Spec -> what is to be estimated from data, and the same question at the model that is found."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.accuracy.calibration import with_alpha
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.identification import Earlier
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
+from inputdesign_cli.questions.building.controllers import controller_matrix
+from inputdesign_cli.questions.building.foreseen import build_foreseen
+from inputdesign_cli.questions.building.knowledge import build_knowledge
+from inputdesign_cli.questions.building.model_error import (
+    build_calibration,
+    model_error_alpha,
+    unstated_errors,
+)
+from inputdesign_cli.questions.building.prior import build_earlier, stated_prior
+from inputdesign_cli.questions.building.requirements import build_requirements
+from inputdesign_cli.questions.building.signal_settings import operating_points
+from inputdesign_cli.questions.building.system import build_experiment, build_model, prior_record, record_step
+from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.questions.least_cost.build import build_convex
+from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.tasks.build.header import build_header
+
+
+def build_identification(spec: Spec) -> Identification:
+    """What `identify` and `assess` run on.
+
+    Raises:
+        SpecError: the plant has no such model.
+    """
+    if spec.plant.kind == "regression":
+        raise bad_spec(
+            "not-supported",
+            "a regression is no model of a plant that could be estimated from u and y",
+            hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
+            key="plant",
+        )
+    nominal = build_model(spec)
+    stated = stated_prior(spec)
+    # What is wrong with a prior is said before any data are read, whether it counts for them or not.
+    if stated is not None:
+        stated.over(spec, nominal.names)
+    prior_record(spec)
+    controller = spec.experiment.controller
+    record_step(spec)  # says where samples are too far apart for the plant
+    return Identification(
+        header=build_header(spec),
+        nominal=nominal,
+        assessable=bool(spec.accuracy.requirements),
+        operating_point=operating_point(spec),
+        earlier=build_earlier(spec, nominal),
+        has_prior=spec.experiment.prior is not None,
+        controller=None
+        if controller is None
+        else controller_matrix(controller, spec.sample_time, (nominal.inputs, nominal.outputs)),
+        knowledge=build_knowledge(spec),
+        foreseen=build_foreseen(spec, nominal),
+        at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
+    )
+
+
+def operating_point(spec: Spec) -> dict[str, float]:
+    """What u varies about, `signal.offset`; in closed loop r does, and nothing is known of u."""
+    if spec.closed_loop or spec.signal.offset is None:
+        return {}
+    return {f"u{j + 1}": float(level) for j, level in enumerate(operating_points(spec))}
+
+
+def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:
+    """The override that lets a record vary about the levels of the data, where the spec does not say it."""
+    inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
+    if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
+        return []
+    offsets = [levels.get(name, 0.0) for name in inputs]
+    return [f"signal.offset={json.dumps(offsets if len(offsets) > 1 else offsets[0])}"]
+
+
+def _reaching(spec: Spec, values: Mapping[str, float]) -> list[str]:
+    """The override that lets intervals reach the estimate, which may be outside of them."""
+    if spec.uncertainty is None or spec.uncertainty.intervals is None:
+        return []
+    reaching = {
+        name: (min(low, values.get(name, low)), max(high, values.get(name, high)))
+        for name, (low, high) in spec.uncertainty.intervals.items()
+    }
+    return [f"uncertainty.intervals={json.dumps(reaching)}"]
+
+
+def restated(spec: Spec, model: Model, source: str) -> Spec:
+    """The spec with another model in place of its nominal plant and noise."""
+    return parse_spec(
+        spec.to_yaml(),
+        file=source,
+        overrides=[f"{key}={json.dumps(block)}" for key, block in blocks_of(model).items()],
+        folder=spec.resolve_path("."),
+        design=False,
+    )
+
+
+def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
+    """What a spec asks of an experiment of so many samples, of which the information has this factor (k, k).
+
+    Raises:
+        SpecError: the loop is unstable; see the builders of the parts.
+    """
+    raw = replace(build_experiment(spec), samples=samples)
+    experiment = replace(raw, factor=factor)
+
+    def topped_up(levels: Mapping[str, float]) -> Results:
+        # With its values it counts for the estimate, too, when the spec is assessed with further records.
+        values = dict(zip(raw.model.names, raw.model.theta.tolist(), strict=True))
+        prior = {"parameters": values, "information": (factor @ factor.T).tolist()}
+        task = build_convex(
+            parse_spec(
+                spec.to_yaml(),
+                file="top-up",
+                overrides=[
+                    f"experiment.prior={json.dumps(prior)}",
+                    *_offset(spec, levels),
+                    *_reaching(spec, values),
+                ],
+                folder=spec.resolve_path("."),
+            )
+        )
+        if task.foresight is None:
+            return task.solve()
+        # Both records are assessed together.
+        earlier = Earlier(raw.model.theta, factor @ factor.T)
+        return replace(task, foresight=replace(task.foresight, earlier=earlier, richer={})).solve()
+
+    requirements = [make(experiment) for make in build_requirements(spec, raw)]
+    usual, information = model_error_alpha(spec, raw.model), np.eye(experiment.size)
+    confidence = Confidence.of(build_calibration(spec), requirements, information, usual)
+    return ModelQuestion(
+        experiment=experiment,
+        confidence=confidence,
+        requirements=with_alpha(requirements, confidence.alpha),
+        entries=[replace(error, experiment=experiment) for error in unstated_errors(spec, raw)],
+        top_up=topped_up if spec.designs else None,
+    )

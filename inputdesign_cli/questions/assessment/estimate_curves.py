@@ -1,0 +1,91 @@
+"""Tables and curves of an estimate: how it fits, what it leaves unexplained, and what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification import Estimate
+from inputdesign_cli.outcome.curves import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves
+from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.bound import bound_curves
+
+
+def data_curves(
+    units: Units, u: Array, y: Array, estimate: Estimate
+) -> tuple[dict[str, Table], dict[str, Curves]]:
+    """fit.csv and residuals.csv with their figures.
+
+    Args:
+        u, y: the records, (samples, r) and (samples, p).
+    """
+    instants = units.sample_time * np.arange(len(y), dtype=np.float64)
+    predicted = y - estimate.errors
+    columns = {units.time_header: instants}
+    if len(estimate.lengths) > 1:
+        columns["record"] = np.repeat(np.arange(1.0, len(estimate.lengths) + 1), estimate.lengths)
+    columns |= {**_columns(units, "u", u), **_columns(units, "y", y)}
+    columns |= _columns(units, "y", predicted, "_predicted")
+    panels = []
+    for i, fit in enumerate(estimate.fit):
+        curve = None if fit is None else estimate.simulated[:, i]
+        if curve is not None:
+            columns[f"y{_number(units, i)}_simulated"] = curve
+        panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i, units.label(f"y{i + 1}")))
+    columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
+    white, cross = estimate.whiteness, estimate.independence
+    shared = min(white.lags.size, cross.lags.size)
+    residuals = {"autocorrelation_lag": white.lags[:shared]}
+    residuals |= _pairs(units, "autocorrelation", white.correlation[:shared])
+    residuals |= {"cross_correlation_lag": cross.lags[:shared]}
+    residuals |= _pairs(units, "cross_correlation", cross.correlation[:shared])
+    curves: dict[str, Curves] = {
+        "fit": FitCurves(instants, tuple(panels), tuple(estimate.lengths)),
+        "residuals": ResidualCurves(
+            white.lags,
+            white.correlation,
+            cross.lags,
+            cross.correlation,
+            white.limit,
+            white.probability,
+            cross.probability,
+        ),
+    }
+    return {"fit": Table(columns), "residuals": Table(residuals)}, curves
+
+
+def bound_of_data(
+    units: Units, requirements: Sequence[Requirement], entries: Sequence[ModelError], information: Array
+) -> tuple[Table, BoundCurves, dict[str, Json]]:
+    """bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
+
+    Args:
+        entries: what has r_u of every entry of G where no requirement bounds it.
+        information: (k, k) of the data.
+    """
+    entry: dict[str, Json] = {}
+    errors = model_errors(requirements)
+    if errors:
+        violation = worst([error.worst(information) for error in errors])
+        entry["worst_ratio"] = violation.ratio
+        if violation.frequency is not None:
+            entry["worst_frequency"] = violation.frequency / units.frequency
+    table, curves = bound_curves(units, errors or entries, information, stated=bool(errors), label="data")
+    return table, curves, entry
+
+
+def _number(units: Units, channel: int) -> str:
+    return "" if units.single else f"{channel + 1}"
+
+
+def _columns(units: Units, name: str, values: Array, of: str = "") -> dict[str, Array]:
+    return {f"{name}{_number(units, i)}{of}": column for i, column in enumerate(values.T)}
+
+
+def _pairs(units: Units, name: str, values: Array) -> dict[str, Array]:
+    _, rows, columns = values.shape
+    return {f"{name}{units.suffix(i, j)}": values[:, i, j] for i in range(rows) for j in range(columns)}

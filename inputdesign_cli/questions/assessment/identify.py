@@ -1,0 +1,242 @@
+"""Records -> an estimate of `plant` and `noise`, ready to paste, and what the data buy."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError, IdesignError
+from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.plant import Model, TransferMatrix
+from inputdesign_cli.questions.assessment.estimate_curves import bound_of_data, data_curves
+from inputdesign_cli.questions.assessment.estimates import (
+    estimate_result,
+    identification_notes,
+    model_text,
+    prior_notes,
+)
+from inputdesign_cli.questions.assessment.faults import faults, loop_faults
+from inputdesign_cli.questions.assessment.level_shifts import shifted_levels
+from inputdesign_cli.questions.assessment.refutations import (
+    differences,
+    refutations,
+    repetitions,
+    stopped_at_ends,
+)
+from inputdesign_cli.questions.assessment.unrelated import answering, hardly_explained, idle
+from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.questions.common.knowledge import Knowledge, that_agrees
+from inputdesign_cli.questions.common.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
+from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
+from inputdesign_cli.tasks.build.preparation import Preparation
+
+
+@dataclass(frozen=True)
+class ModelQuestion:
+    """What a spec asks, at one model.
+
+    Attributes:
+        experiment: with that model and the loop, in the coordinates of the data: their information is I.
+        confidence: the size of the confidence region of r_u.
+        requirements: all that is asked, in these coordinates.
+        entries: what has r_u of every entry of G where no requirement has it.
+        top_up: designs what the model needs beside the data, with a record about the levels of the
+            inputs by name; None where the spec designs nothing.
+    """
+
+    experiment: Experiment
+    confidence: Confidence
+    requirements: Sequence[Requirement]
+    entries: Sequence[ModelError]
+    top_up: Callable[[Mapping[str, float]], Results] | None
+
+    @property
+    def information(self) -> Array:
+        """(k, k): that of the data."""
+        return np.eye(self.experiment.size)
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What is to be estimated from data, and what is asked of the estimate.
+
+    Attributes:
+        nominal: the structure; its parameters are one of the starts.
+        assessable: whether any accuracy is asked for that data could meet or miss.
+        operating_point: by channel, what the spec says that signals vary about.
+        earlier: the prior as an estimate, which counts along; None where it has no values.
+        has_prior: whether it states prior information.
+        controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
+        knowledge: what else it says of the parameters; None where it says nothing.
+        foreseen: whether the design was made for a plant of these parameters (k,), known with this covariance
+            (k, k), as well; None where it was made for that of the spec.
+        at: the question of the spec at another model with the given number of samples, the factor (k, k) of
+            whose information sets the coordinates; the text names the source of that model in diagnostics.
+    """
+
+    header: Header
+    nominal: Model
+    assessable: bool
+    operating_point: Mapping[str, float]
+    earlier: Earlier | None
+    has_prior: bool
+    controller: TransferMatrix | None
+    knowledge: Knowledge | None
+    foreseen: Callable[[Array, Array], bool] | None
+    at: Callable[[Model, int, Array, str], ModelQuestion]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate.
+
+    `ruled_out` are other minima, which what is known of the plant rules out; `loop_told` is whether a note
+    says already that inputs answer the outputs.
+    """
+
+    estimate: Estimate
+    model: Model
+    data: Data
+    preparation: Preparation
+    question: ModelQuestion | None
+    unasked: str = ""
+    ruled_out: tuple[Rival, ...] = ()
+    loop_told: bool = False
+
+
+def identified(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Identified:
+    """The estimate from the data in `paths`, jointly; the nominal parameters are one of the starts.
+
+    Raises:
+        DataError: a file cannot be used, or the data do not determine the parameters.
+    """
+    known = {**task.operating_point, **preparation.operating_point}
+    taken = replace(preparation, operating_point=known)
+    return estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
+
+
+def estimated(task: Identification, data: Data, first: Path, taken: Preparation) -> Identified:
+    """The same from data that have been read.
+
+    Args:
+        first: the file that an objection to the data names.
+        taken: how they were prepared.
+
+    Raises:
+        DataError: the data do not determine the parameters.
+    """
+    units, nominal = task.header.units, task.nominal
+
+    def from_start(start: Array, near: bool) -> Estimate:
+        return estimate_model(
+            nominal,
+            data.u,
+            data.y,
+            units.step,
+            start=start,
+            feedback=units.closed_loop,
+            lengths=data.lengths,
+            earlier=task.earlier,
+            experiments=[samples for _, samples in data.files],
+            near=near,
+            ramp=data.lined,
+        )
+
+    with blaming_columns(first):
+        likeliest = from_start(nominal.theta, False)
+        estimate, ruled_out = that_agrees(task.knowledge, likeliest, partial(from_start, near=True))
+    if task.earlier is not None and task.earlier.is_of_these_data(estimate.theta, estimate.factor):
+        raise DataError.because(
+            "data-repeated",
+            f"experiment.prior is the estimate from {first.name} itself: what that tells would count twice",
+            "leave the prior out, or give only records that it was not made of",
+            "experiment.prior",
+        )
+    model = nominal.at(estimate.theta, estimate.noise)
+    try:
+        question = task.at(model, len(data.y), estimate.factor, f"{first.name} (estimate)")
+    except IdesignError as error:
+        return Identified(estimate, model, data, taken, None, told(error), ruled_out)
+    return Identified(estimate, model, data, taken, question, "", ruled_out)
+
+
+def told(error: IdesignError) -> str:
+    """What is wrong and how to mend it, as a sentence."""
+    return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
+
+
+def speaking_against(task: Identification, found: Identified) -> list[str]:
+    """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
+    data, estimate = found.data, found.estimate
+    units = task.header.units
+    return mismeasured(task, found) or [
+        # Where an expression ends G may vanish, whatever the inputs do.
+        *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
+        *shifted_levels(estimate, data, units.time_unit),
+        *refutations(found.model, estimate),
+        *([] if found.loop_told else answering(units, estimate, data)),
+        *(repetitions(estimate, data.files) or data.repeated),
+    ]
+
+
+def mismeasured(task: Identification, found: Identified) -> list[str]:
+    """What a record says against itself: faults of measurement."""
+    data = found.data
+    return [*faults(task.header.units, found.estimate, data), *loop_faults(task.controller, data)]
+
+
+def identification_results(task: Identification, found: Identified, started: float) -> Results:
+    """What `idesign identify` writes.
+
+    Args:
+        started: `time.perf_counter()` when the work began.
+    """
+    header, question, estimate = task.header, found.question, found.estimate
+    result = estimate_result(header.title, estimate)
+    if found.preparation.detrend == "constant":
+        result["identification"]["means_removed"] = True
+    elif found.preparation.levels:
+        result["identification"]["operating_point"] = dict(found.preparation.levels)
+    tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
+    against = [*speaking_against(task, found), *hardly_explained(header.units, found.model, estimate)]
+    notes = identification_notes(found.data.notes, found.model, estimate, against)
+    notes += differences(estimate, [name for name, _ in found.data.files])
+    notes += prior_notes(estimate, stated=task.has_prior)
+    if found.ruled_out:
+        result["identification"]["ruled_out"] = rival_entries(estimate, found.ruled_out)
+        notes += ruled_out_notes(estimate, found.ruled_out)
+    if question is None:
+        notes.append(f"there is no r_u for this estimate: {found.unasked}")
+    else:
+        errors = model_errors(question.requirements) or question.entries
+        apart = beyond_errors(found.model, estimate, errors, question.information)
+        notes += rival_notes(header.units, estimate, apart)
+        tables["bound"], curves["bound"], worst = bound_of_data(
+            header.units, question.requirements, question.entries, question.information
+        )
+        result["model_error"] = {"alpha": question.confidence.alpha, **question.confidence.entry, **worst}
+    if notes:
+        result["notes"] = notes
+    result["timing_s"] = {"identification": time.perf_counter() - started}
+    files = {"model.yaml": model_text(header.units, found.model, estimate).encode()}
+    return Results(typed(result), header.resolved_spec, header.units.time_unit, tables, curves, files)
+
+
+def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
+
+    Raises:
+        DataError: see `identified`.
+    """
+    started = time.perf_counter()
+    return identification_results(task, identified(task, paths, preparation), started)

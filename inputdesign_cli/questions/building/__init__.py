@@ -1,0 +1,1 @@
+"""Parts of a spec become objects: model, loop, requirements, limits, signals."""

@@ -1,0 +1,129 @@
+"""Spec -> limits on powers and on the density of the excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
+from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
+from inputdesign_cli.plant import graded_grid
+from inputdesign_cli.questions.building.signal_settings import stated_moves, stated_peaks
+from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.limits import Curve
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
+
+_KEY = "limits.spectrum"
+
+
+def build_power_limits(spec: Spec) -> list[PowerLimit]:
+    """Upper and lower limits on the powers; lower limits of zero say nothing and are left out."""
+    limits: list[PowerLimit] = []
+    stated_limits = {
+        "input": spec.limits.input_power,
+        "output": spec.limits.output_power,
+        "excitation": spec.limits.excitation_power,
+    }
+    for kind in POWER_KINDS:
+        stated = stated_limits[kind]
+        if stated is None:
+            continue
+        for value, upper in ((stated.max, True), (stated.min, False)):
+            if value is None:
+                continue
+            values = value if isinstance(value, tuple) else (value,)
+            single = len(values) == 1
+            limits += [
+                PowerLimit(kind, float(v), upper, None if single else channel)
+                for channel, v in enumerate(values)
+                if upper or v > 0
+            ]
+    return limits
+
+
+def implied_limits(spec: Spec) -> list[PowerLimit]:
+    """What limits on single samples leave of the powers: with |u| <= a an input has no more than a^2.
+
+    Of values that are held over h samples there is one move in h.
+    """
+    kinds: list[PowerKind] = ["input", "output", "moves"]
+    most = [*stated_peaks(spec), stated_moves(spec) if spec.plant.sampled else None]
+    return [
+        PowerLimit(kind, float(a) ** 2, channel=channel if peak.size > 1 else None, implied=True)
+        for kind, peak in zip(kinds, most, strict=True)
+        if peak is not None
+        for channel, a in enumerate(peak)
+        if np.isfinite(a)
+    ]
+
+
+def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
+    """Bounds on the density of the excitation at every frequency of its band.
+
+    Raises:
+        SpecError, DataError: a curve cannot be used, or the lower bound crosses the upper one.
+    """
+    stated = spec.limits.spectrum
+    if stated is None:
+        return []
+    unit, limits = build_units(spec).frequency, []
+    for curve, upper in ((stated.max, True), (stated.min, False)):
+        if curve is None or curve == 0.0:
+            continue
+        key = f"{_KEY}.{'max' if upper else 'min'}" if stated.min is not None else _KEY
+        level, knots, singular, zero = _level(spec, curve, key, experiment.band)
+        grid = graded_grid(
+            np.concatenate([experiment.singularities, singular]), *experiment.band, knots=knots
+        )
+        if upper and zero is None and level(grid).min() <= 0.0:
+            zero = float(grid[int(np.argmin(level(grid)))])
+        if zero is not None:
+            why = "no spectrum with a density vanishes there and stays positive around"
+            relative = "how far a spectrum stays above it is counted relative to it"
+            raise spec.complain(
+                "bad-limit",
+                f"the {'upper' if upper else 'lower'} bound vanishes at {zero / unit:.6g} "
+                f"rad/{spec.time_unit}: {why if upper else relative}",
+                hint="give a small positive bound instead",
+                key=key,
+            )
+        limits.append(DensityLimit(level, grid, upper))
+    if len(limits) == 2:
+        grid = np.union1d(limits[0].grid, limits[1].grid)
+        room = limits[0].level(grid) - limits[1].level(grid)
+        if room.min() <= 0:
+            at = grid[int(np.argmin(room))] / unit
+            raise spec.complain(
+                "bad-limit",
+                f"min reaches max at {at:.6g} rad/{spec.time_unit}: no spectrum fits in between",
+                hint="lower min or raise max there",
+                key=_KEY,
+            )
+    return limits
+
+
+def _level(
+    spec: Spec, curve: Curve, key: str, band: tuple[float, float]
+) -> tuple[Callable[[Array], Array], Array, ComplexArray, float | None]:
+    """The level over frequency in rad/sample, its kinks, points near which it changes fast, where it is zero.
+
+    Raises:
+        SpecError: `bad-limit`, it is infinite somewhere in the band.
+    """
+    nowhere, smooth = np.zeros(0), np.zeros(0, dtype=complex)
+    if isinstance(curve, float | int):
+        constant = float(curve)
+        return lambda w: np.full(np.shape(w), constant), nowhere, smooth, None
+    if curve.kind == "table":
+        columns = read_frequency_table(spec, curve.table, ["phi"], key)
+        frequency, value = columns["frequency"], columns["phi"]
+        if np.any(value < 0):
+            raise bad_table(spec, curve.table, "phi must not be negative", "correct the values", key)
+        return lambda w: np.interp(w, frequency, value), frequency, smooth, None
+    W = build_weight(spec, curve, key)
+    check_finite(spec, W, band, "bad-limit", key)
+    return lambda w: np.abs(W.at(w)) ** 2, nowhere, W.singularities, on_the_limit(W.zero_points, band)

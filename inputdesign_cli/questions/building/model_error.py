@@ -1,0 +1,337 @@
+"""Spec -> the requirement on the model error over frequency, entry by entry or of the norm of G."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.accuracy import (
+    Absolute,
+    AdmissibleError,
+    EllipsoidError,
+    Entry,
+    Floored,
+    ModelError,
+    Relative,
+    Sensitivity,
+    Table,
+    Weighted,
+    active_entries,
+)
+from inputdesign_cli.accuracy.calibration import Calibration
+from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
+from inputdesign_cli.plant import Model, Rational, ScalarTransfer
+from inputdesign_cli.questions.building.system import build_loop
+from inputdesign_cli.questions.building.tuning import loop_controller
+from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
+from inputdesign_cli.specification import ModelError as StatedError, Spec
+from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
+from inputdesign_cli.specification.models.controller import Controller
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
+
+_KEY = "accuracy.model_error"
+_LOOP = "accuracy.loop"
+_GROWS = 5.0
+
+
+def confidence_factor(probability: float, parameters: int) -> float:
+    """alpha with Pr(chi-squared with this many degrees of freedom <= alpha^2) = probability."""
+    return float(np.sqrt(2.0 * scipy.special.gammaincinv(parameters / 2.0, probability)))
+
+
+def model_error_alpha(spec: Spec, model: Model) -> float:
+    """alpha as given, or from the confidence and the number of parameters of G."""
+    error = spec.accuracy.error
+    if error is not None and error.alpha is not None:
+        return error.alpha
+    probability = (error.probability if error is not None else None) or DEFAULT_CONFIDENCE
+    return confidence_factor(probability, int(np.sum(model.in_plant)))
+
+
+def build_calibration(spec: Spec) -> Calibration | None:
+    """How alpha is calibrated where `confidence: {exact: ..}` asks for that."""
+    error = spec.accuracy.error
+    stated = None if error is None else error.calibrated
+    if stated is None or stated.exact is None:
+        return None
+    return Calibration(stated.exact, stated.draws)
+
+
+def required_band(
+    spec: Spec, experiment: Experiment, stated: tuple[float, float] | None
+) -> tuple[float, float]:
+    """The band of a requirement: as stated, or all frequencies, in continuous time those that are excited."""
+    if not spec.plant.sampled:
+        return stated or experiment.band
+    lo, hi = spec.clip_band(stated)
+    return lo * spec.sample_time, min(hi * spec.sample_time, float(np.pi))
+
+
+def build_model_errors(
+    spec: Spec, experiment: Experiment, nominal: Model | None = None
+) -> list[OnModelError]:
+    """The bound on the model error, stated or of a loop, in raw coordinates.
+
+    One an entry of G that is not absent, or one of the norm; empty when it is not asked for.
+
+    Args:
+        nominal: where the experiment is on a scenario, the plant of the spec: r_adm may be that of the one or
+            of the other.
+
+    Raises:
+        SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
+        DataError: the table cannot be used.
+    """
+    error = spec.accuracy.error
+    if error is None:
+        return []
+    band = required_band(spec, experiment, error.band)
+    if error.norm == "frobenius" or error.sensitivity is not None:
+        places: list[Entry | None] = [(0, 0) if build_units(spec).single else None]
+    else:
+        places = list(active_entries(experiment.model, band[1]))
+    return [_on_entry(spec, error, experiment, band, entry, nominal) for entry in places]
+
+
+def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
+    """What has r_u of every entry where no bound on it is stated; r_adm means nothing."""
+    band, alpha = required_band(spec, experiment, None), model_error_alpha(spec, experiment.model)
+    return [
+        ModelError(experiment=experiment, band=band, entry=entry, admissible=Absolute(1.0), alpha=alpha)
+        for entry in active_entries(experiment.model, band[1])
+    ]
+
+
+def _on_entry(
+    spec: Spec,
+    error: StatedError,
+    experiment: Experiment,
+    band: tuple[float, float],
+    entry: Entry | None,
+    nominal: Model | None,
+) -> OnModelError:
+    admissible = _admissible_of(spec, error, experiment.model, band, entry, nominal)
+    if error.weight is not None:
+        key = f"{_KEY}.weight"
+        weight = build_weight(spec, error.weight, key)
+        check_finite(spec, weight, band, "admissible-not-positive", key)
+        if error.region == "ellipsoid":
+            _check_nowhere_void(spec, weight, band, key)
+        admissible = Weighted(admissible, weight)
+    alpha = model_error_alpha(spec, experiment.model)
+    made: OnModelError
+    if error.region == "first_order":
+        made = ModelError(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
+    else:
+        _check_fraction(spec, experiment.model, entry)
+        made = EllipsoidError(
+            experiment=experiment,
+            band=band,
+            entry=entry,
+            admissible=admissible,
+            alpha=alpha,
+            against="absolute" if error.relative is None else "relative",
+        )
+    if nominal is None:
+        check_bounded(spec, made, _KEY if spec.accuracy.loop is None else _LOOP)
+    if nominal is None or not _has_floor(spec):
+        units = build_units(spec)
+        try:
+            check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
+        except SpecError as missed:
+            raise _too_much(spec, admissible, made) or missed from missed
+    return made
+
+
+def _check_nowhere_void(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], key: str) -> None:
+    """Raise `SpecError` (`not-supported`) where a weight vanishes: ellipsoids are compared with r_adm."""
+    void, units = on_the_limit(weight.zero_points, band), build_units(spec)
+    if void is not None:
+        raise spec.complain(
+            "not-supported",
+            f"{key} vanishes at {void / units.frequency:.6g} {units.per_time}, where region: ellipsoid has "
+            "nothing to bound",
+            hint="leave that frequency out of the band, move the zero off it, or use region: first_order",
+            key=key,
+        )
+
+
+def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
+    """What to say of a margin that the loop does not even have with the nominal plant."""
+    stated = spec.accuracy.loop
+    if stated is None or not isinstance(admissible, Sensitivity):
+        return None
+    peak = float(np.max(admissible.nominal(made.grid)))
+    return spec.complain(
+        "admissible-not-positive",
+        f"with the nominal plant |S| of the loop reaches {peak:.4g} already, and the margin asks for "
+        f"{stated.peak:.4g} at most",
+        hint="tune the controller more slowly (a larger tau_c), or ask for less of a margin than "
+        f"{stated.allowing(peak)} (the nearer, the longer the experiment), such as "
+        f"{stated.allowing(1.2 * peak)}",
+        key=_LOOP,
+    )
+
+
+def _has_floor(spec: Spec) -> bool:
+    """Whether r_adm of scenarios is positive since that of the nominal plant is."""
+    stated = spec.uncertainty
+    return stated is not None and (stated.r_adm == "fixed" or stated.floor > 0.0)
+
+
+def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
+    """Raise `SpecError` (`unbounded-error`) where no information is enough for the requirement.
+
+    That is at a pole of G on the unit circle: the estimated pole is off by a little, and the error of G
+    there grows faster than G itself.
+    """
+    lo, hi = requirement.band
+    units = build_units(spec)
+    for at in requirement.poles_on_the_circle.tolist():
+        side = 1.0 if at + 1e-5 * hi <= hi else -1.0
+        far, close = np.abs(requirement.rows(at + side * np.array([1e-5, 1e-6]) * hi)).max(axis=(1, 2))
+        # A weight may hide the pole.
+        if not np.isfinite(close) or close > _GROWS * far:
+            where = f"{at / units.frequency:.6g} {units.per_time}"
+            raise spec.complain(
+                "unbounded-error",
+                f"G has a pole on the unit circle, at {where}, that is estimated: no experiment bounds the "
+                "error there",
+                hint="leave that frequency out, such as "
+                f"{key}.band: [{_beside(at, lo, hi, units.frequency)}]",
+                key=key,
+            )
+
+
+def _beside(at: float, lo: float, hi: float, unit: float) -> str:
+    """The larger part of the band without the frequency, in the user's unit."""
+    margin = 1e-2 * (hi - lo)
+    left, right = (lo, at - margin), (at + margin, hi)
+    edges = right if right[1] - right[0] >= left[1] - left[0] else left
+    return f"{rounded_up(edges[0] / unit, 4)}, {rounded_down(edges[1] / unit, 4)}"
+
+
+def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
+    """Raise `SpecError` (`not-supported`) unless the entry is a fraction affine in the parameters."""
+    if entry is None:
+        raise spec.complain(
+            "not-supported",
+            "region: ellipsoid is for the entries of G one by one, not for the norm of the error",
+            hint="use region: first_order, or norm: entry with relative, absolute or table",
+            key=f"{_KEY}.region",
+        )
+    if np.any(model.bends(*entry)):
+        named = build_units(spec).entry(*entry) or "G"
+        raise spec.complain(
+            "not-supported",
+            f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not: it has "
+            "both A and F, is sampled from s, has a dead time that is estimated, or expressions that are not "
+            "linear",
+            hint="use region: first_order for this structure",
+            key=f"{_KEY}.region",
+        )
+
+
+def _admissible_of(
+    spec: Spec,
+    error: StatedError,
+    model: Model,
+    band: tuple[float, float],
+    entry: Entry | None,
+    nominal: Model | None,
+) -> AdmissibleError:
+    """r_adm of a model; of a scenario as `uncertainty` says, its own down to a floor or the nominal one.
+
+    Raises:
+        SpecError: see `build_model_errors`.
+    """
+    stated = spec.uncertainty
+    if nominal is None or stated is None:
+        return _admissible(spec, error, model, band, entry)
+    known = _admissible(spec, error, nominal, band, entry)
+    if stated.r_adm == "fixed":
+        return known
+    own = _admissible(spec, error, model, band, entry)
+    return Floored(own, known, stated.floor) if stated.floor > 0.0 else own
+
+
+def _admissible(
+    spec: Spec, error: StatedError, model: Model, band: tuple[float, float], entry: Entry | None
+) -> AdmissibleError:
+    """r_adm; of a table its column r_adm_21 for an entry, or r_adm for all alike."""
+    if error.relative is not None:
+        return Relative(model, error.relative, entry)
+    if error.absolute is not None:
+        return Absolute(error.absolute)
+    if error.table is not None:
+        units, column = build_units(spec), "r_adm"
+        path = spec.resolve_path(error.table)
+        if entry is not None and not units.single and has_column(path, "r_adm_", key=f"{_KEY}.table"):
+            column += units.suffix(*entry)
+        return positive_table(spec, error.table, band, column, f"{_KEY}.table")
+    return _sensitivity(spec, error, model, band)
+
+
+def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> Table:
+    """One column of a file, positive over the whole `band` of the section that has `key`.
+
+    Raises:
+        DataError: the file cannot be read, or does not tell the column on the whole band (`bad-table`).
+    """
+    units = build_units(spec)
+    columns = read_frequency_table(spec, name, [column], key)
+    frequency, value = columns["frequency"], columns[column]
+    if np.any(value <= 0):
+        row = int(np.argmax(value <= 0)) + 2
+        message = f"{column} is {value[row - 2]:g} in row {row}: it must be positive"
+        hint = "leave frequencies that do not matter out, and restrict band"
+        raise bad_table(spec, name, message, hint, key)
+    if frequency[0] > band[0] * (1 + 1e-9) or frequency[-1] < band[1] * (1 - 1e-9):
+        covered, asked = (
+            f"{lo / units.frequency:g} to {hi / units.frequency:g} {units.per_time}"
+            for lo, hi in ((frequency[0], frequency[-1]), band)
+        )
+        message = f"it covers {covered}, but the band is {asked}"
+        hint = f"extend the table, or restrict {key.rpartition('.')[0]}.band"
+        raise bad_table(spec, name, message, hint, key)
+    return Table(frequency, value)
+
+
+def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float, float]) -> Sensitivity:
+    asked = error.sensitivity
+    loop_kept = spec.accuracy.loop
+    if loop_kept is not None:
+        given = loop_controller(spec, loop_kept, model)
+    else:
+        given = None if asked is None else asked.controller or spec.experiment.controller
+    if asked is None or given is None:
+        raise ValueError("the spec has been checked: a bound on the sensitivity has a loop")
+    loop = build_loop(spec, model, given)
+    if not np.any(loop.controller.numerator):
+        raise spec.complain(
+            "no-feedback",
+            "the controller is zero: no model error can harm the sensitivity",
+            hint="give the controller of the loop to be kept",
+            key=f"{_KEY}.sensitivity" if loop_kept is None else _LOOP,
+        )
+    if asked.weight is not None:
+        weight = rational(asked.weight)
+        check_finite(spec, weight, band, "admissible-not-positive", f"{_KEY}.sensitivity")
+        return Sensitivity(loop, weight)
+    peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
+    settings = _settings(given) if loop_kept is not None else None
+    return Sensitivity(loop, Rational.build([peak]), settings)
+
+
+def _settings(controller: Controller) -> dict[str, float] | None:
+    """Those of a PID controller; none of others."""
+    if controller.kind != "pid":
+        return {}
+    stated = controller.pid
+    listed = {"Kp": stated.Kp, "Ti": stated.Ti, "Td": stated.Td or None}
+    return {name: value for name, value in listed.items() if value is not None}

@@ -1,0 +1,214 @@
+"""Spec -> requirements on the accuracy of the model and criteria, as makers for any coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.accuracy import Criterion, InformationTarget, WeightedVariance, active_entries
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.design.convex.demands import RequirementFactory
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.building.model_error import (
+    build_model_errors,
+    check_bounded,
+    confidence_factor,
+    required_band,
+)
+from inputdesign_cli.questions.building.parameters import embedded
+from inputdesign_cli.questions.building.weights import build_weight, check_finite
+from inputdesign_cli.questions.common.within_limits import StatedBound
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.header import build_units
+
+_RELATIVE_ZERO = 1e-9
+
+
+def build_requirements(
+    spec: Spec, experiment: Experiment, nominal: Model | None = None
+) -> list[RequirementFactory]:
+    """One maker for each requirement that `accuracy` states, in the order of the contract.
+
+    Requirements over frequency are made entry by entry of G.
+
+    Args:
+        nominal: the plant of the spec, where the experiment is on a scenario.
+
+    Raises:
+        SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
+            cannot be met or is not supported.
+        DataError: a table cannot be used.
+    """
+
+    def made(key: str) -> list[RequirementFactory]:
+        if key in ("model_error", "loop") and nominal is not None:
+            return [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
+        return BUILDERS[key](spec, experiment)
+
+    return [make for key in spec.accuracy.requirements for make in made(key)]
+
+
+def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
+    """Return the maker of `accuracy.criterion`, of the parameters or of their relative errors.
+
+    Raises:
+        SpecError: `zero-parameter` when a relative error of a parameter that is zero is asked for.
+    """
+    letter = spec.accuracy.criterion
+    if letter is None:
+        return None
+    scale = np.ones(experiment.size)
+    if spec.accuracy.scale == "relative":
+        scale = experiment.model.theta
+        if np.any(scale == 0.0):
+            name = experiment.model.names[int(np.argmax(scale == 0.0))]
+            raise spec.complain(
+                "zero-parameter",
+                f"{name} is zero, so that it has no relative error",
+                hint="use scale: absolute, or drop the parameter from the model",
+                key="accuracy.scale",
+            )
+
+    def make(coordinates: Experiment) -> Criterion:
+        factor = np.eye(coordinates.size) if coordinates.factor is None else coordinates.factor
+        return Criterion(letter, scale[:, None] * factor)
+
+    return make
+
+
+def build_asked(
+    spec: Spec, experiment: Experiment, nominal: Model | None = None
+) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
+    """What the goal of a design is about, and what must hold besides: requirements beside a criterion.
+
+    Raises:
+        SpecError, DataError: see `build_requirements` and `build_criterion`.
+    """
+    requirements = build_requirements(spec, experiment, nominal)
+    criterion = build_criterion(spec, experiment)
+    return (requirements, []) if criterion is None else ([criterion], requirements)
+
+
+def stated_bounds(spec: Spec) -> list[StatedBound]:
+    """The numbers of `accuracy` that bound errors in proportion to them, or to their powers.
+
+    None for a bound over the whole confidence ellipsoid: its error is not in proportion to any of them.
+    """
+    accuracy, found = spec.accuracy, list[StatedBound]()
+    error, variance = accuracy.error, accuracy.weighted_variance
+    if error is not None and error.region == "ellipsoid":
+        return []
+    if error is not None:
+        key = "accuracy.model_error"
+        if error.relative is not None:
+            found.append(StatedBound(f"{key}.relative", "relative", error.relative, fraction=True))
+        if error.absolute is not None:
+            found.append(StatedBound(f"{key}.absolute", "absolute", error.absolute))
+    if accuracy.application is not None:
+        key, gamma = "accuracy.application.gamma", accuracy.application.gamma
+        found.append(StatedBound(key, "gamma", gamma, power=-2))
+    if variance is not None:
+        key = "accuracy.weighted_variance.max"
+        found.append(StatedBound(key, "weighted_variance", variance.max, power=2))
+    key = "accuracy.standard_deviation"
+    found += [
+        StatedBound(f"{key}.{name}", f"standard_deviation of {name}", most)
+        for name, most in (accuracy.standard_deviation or {}).items()
+    ]
+    return found
+
+
+def _model_errors(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    return [_maker(error) for error in build_model_errors(spec, experiment)]
+
+
+def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    stated = spec.accuracy.information
+    assert stated is not None
+    names = experiment.model.names
+    return [_target(spec, names, stated.matrix, stated.parameters, "accuracy.information", "information")]
+
+
+def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    """M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over."""
+    asked = spec.accuracy.application
+    assert asked is not None
+    chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
+    hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
+    names = experiment.model.names
+    return [_target(spec, names, hessian, asked.parameters, "accuracy.application", "application")]
+
+
+def _standard_deviations(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    key, names = "accuracy.standard_deviation", experiment.model.names
+    return [
+        _target(spec, names, np.array([[1.0 / most**2]]), (name,), key, f"standard_deviation of {name}")
+        for name, most in (spec.accuracy.standard_deviation or {}).items()
+    ]
+
+
+def _maker(requirement: OverFrequency) -> RequirementFactory:
+    return lambda experiment: replace(requirement, experiment=experiment)
+
+
+def _target(
+    spec: Spec, known: Sequence[str], matrix: ArrayLike, names: Sequence[str] | None, key: str, label: str
+) -> RequirementFactory:
+    full = embedded(spec, known, np.array(matrix, dtype=float), names, key)
+    return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
+
+
+def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    """`accuracy.weighted_variance` of every entry of G that is not absent."""
+    stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
+    assert stated is not None
+    weight = build_weight(spec, stated.weight, f"{key}.weight")
+    band = required_band(spec, experiment, stated.band)
+    check_finite(spec, weight, band, "admissible-not-positive", f"{key}.weight")
+    found = [
+        WeightedVariance(
+            experiment=experiment,
+            band=band,
+            entry=entry,
+            weight=weight,
+            limit=stated.max,
+            relative=stated.relative,
+        )
+        for entry in active_entries(experiment.model, band[1])
+    ]
+    for variance in found:
+        check_bounded(spec, variance, key)
+        if stated.relative:
+            _check_nowhere_zero(spec, variance)
+    return [_maker(variance) for variance in found]
+
+
+def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
+    """Raise `SpecError` (`admissible-not-positive`) where G vanishes: its relative variance is infinite."""
+    grid, units = variance.grid, build_units(spec)
+    size = variance.nominal_size(grid)
+    if size.min() <= _RELATIVE_ZERO * np.median(size):
+        at = grid[int(np.argmin(size))] / units.frequency
+        named = f"entry {units.entry(*variance.entry)} of G" if variance.entry and not units.single else "G"
+        raise spec.complain(
+            "admissible-not-positive",
+            f"{named} vanishes at {at:.6g} {units.per_time}, where its relative variance is infinite",
+            hint="restrict `band` to the frequencies that matter",
+            key="accuracy.weighted_variance",
+        )
+
+
+BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
+    "model_error": _model_errors,
+    "loop": _model_errors,
+    "information": _information,
+    "application": _application,
+    "weighted_variance": _weighted_variances,
+    "standard_deviation": _standard_deviations,
+    "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
+}
+"""What makes the requirement of each key of `accuracy`; a new requirement adds its own."""

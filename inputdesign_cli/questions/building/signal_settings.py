@@ -1,0 +1,215 @@
+"""`signal:` and the limits on single samples -> what is asked of the record."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.questions.building.demand import check_record, longest_record
+from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
+from inputdesign_cli.questions.common.record import Delivery, RecordRequest
+from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
+from inputdesign_cli.signal.settings import Method, Phases
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.units import SECONDS
+from inputdesign_cli.tasks.build.header import build_units
+
+# Shared by the inputs: each adds a period to a record, which varies the less and takes the longer.
+_CANDIDATES, _FEWEST = 20, 4
+_PATIENCE = 4  # times as many at most, where noise happens to fit badly
+# Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
+_OPTIMISED = 4
+# Signals whose times of switching are searched take seconds.
+_SEARCHED = 2
+
+
+def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
+    """All that the spec asks of its record, for a model of so many parameters.
+
+    Raises:
+        SpecError: `needs-band`; `too-large`; `beyond-nyquist` when samples are too far apart for the band.
+    """
+    check_record(spec, parameters)
+    step, limits, signal = record_step(spec), spec.limits, spec.signal
+    lo, hi = excitation_band(spec)
+    stated = {
+        "limits.amplitude": limits.amplitude,
+        "limits.rate": limits.rate,
+        "signal.quantisation": signal.quantisation,
+    }
+    return RecordRequest(
+        settings=build_signal_settings(spec),
+        bounds=build_bounds(spec),
+        cost=build_cost(spec) or {"excitation": 1.0},
+        units=build_units(spec),
+        band=(lo * step, hi * step),
+        step=step,
+        samples=signal.samples,
+        meets=signal.scale != "design",
+        most_samples=limits.samples,
+        longest=longest_record(parameters, spec.plant.outputs),
+        stated_method=signal.type is not None,
+        others=tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
+        limit_keys=tuple(key for key, value in stated.items() if value is not None),
+        delivery=Delivery(
+            operating_points=None if signal.offset is None else operating_points(spec),
+            also=signal.also or (),
+            full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),
+            sampling_rate=sampling_rate(spec),
+        ),
+    )
+
+
+def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSettings:
+    """What is to be generated; kinds and phases that the spec leaves open follow from the rest.
+
+    Args:
+        method: in place of the kind that the spec asks for.
+    """
+    signal, inputs = spec.signal, spec.plant.inputs
+    method = method or _method(spec)
+    limited = spec.limits.amplitude is not None or spec.limits.rate is not None
+    uniform: Phases = "orthogonal" if inputs > 1 else "random"
+    phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else uniform)
+    candidates = max(_CANDIDATES // inputs, _FEWEST)
+    if method == "multisine" and phases == "optimised":
+        candidates = _OPTIMISED
+    elif method == "slewed":
+        candidates = _SEARCHED
+    most = _PATIENCE * candidates if method == "filtered_noise" else candidates
+    return SignalSettings(
+        method=method,
+        phases=phases,
+        lines=signal.lines,
+        periods=signal.periods or 1,
+        hold=signal.hold or 1,
+        ramp=signal.ramp or 0,
+        bits=signal.bits,
+        level=None if signal.amplitudes is None else per_channel(signal.amplitudes, inputs),
+        candidates=signal.candidates or candidates,
+        most_candidates=signal.candidates or most,
+        seed=signal.seed or 0,
+    )
+
+
+def stated_peaks(spec: Spec) -> tuple[Array | None, Array | None]:
+    """The largest |u| (r,) and |y| (p,), counted from the offset."""
+    amplitude = spec.limits.amplitude
+    if amplitude is None:
+        return None, None
+    u, y = amplitude.input, amplitude.output
+    return (
+        None if u is None else per_channel(u, spec.plant.inputs),
+        None if y is None else per_channel(y, spec.plant.outputs),
+    )
+
+
+def stated_moves(spec: Spec) -> Array | None:
+    """(r,): the largest root of a mean square of moves that the limit on single ones leaves.
+
+    Infinite where the limit on |u| says as much: moves between -a and a are 2 a at most.
+    """
+    if spec.limits.rate is None:
+        return None
+    rate, (peak, _) = per_channel(spec.limits.rate, spec.plant.inputs), stated_peaks(spec)
+    told = np.ones(rate.size, dtype=bool) if peak is None else rate < 2.0 * peak
+    return np.where(told, rate / np.sqrt(spec.signal.hold or 1), np.inf)
+
+
+def build_bounds(spec: Spec) -> Bounds:
+    """What single samples of the record may not exceed, channel by channel.
+
+    Records count from values of the converters; where the offset lies between two, peaks keep off by as much.
+    """
+    rate, inputs, quantisers = spec.limits.rate, spec.plant.inputs, _quantisers(spec)
+    amplitude, output = stated_peaks(spec)
+    if amplitude is not None and quantisers:
+        amplitude = amplitude - np.abs(
+            per_channel(spec.signal.offset or 0.0, inputs) - operating_points(spec)
+        )
+    return Bounds(
+        amplitude=amplitude,
+        rate=None if rate is None else per_channel(rate, inputs),
+        output=output,
+        quantisers=quantisers,
+    )
+
+
+def _quantisers(spec: Spec) -> tuple[Quantiser, ...]:
+    """The converter of each input; all have the same number of bits."""
+    stated, inputs = spec.signal.quantisation, spec.plant.inputs
+    if stated is None:
+        return ()
+    spans = per_channel(stated.range, inputs)
+    offsets = per_channel(spec.signal.offset or 0.0, inputs)
+    return tuple(
+        Quantiser(stated.bits, float(span), float(offset))
+        for span, offset in zip(spans, offsets, strict=True)
+    )
+
+
+def operating_points(spec: Spec) -> Array:
+    """(r,): the offset of each input, or the value of its converter next to it."""
+    quantisers = _quantisers(spec)
+    if quantisers:
+        return np.array([quantiser.operating_point for quantiser in quantisers])
+    return per_channel(spec.signal.offset or 0.0, spec.plant.inputs)
+
+
+def deviations(spec: Spec, table: Table) -> Array:
+    """(n, r): the samples of signal.csv from their operating points; a record that was given as it is."""
+    columns = build_units(spec).excitations
+    values = np.stack([np.asarray(table.columns[name]) for name in columns], axis=1)
+    given = spec.given is not None and spec.given.type == "signal"
+    return values if given else values - operating_points(spec)
+
+
+def sampling_rate(spec: Spec) -> float:
+    """Samples a second."""
+    return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
+
+
+def _method(spec: Spec) -> Method:
+    """The kind of signal: as stated, or as other keys ask for."""
+    signal = spec.signal
+    if signal.type is not None:
+        return signal.type
+    if signal.phases is not None or signal.lines is not None:
+        return "multisine"
+    if signal.bits is not None:
+        return "prbs"
+    return _usual_method(spec)
+
+
+def _usual_method(spec: Spec) -> Method:
+    """Where nothing is stated: noise where a spectral factor may be had, one input and output in q^-1."""
+    plant, spectrum = spec.plant, spec.spectrum
+    if spec.accuracy.frequency_response is not None:
+        return "multisine"
+    single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
+    banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
+    return "filtered_noise" if single and not banded else "multisine"
+
+
+def _other_methods(spec: Spec) -> tuple[Method, ...]:
+    """What may stand in for the kind of signal; none where the spec says how it is to be made."""
+    signal = spec.signal
+    if signal.phases is not None or signal.lines is not None or signal.bits is not None:
+        return ()
+    levels: tuple[Method, ...] = ("binary",) if spec.plant.sampled and not signal.ramp else ()
+    if levels and _ramps_needed(spec):
+        levels = ("slewed",)
+    others: list[Method] = list(dict.fromkeys((_usual_method(spec), "multisine", *levels)))
+    return tuple(method for method in others if method != _method(spec))
+
+
+def _ramps_needed(spec: Spec) -> bool:
+    """Whether the limits on moves keep an input from switching between its levels at once."""
+    moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
+    return moves is not None and not spec.closed_loop and peak is not None and bool(np.isfinite(moves).any())
+
+
+def per_channel(value: float | tuple[float, ...], channels: int) -> Array:
+    """(channels,): a number holds for every channel."""
+    return np.broadcast_to(np.asarray(value, dtype=float), channels)

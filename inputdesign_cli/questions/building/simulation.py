@@ -1,0 +1,77 @@
+"""Spec -> how its experiment is tried on the true system: the nominal one, but for what `simulation` says."""
+
+from __future__ import annotations
+
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.questions.building.model_error import unstated_errors
+from inputdesign_cli.questions.building.system import build_cost, build_loop, build_model, held_plant
+from inputdesign_cli.questions.common.simulated_estimates import Simulator
+from inputdesign_cli.questions.common.simulation import Simulation, TrueSystem
+from inputdesign_cli.specification import Simulation as SimulationSection, Spec
+from inputdesign_cli.specification.models.experiment import Noise
+from inputdesign_cli.tasks.build.header import build_units
+
+
+def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
+    """What `simulate` needs besides the design or the given excitation.
+
+    Args:
+        nominal: the experiment on the design model, in raw parameters, prior information included.
+
+    Raises:
+        SpecError: a loop that is unstable with the true plant.
+    """
+    study = spec.simulation or SimulationSection()
+    return Simulation(
+        units=build_units(spec),
+        nominal=nominal,
+        truth=_true_system(spec),
+        runs=study.runs,
+        seed=study.seed,
+        renewed=study.excitation == "new",
+        compare=study.compare,
+        cost=build_cost(spec),
+        entries=unstated_errors(spec, nominal),
+    )
+
+
+def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
+    """What simulates experiments for an exact confidence; None where asymptotic theory alone is to tell."""
+    error = spec.accuracy.error
+    stated = None if error is None else error.calibrated
+    if stated is None or not stated.runs:
+        return None
+    return Simulator(nominal, stated.runs, build_units(spec).step)
+
+
+def _true_system(spec: Spec) -> TrueSystem | None:
+    """The system of `simulation.plant` and `simulation.noise`; None where neither is given.
+
+    Raises:
+        SpecError: a loop that the nominal plant leaves stable, and the true one does not.
+    """
+    study = spec.simulation
+    if study is None or (study.plant is None and study.noise is None):
+        return None
+    plant, noise = study.plant or spec.plant, spec.noise
+    if study.noise is not None:
+        stated = study.noise
+        noise = Noise.model_construct(
+            C=stated.C, D=stated.D, drift=stated.drift, known=stated.known, variance=stated.variance or 1.0
+        )
+    if plant.kind == "continuous" and spec.plant.kind == "polynomial":
+        plant = held_plant(plant, spec.sample_time)
+    model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
+    controller = spec.experiment.controller
+    try:
+        loop = None if controller is None else build_loop(spec, model, controller)
+    except SpecError as error:
+        found = error.diagnostics[0]
+        raise bad_spec(
+            found.code,
+            f"with the true plant {found.message}",
+            hint="give a true plant that the controller stabilises as well",
+            key="simulation.plant",
+        ) from error
+    return TrueSystem(model, loop, None if study.noise is None else study.noise.relative_std)

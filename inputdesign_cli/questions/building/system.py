@@ -1,0 +1,290 @@
+"""Spec -> plant, loop and experiment: what is excited, for how long, in which loop, at what price."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.plant import (
+    Coloured,
+    ContinuousModel,
+    Listed,
+    Loop,
+    Model,
+    PolynomialModel,
+    SampledModel,
+    close_loop,
+    hold_entries,
+)
+from inputdesign_cli.questions.building.controllers import controller_matrix
+from inputdesign_cli.questions.building.demand import check_effects, check_model
+from inputdesign_cli.questions.building.integrators import on_finite_information
+from inputdesign_cli.questions.building.parameters import degrees_of, delays_of, reparametrised
+from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
+from inputdesign_cli.questions.building.state_space import state_space_model
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.controller import Controller
+from inputdesign_cli.specification.models.experiment import NoiseShape
+from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
+from inputdesign_cli.specification.models.spectrum import (
+    GivenMultisine,
+    GivenSignal,
+    GivenSpectrum,
+    GivenTable,
+    MultisineSpectrum,
+    PolynomialSpectrum,
+)
+from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.tables import read_frequency_table, read_samples
+
+# Of pi/sample_time, where a band is proposed.
+_WITHIN = 0.95
+
+
+def build_model(spec: Spec) -> Model:
+    """The model of `plant` and `noise`.
+
+    Raises:
+        SpecError: `not-supported` for a regression; what is wrong with known and with named parameters.
+    """
+    covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
+    match spec.plant:
+        case PolynomialPlant() as plant:
+            noise = spec.noise
+            one, pairs = np.ones(1), tuple(zip(per_output(noise.D), noise.held, strict=True))
+            inside = polynomial_model(plant, noise, covariance, [one if held else d for d, held in pairs])
+            outside = [d if held else one for d, held in pairs]
+            return reparametrised(spec, plant, _coloured(inside, noise, [one], outside))
+        case ContinuousPlant() as plant:
+            matrix = plant.continuous
+            continuous = ContinuousModel.monic(
+                _reversed(matrix.numerator_matrix),
+                _reversed(matrix.denominator_matrix),
+                covariance,
+                common=matrix.common,
+                delay=delays_of(plant),
+                common_delay=matrix.common_delay,
+                degrees=degrees_of(plant),
+            )
+            model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
+            C, D = per_output(spec.noise.C), per_output(spec.noise.D)
+            return reparametrised(spec, plant, _coloured(model, spec.noise, C, D))
+        case StateSpacePlant() as plant:
+            C, D = per_output(spec.noise.C), per_output(spec.noise.D)
+            states = state_space_model(spec, plant, covariance)
+            return reparametrised(spec, plant, _coloured(states, spec.noise, C, D))
+    raise spec.complain(
+        "not-supported",
+        "a regression has no dynamics to be estimated here",
+        hint="ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1",
+        key="plant",
+    )
+
+
+def _coloured(model: Listed, noise: NoiseShape, C: Sequence[Array], D: Sequence[Array]) -> Listed:
+    """The model with these C and D and the drift of the noise; itself where there is nothing to add."""
+    if not any(noise.drifts) and all(len(p) == 1 for p in (*C, *D)):
+        return model
+    return Coloured(model, tuple(C), tuple(D), noise.held, noise.drifts)
+
+
+def polynomial_model(
+    plant: PolynomialPlant, noise: NoiseShape, covariance: Array, D: Sequence[Array] | None = None
+) -> PolynomialModel:
+    """A plant in q^-1; A, C and D that the spec states once are common to the outputs.
+
+    Args:
+        D: in place of those of the noise.
+    """
+    return PolynomialModel(
+        B=_arrays(plant.B_matrix),
+        A=per_output(plant.A),
+        F=_arrays(plant.F_matrix),
+        C=per_output(noise.C),
+        D=per_output(noise.D) if D is None else tuple(D),
+        covariance=covariance,
+        delays=plant.delays,
+    )
+
+
+def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
+    """A plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
+    matrix = plant.continuous
+    rows = (matrix.numerator_matrix, matrix.denominator_matrix)
+    held = hold_entries(*rows, sample_time, matrix.delays)
+    B, F = (tuple(tuple(tuple(entry.tolist()) for entry in row) for row in rows) for rows in held)
+    return PolynomialPlant.model_construct(A=(1.0,), B=B, F=F)
+
+
+def bare_experiment(spec: Spec, model: Model, loop: Loop | None = None) -> Experiment:
+    """The experiment in raw coordinates, of which nothing is checked and without its prior."""
+    return Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+
+
+def build_experiment(spec: Spec) -> Experiment:
+    """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
+
+    Raises:
+        SpecError: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
+            algebraic loop; a prior that does not fit the parameters.
+        DataError: the record of a prior cannot be used.
+    """
+    model, controller = build_model(spec), spec.experiment.controller
+    check_model(spec, model)
+    loop = None if controller is None else build_loop(spec, model, controller)
+    if loop is not None:
+        loop.check_delay()
+    experiment = bare_experiment(spec, model, loop)
+    check_effects(spec, experiment)
+    experiment = on_finite_information(spec, experiment)
+    return replace(experiment, prior=_prior(spec, experiment))
+
+
+def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
+    """The loop of a model that is sampled.
+
+    Raises:
+        SpecError: the loop is unstable or algebraic.
+    """
+    C = controller_matrix(controller, spec.sample_time, (model.inputs, model.outputs))
+    loop = close_loop(model, C)
+    loop.check_stability()
+    return loop
+
+
+def excitation_band(spec: Spec) -> tuple[float, float]:
+    """Where the excitation may have power, in rad/sample, or rad per time unit in continuous time.
+
+    Raises:
+        SpecError: `needs-band` when continuous time leaves it open.
+        DataError: the table of a given spectrum cannot be read.
+    """
+    band = _stated_band(spec)
+    if spec.plant.sampled:
+        lo, hi = spec.clip_band(band)
+        return lo * spec.sample_time, min(hi * spec.sample_time, np.pi)
+    if band is None or not np.isfinite(band[1]):
+        raise spec.complain(
+            "needs-band",
+            "in continuous time frequencies have no end: the band of the excitation is missing",
+            hint="add sample: zoh to the plant, whose input is then held for each sample_time; or, to stay "
+            f"in continuous time, limits: {{band: [0, {0.5 * np.pi / spec.sample_time:.3g}]}}, or a "
+            "polynomial spectrum with its band",
+            key="spectrum" if spec.spectrum is not None else "limits",
+        )
+    return band
+
+
+def _stated_band(spec: Spec) -> tuple[float, float] | None:
+    """The band of the spectrum or of the limits; in continuous time also what a given excitation covers."""
+    match spec.spectrum:
+        case PolynomialSpectrum(band=band):
+            return band
+        case MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
+            return _around(given)
+        case GivenSpectrum(given=GivenSignal()) if spec.limits.band is None and not spec.plant.sampled:
+            return 0.0, np.pi / spec.sample_time
+        case GivenSpectrum(given=GivenMultisine(frequencies=given)) if (
+            spec.limits.band is None and not spec.plant.sampled and given[-1] > 0
+        ):
+            return _around(given)
+        case GivenSpectrum(given=GivenTable(file=name)) if (
+            spec.limits.band is None and not spec.plant.sampled
+        ):
+            rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)["frequency"]
+            return _around(rows.tolist()) if rows[-1] > 0 else None
+    return spec.limits.band
+
+
+def _around(frequencies: Sequence[float]) -> tuple[float, float]:
+    lo, hi = frequencies[0], frequencies[-1]
+    return (lo, hi) if hi > lo else (0.5 * lo, 1.5 * hi)
+
+
+def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
+    """Weights of the powers: of the sum over the channels, or one a channel."""
+    weights: dict[PowerKind, Weight] = {
+        "input": spec.cost.input_power,
+        "output": spec.cost.output_power,
+        "excitation": spec.cost.excitation_power,
+    }
+    return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
+
+
+def _prior(spec: Spec, experiment: Experiment) -> Array | None:
+    """`experiment.prior` (k, k): a matrix, that of a model file, or that of earlier samples."""
+    stated = stated_prior(spec)
+    if stated is not None:
+        return stated.over(spec, experiment.model.names)
+    record = prior_record(spec)
+    if record is None:
+        return None
+    earlier = replace(experiment, samples=len(record))
+    return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
+
+
+def prior_record(spec: Spec) -> Array | None:
+    """(n, r): the earlier samples that `experiment.prior` names; None where it is something else, or absent.
+
+    Raises:
+        DataError: they cannot be used.
+    """
+    prior = spec.experiment.prior
+    if prior is None or prior.names_a_model or not isinstance(prior.information, str):
+        return None
+    return read_excitation_record(spec, prior.information, PRIOR)
+
+
+def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
+    """(n, r): the samples of an excitation from a CSV file, its columns u1, u2, .. (in closed loop r1, ..).
+
+    Of one input the column is u or u1.
+
+    Raises:
+        DataError: the file cannot be used.
+    """
+    units = build_units(spec)
+    names = [units.excitation] if units.inputs == 1 else list(units.excitations)
+    columns = read_samples(spec.resolve_path(name), {column: column for column in names}, key=key)
+    return np.stack([columns[column] for column in names], axis=1)
+
+
+def record_step(spec: Spec) -> float:
+    """The time between samples in the unit of the experiment's frequencies: 1, or sample_time.
+
+    Raises:
+        SpecError: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
+    """
+    if spec.plant.sampled:
+        return 1.0
+    _, hi = excitation_band(spec)
+    if hi * spec.sample_time > np.pi * (1 + 1e-9):
+        raise spec.complain(
+            "beyond-nyquist",
+            f"samples {spec.sample_time:g} {spec.time_unit} apart cannot carry the band up to {hi:g} "
+            f"rad/{spec.time_unit}",
+            hint="if the input is held between samples, add sample: zoh to the plant and end the band at "
+            f"{_WITHIN * np.pi / spec.sample_time:.3g}; otherwise set sample_time to {0.5 * np.pi / hi:.3g} "
+            f"or less (at most {np.pi / hi:.3g})",
+            key="sample_time",
+        )
+    return spec.sample_time
+
+
+def _arrays(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:
+    return tuple(tuple(np.array(entry, dtype=float) for entry in row) for row in rows)
+
+
+def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:
+    return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
+
+
+def per_output(value: tuple) -> tuple[Array, ...]:
+    """One polynomial, common to all outputs, or a list of one an output."""
+    return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))

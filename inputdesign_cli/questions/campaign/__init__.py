@@ -1,0 +1,1 @@
+"""Experiments in parts that are planned anew after each record."""

@@ -1,0 +1,158 @@
+"""Spec -> how its experiment goes in parts, real ones and simulated ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.questions.assessment.build import build_identification
+from inputdesign_cli.questions.building.signal_settings import operating_points
+from inputdesign_cli.questions.building.simulation import build_simulation
+from inputdesign_cli.questions.building.system import record_step
+from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.rounds import Rounds
+from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
+from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
+from inputdesign_cli.questions.least_cost.build import build_convex
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.campaign import Campaign, Pilot
+
+_TENTH, _LONGEST, _CAP = 10, 3, 10.0
+
+
+def build_rules(spec: Spec) -> Rules:
+    """How the campaign of a spec goes.
+
+    Raises:
+        SpecError: it states none, or what this version does not do in parts; `conflicting-keys`.
+    """
+    stated = spec.campaign
+    if stated is None:
+        raise spec.complain(
+            "missing-key",
+            "the spec has no campaign, so that there is one experiment and no parts of it",
+            hint="add campaign: {block: 50}, or design the one with idesign solve",
+            key="campaign",
+        )
+    _check(spec, stated)
+    pilot = stated.pilot
+    return Rules(
+        schedule=_schedule(spec, stated, pilot),
+        pilot_power=None if pilot is None else pilot.power,
+        power_cap=stated.power_cap or _CAP,
+        robust_last=stated.last == "robust",
+        stops=stated.stop == "data",
+        rate=_rate(spec),
+        seed=spec.signal.seed or 0,
+    )
+
+
+def _rate(spec: Spec) -> tuple[float, ...] | None:
+    """The largest move of each input; in a loop it is about u, and nothing is applied to u itself."""
+    if spec.limits.rate is None or spec.closed_loop:
+        return None
+    return tuple(np.broadcast_to(np.asarray(spec.limits.rate, dtype=float), (spec.plant.inputs,)).tolist())
+
+
+def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
+    samples, has = spec.experiment.samples, "has"
+    if pilot is not None and pilot.power is not None:  # what is known before the experiment begins
+        samples, has = samples + pilot.samples, "and its pilot have"
+    most = stated.max_samples or max(spec.limits.samples or _LONGEST * samples, samples)
+    if most < samples:
+        raise spec.complain(
+            "conflicting-keys",
+            f"the experiment {has} {samples} samples, and the campaign ends at {most}",
+            hint="raise campaign.max_samples, or lower experiment.samples",
+            key="campaign.max_samples",
+        )
+    if stated.stages is not None:
+        if sum(stated.stages) != samples:
+            raise spec.complain(
+                "conflicting-keys",
+                f"the stages have {sum(stated.stages)} samples together, and the experiment {samples}",
+                hint="make them agree: experiment.samples is the length of the whole",
+                key="campaign.stages",
+            )
+        return Schedule(stated.stages, stated.stages[-1], samples, most)
+    tenth = max(spec.experiment.samples // _TENTH, 1)
+    block = stated.block or tenth
+    first = min(block, tenth) if pilot is None else pilot.samples
+    for key, length in (("block", block), ("pilot", first)):
+        if length > samples:
+            raise spec.complain(
+                "conflicting-keys",
+                f"the {key} has {length} samples, and the whole experiment {samples}",
+                hint="parts are shorter than the whole",
+                key=f"campaign.{key}",
+            )
+    return Schedule((first,), block, samples, most)
+
+
+def _check(spec: Spec, stated: Campaign) -> None:
+    """Raise `SpecError` (`not-supported`) for what is not done in parts."""
+    what, hint, key = "", "state accuracy.model_error and let the power follow", "campaign"
+    accuracy = spec.accuracy
+    elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
+    if spec.plant.kind == "regression" or elsewhere:
+        what = "this kind of design"
+    elif not spec.designs:
+        what, hint = "a given excitation", "let it be designed: spectrum: {type: fir, order: 20}"
+    elif not accuracy.requirements or spec.goal != "least_cost":
+        what, hint = "another goal than the least cost", "ask for an accuracy that ends the campaign"
+    elif not spec.plant.sampled:
+        what, hint = "an experiment in continuous time", "write plant.sample: zoh"
+    elif spec.experiment.samples < 2:
+        what, hint, key = "an experiment without a length", "state experiment.samples", "experiment.samples"
+    if what:
+        raise spec.complain("not-supported", f"a campaign does not go with {what}", hint=hint, key=key)
+
+
+def build_campaign(spec: Spec) -> CampaignTask:
+    """The design of the first plan in one shot, and the study of whole campaigns.
+
+    Raises:
+        SpecError, DataError: see `build_rules` and the builders of a design.
+    """
+    rules, planner = build_rules(spec), SpecPlanner(spec)
+    design, study = build_convex(spec), build_simulation(spec, planner.nominal)
+    truth = planner.nominal.model if study.truth is None else study.truth.model
+    loop = planner.nominal.loop if study.truth is None else study.truth.loop
+    return CampaignTask(
+        design=design,
+        study=CampaignStudy(
+            planner=planner,
+            rules=rules,
+            true=replace(planner.nominal, model=truth, loop=loop),
+            step=record_step(spec),
+            cost=study.cost,
+            runs=study.runs,
+            seed=study.seed,
+            white="white" in study.compare,
+            uncertain=spec.uncertainty is not None or rules.pilot_power is not None,
+            has_prior=spec.experiment.prior is not None,
+        ),
+    )
+
+
+def build_rounds(spec: Spec) -> Rounds:
+    """What the rounds of a real campaign need.
+
+    Raises:
+        SpecError, DataError: see `build_rules` and the builders of a design.
+    """
+    rules, planner = build_rules(spec), SpecPlanner(spec)
+    return Rounds(build_identification(spec), planner, rules, operating_points(spec))
+
+
+def check_applied_in_parts(spec: Spec) -> None:
+    """Raise `SpecError` (`not-supported`) for what a spec asks of its record and no part has."""
+    unlike = {
+        "samples": (spec.signal.samples, "campaign.block or campaign.stages have the lengths of parts"),
+        "also": (spec.signal.also, "remove it: signal.csv is the file of a part"),
+    }
+    for name, (stated, hint) in unlike.items():
+        if stated is not None:
+            key = f"signal.{name}"
+            raise spec.complain("not-supported", f"parts of a campaign have no {key}", hint=hint, key=key)

@@ -1,0 +1,233 @@
+"""Whole campaigns on a simulated true system: each run estimates, plans, and stops as a real one would."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import OnModelError, model_errors
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError
+from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.assessment.neglected import mattering, neglected
+from inputdesign_cli.questions.campaign.schedule import Planner, Rules, Standing, ratio_of, standing
+
+Ending = Literal["stopped", "missed", "undecided", "unplanned"]
+_SEEDS = 2**31
+
+
+@dataclass(frozen=True)
+class CampaignJob:
+    """What all runs of one way of experimenting share.
+
+    Attributes:
+        true: the experiment on the true system.
+        step: time between samples in the unit of the experiment's frequencies.
+        cost: weights of the powers.
+    """
+
+    planner: Planner
+    rules: Rules
+    true: Experiment
+    step: float
+    cost: Mapping[PowerKind, Weight]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How one run ended.
+
+    Attributes:
+        status: `stopped` where the data met what is asked; `unplanned` where there was no experiment to do.
+        ratio: the largest r_u / r_adm of the true plant under the experiment done; None where the true system
+            has other parameters than the model.
+        energy: cost per sample times samples, on the true plant.
+        within: whether the estimate is off by no more than r_adm of the truth, of itself, of the plant of the
+            spec; None where it cannot be asked.
+        parts: that were applied; `shrunk`: those after which the estimate was not built on as it is.
+    """
+
+    status: Ending
+    samples: int
+    energy: float
+    theta: Array
+    ratio: float | None
+    within: Mapping[str, bool | None]
+    parts: int
+    shrunk: int
+
+
+def run_campaigns(job: CampaignJob, runs: int, rng: np.random.Generator) -> list[Ended]:
+    """Several campaigns from rest, one after the other."""
+    return [_Run(job, rng).end() for _ in range(runs)]
+
+
+@dataclass
+class _Run:
+    """One campaign; the noise of all its samples is drawn first, so that others meet the same."""
+
+    job: CampaignJob
+    rng: np.random.Generator
+    known: Standing | None = None
+    first: float | None = None
+    parts: int = 0
+    shrunk: set[int] = field(default_factory=set)  # parts, by their numbers
+
+    def __post_init__(self) -> None:
+        true = self.job.true
+        size = (self.job.rules.schedule.most, true.model.outputs)
+        self.e = self.rng.standard_normal(size) @ np.linalg.cholesky(true.model.covariance).T
+        self.r: Array = np.zeros((0, true.inputs))
+        self.sound = self.last = self.job.planner.nominal.model
+
+    def end(self) -> Ended:
+        """The campaign from its first plan to its end."""
+        rules = self.job.rules
+        while True:
+            try:
+                plan = self.job.planner.plan(
+                    rules, self.known, len(self.r), int(self.rng.integers(_SEEDS)), self.first, self.r
+                )
+            except (InfeasibleError, InaccurateError, SpecError):
+                return self._ended("unplanned")
+            if self.first is None and plan.designed:
+                self.first = plan.cost
+            self.r = np.concatenate([self.r, plan.applied])
+            u, y = self._measured()
+            self.parts += 1
+            self._estimate(u, y)
+            met = self.known is not None and self.known.met
+            over = rules.over(len(self.r), met=met)
+            if not over and not self._doubted(u, y):
+                continue
+            full = self._anew(u, y)
+            if full is not None and not over and rules.refuted(full):
+                return self._ended("undecided")
+            met = self.known is not None and self.known.met
+            if rules.over(len(self.r), met=met):
+                against = full is not None and self._speaks_against(full)
+                return self._ended("undecided" if against else "stopped" if met else "missed")
+
+    def _measured(self) -> tuple[Array, Array]:
+        true, n = self.job.true, len(self.r)
+        if true.loop is None:
+            caused, noise = true.model.simulate(self.r[None], self.e[None, :n], self.job.step)
+            return self.r, (caused + noise)[0]
+        y, u = true.loop.signals(self.r[None], self.e[None, :n])
+        return u[0], y[0]
+
+    def _estimate(self, u: Array, y: Array) -> None:
+        """Estimate from the last estimate on; from several starts while there is none."""
+        model, step = self.last, self.job.step
+        if self.known is not None:
+            found = fit_batch(model, u[None], y[None], step, start=model.theta)
+            if found.converged[0]:
+                self._stand(model.at(found.theta[0], found.noise[0]), u, y)
+                return
+        self._anew(u, y)
+
+    def _doubted(self, u: Array, y: Array) -> bool:
+        """Whether tests at the estimate as it is refute the structure."""
+        if self.known is None or not self.job.rules.stops:
+            return False
+        full = self._identified(u, y, near=True)
+        return full is not None and self.job.rules.refuted(full)
+
+    def _anew(self, u: Array, y: Array) -> Estimate | None:
+        """The estimate from several starts, which is then built on; None where there is none."""
+        full = self._identified(u, y)
+        if full is not None:
+            self._stand(self.last.at(full.theta, full.noise), u, y)
+        return full
+
+    def _identified(self, u: Array, y: Array, *, near: bool = False) -> Estimate | None:
+        model, step, feedback = self.last, self.job.step, self._feedback
+        try:
+            return identify(model, u, y, step, start=model.theta, feedback=feedback, rest=True, near=near)
+        except SpecError:  # too little is known yet
+            return None
+
+    def _speaks_against(self, full: Estimate) -> bool:
+        """Whether the estimate speaks against the structure at the end."""
+        if full.failed or not full.converged:
+            return True
+        known = self.known
+        if known is None or not known.met:  # more parameters miss it all the more
+            return False
+        question = self.job.planner.question(known.model, known.information)
+        errors = model_errors(question.requirements)
+        return bool(mattering(neglected(known.model, full, errors, question.information)))
+
+    @property
+    def _feedback(self) -> bool:
+        return self.job.true.loop is not None
+
+    def _stand(self, estimate: Model, u: Array, y: Array) -> None:
+        informed = partial(information_of_data, u=u, y=y, step=self.job.step)
+        stands = standing(self.job.planner, estimate, informed, self.sound)
+        if stands is None:
+            return
+        self.known, self.last = stands, stands.model
+        self.shrunk.discard(self.parts)  # a part may be estimated anew
+        if stands.share == 1.0:
+            self.sound = stands.model
+        else:
+            self.shrunk.add(self.parts)
+
+    def _ended(self, status: Ending) -> Ended:
+        samples = len(self.r)
+        return Ended(
+            status,
+            samples,
+            energy_of(self.r, self.job.true, self.job.step, self.job.cost) if samples else 0.0,
+            self.last.theta,
+            self._true_ratio() if samples else None,
+            {of: within(self.job, self.last, of) for of in ("true", "estimate", "design")},
+            self.parts,
+            len(self.shrunk),
+        )
+
+    def _true_ratio(self) -> float | None:
+        """That of the true plant, by the samples applied."""
+        true = replace(self.job.true, samples=len(self.r))
+        if true.model.names != self.last.names:
+            return None
+        information = FiniteRecord(true, len(self.r), self.job.step).information(self.r)
+        try:
+            question = self.job.planner.question(true.model, information)
+            return ratio_of(question, question.information)
+        except (IdesignError, np.linalg.LinAlgError):
+            return None
+
+
+def energy_of(r: Array, true: Experiment, step: float, cost: Mapping[PowerKind, Weight]) -> float:
+    """Cost on the true plant of a record (n, r), summed over its samples; see `CampaignJob`."""
+    at = FiniteRecord(true, len(r), step)
+    powers: dict[PowerKind, list[float]] = {
+        kind: np.mean(at.signals(kind, r) ** 2, axis=0).tolist() for kind in POWER_KINDS
+    }
+    return len(r) * weighted_sum(cost, powers)
+
+
+def within(job: CampaignJob, estimate: Model, of: str) -> bool | None:
+    """Whether |G_hat - G_0| <= r_adm at all frequencies, that of the truth, the estimate, or the spec."""
+    models = {"true": job.true.model, "estimate": estimate, "design": job.planner.nominal.model}
+    try:
+        errors = model_errors(job.planner.question(models[of], np.eye(len(models[of].names))).requirements)
+    except IdesignError:
+        return None
+    return all(_kept(error, estimate, job.true.model) for error in errors) if errors else None
+
+
+def _kept(error: OnModelError, estimate: Model, truth: Model) -> bool:
+    w = error.grid
+    off: NDArray[np.complex128] = error.concerned(estimate.plant_at(w) - truth.plant_at(w))
+    return bool(np.all(np.linalg.norm(off, axis=1) <= error.admissible.at(w)))

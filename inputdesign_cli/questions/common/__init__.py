@@ -1,0 +1,1 @@
+"""What several kinds of questions share once their objects are built."""

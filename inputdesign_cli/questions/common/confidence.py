@@ -1,0 +1,160 @@
+"""The confidence factor alpha: as stated, or calibrated to what estimates really do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, Requirement
+from inputdesign_cli.accuracy.calibration import Calibration, Coverage
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import InaccurateError, InfeasibleError
+from inputdesign_cli.monte_carlo.statistics import binomial_limits
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.shares import per_cent
+from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates
+
+SETTLED = 1e-3
+_MOST_ROUNDS = 15
+_STEP = 2.0  # the most that one round changes alpha by
+_SMALLER = 0.02
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """alpha of r_u; where it was calibrated, how, the chi-squared one (`usual`) and what is kept."""
+
+    alpha: float
+    usual: float
+    calibration: Calibration | None = None
+    coverage: Coverage | None = None
+
+    @classmethod
+    def of(
+        cls,
+        calibration: Calibration | None,
+        requirements: Sequence[Requirement],
+        information: Array,
+        usual: float,
+        simulated: SimulatedEstimates | None = None,
+    ) -> Confidence:
+        """The alpha of an experiment of this information (k, k), in the coordinates of the requirements.
+
+        Args:
+            simulated: estimates of such experiments; None for asymptotic theory alone.
+
+        Raises:
+            InaccurateError: see `SimulatedEstimates.corrected`.
+        """
+        errors = bounded_errors(requirements)
+        if calibration is None or not errors:
+            return cls(usual, usual)
+        if simulated is not None:
+            calibration = simulated.corrected(calibration, errors, information)
+        alpha, coverage = calibration.alpha(errors, information), calibration.coverage(errors, information)
+        if simulated is not None:
+            coverage = simulated.checked(coverage, errors, 1.0)
+        return cls(alpha, usual, calibration, coverage)
+
+    @property
+    def entry(self) -> dict[str, Json]:
+        """`model_error.confidence` of the result; empty where nothing was calibrated."""
+        told, by = self.coverage, self.calibration
+        if told is None or by is None:
+            return {}
+        entry = {"asked": by.probability, "chi_squared_alpha": self.usual, **covered(told)}
+        return {"confidence": entry | ({"excess": by.excess} if told.runs else {})}
+
+
+def covered(coverage: Coverage) -> dict[str, Json]:
+    """The shares of estimates within r_adm with their 95 % limits: of draws by the exact G, and of runs."""
+    draws, runs = coverage.draws, coverage.runs
+    entry: dict[str, Json] = {
+        "draws": draws,
+        "exact": coverage.exact / draws,
+        "exact_limits": list(binomial_limits(coverage.exact, draws)),
+        "linear": coverage.linear / draws,
+    }
+    if runs:
+        limits = list(binomial_limits(coverage.kept, runs))
+        entry |= {"runs": runs, "kept": coverage.kept / runs, "kept_limits": limits}
+    return entry
+
+
+def too_few(coverage: Coverage, probability: float) -> bool:
+    """Whether fewer runs than asked keep r_adm, by more than chance."""
+    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[1] < probability)
+
+
+def too_many(coverage: Coverage, probability: float) -> bool:
+    """Whether more of them do."""
+    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[0] > probability)
+
+
+def missed(result: Mapping[str, Json]) -> list[str]:
+    """Notes where the design of a result, or its record, keeps less than was asked, by more than chance."""
+    notes = []
+    design = result.get("model_error", {}).get("confidence", {})
+    for of, told in (
+        ("of this design", design),
+        ("with this record", result.get("signal", {}).get("confidence", {})),
+    ):
+        if "kept_limits" in told and told["kept_limits"][1] < design["asked"]:
+            notes.append(
+                f"{100 * told['kept']:.1f} % of {told['runs']} simulated experiments {of} keep r_adm, fewer "
+                f"than the {100 * design['asked']:g} % that are asked for by more than chance: ask for more "
+                "runs (confidence: {exact: .., runs: ..}), which tell alpha more sharply"
+            )
+    return notes
+
+
+def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
+    """The requirements on a model error to first order."""
+    return [requirement for requirement in requirements if isinstance(requirement, ModelError)]
+
+
+def settled_alpha(needed: Callable[[float], float | None], start: float) -> float:
+    """The alpha whose design needs just that alpha.
+
+    A design for a larger alpha is more accurate, and needs a smaller one: log(needed / alpha) falls, and the
+    secant method in log(alpha) finds its root.
+
+    Args:
+        needed: the calibrated alpha of the design for an alpha; None where the limits leave no such design.
+
+    Raises:
+        InfeasibleError: no alpha was found whose design keeps within the limits.
+        InaccurateError: `confidence-not-settled`.
+    """
+    x, before, missing, refused = np.log(start), None, np.nan, False
+    for _ in range(_MOST_ROUNDS):
+        told = needed(float(np.exp(x)))
+        if told is None:
+            refused, before = True, None
+            x -= _SMALLER
+            continue
+        missing = float(np.log(told) - x)
+        if abs(missing) <= SETTLED:
+            return float(np.exp(x))
+        step = missing
+        if before is not None and (slope := (missing - before[1]) / (x - before[0])) < 0.0:
+            step = -missing / slope
+        before = (x, missing)
+        x += float(np.clip(step, -np.log(_STEP), np.log(_STEP)))
+    if refused:
+        raise InfeasibleError.because(
+            "infeasible",
+            "no design within the limits was found that keeps the exact confidence; that there is none is "
+            "not proved",
+            hint="loosen the limits, or ask for confidence: 0.95, of which infeasible tells what is proved",
+            key="limits",
+        )
+    raise InaccurateError.because(
+        "confidence-not-settled",
+        f"no alpha was found for which a design keeps the confidence asked for: after {_MOST_ROUNDS} "
+        f"designs it still changes by {per_cent(abs(missing), 2)}",
+        hint="ask for more draws (confidence: {exact: .., draws: 20000}), or for confidence: 0.95",
+        key="accuracy.model_error.confidence",
+    )

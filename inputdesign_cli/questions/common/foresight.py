@@ -1,0 +1,167 @@
+"""What data of a design may leave undecided, before they are taken: minima of the likelihood far apart.
+
+The local covariance knows of one minimum. A dead time that few frequencies excite has others, whole periods
+away. A record of the design is simulated on the nominal plant and estimated with the search of `identify`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, what_ended
+from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.identification import Earlier, Estimate
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.monte_carlo.searched_runs import searched_run
+from inputdesign_cli.outcome.results import Json, Result
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.knowledge import Knowledge
+from inputdesign_cli.questions.common.rivals import (
+    Apart,
+    beyond_admissible,
+    beyond_errors,
+    foreseen_entries,
+    foreseen_note,
+)
+
+_SEED = 0
+# Seconds of a search for each sample, channel, channel and parameter, measured; the longest that is begun.
+_SECONDS, _LONGEST = 1.2e-4, 20.0
+# Another spectrum that costs no more than this is not improved on.
+_CHEAP = 1.2
+# What a simulated search may end with; then nothing can be said.
+_ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """What `foreseen` of the result says, and notes."""
+
+    entry: dict[str, Json] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Foresight:
+    """How the data of an experiment are foreseen.
+
+    Attributes:
+        nominal: the experiment in raw parameters, prior information included.
+        entries: errors that have r_u where no requirement bounds one.
+        earlier: what counts along where the data are assessed.
+        advice: what to do about rivals, where nothing better is known.
+        knowledge: what the spec says of the parameters, which rules rivals out.
+        looks: whether rivals are looked for at all.
+        richer: by its words in a spec the result of the same design with another spectrum; none where there
+            is no other.
+    """
+
+    units: Units
+    nominal: Experiment
+    entries: Sequence[ModelError]
+    earlier: Earlier | None
+    advice: str
+    knowledge: Knowledge | None = None
+    looks: bool = True
+    richer: Mapping[str, Callable[[], Result]] = field(default_factory=dict)
+
+    def foreseen(self, record: Array, requirements: Sequence[Requirement], design: Result) -> Foreseen:
+        """The rivals that a record (n, r) of a design would leave, and what to do about them."""
+        reason = self._not_now(len(record))
+        if reason:
+            return Foreseen(
+                notes=(
+                    f"{reason}: whether other dead times would explain such a record nearly as well was not "
+                    "looked at",
+                )
+            )
+        try:
+            estimate, _ = self._searched(record, np.random.default_rng(_SEED))
+            found = self._beyond(record, estimate, requirements)
+        except _ENDS:
+            return Foreseen()
+        entry: dict[str, Json] = {"rivals": foreseen_entries(self.units, estimate, found)}
+        if not found:
+            return Foreseen(entry)
+        return Foreseen(entry, (foreseen_note(self.units, estimate, found, self._remedy(design)),))
+
+    def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> dict[str, int]:
+        """Of some records how many end `elsewhere`, and how many leave such `rivals`; empty if untold."""
+        counts = {"runs": runs, "elsewhere": 0, "rivals": 0}
+        for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
+            tell(Counted("records searched from several starts", done, runs))
+            try:
+                estimate, at_home = self._searched(record, rng)
+                found = self._beyond(record, estimate, requirements)
+            except _ENDS:
+                return {}
+            better = any(one.rival.excess < 0.0 for one in found)
+            counts["elsewhere"] += better and not at_home
+            counts["rivals"] += bool(found)
+        return counts
+
+    def _searched(self, record: Array, rng: np.random.Generator) -> tuple[Estimate, bool]:
+        return searched_run(self.nominal, record, self.units.step, rng, self.earlier)
+
+    def _beyond(self, record: Array, estimate: Estimate, requirements: Sequence[Requirement]) -> list[Apart]:
+        if self.knowledge is not None:
+            known = tuple(one for one in estimate.rivals if self.knowledge.admits(one.theta))
+            estimate = replace(estimate, rivals=known)
+        model, errors = self.nominal.model.at(estimate.theta), model_errors(requirements)
+        if errors:
+            return beyond_admissible(model, estimate, errors)
+        plant = FiniteRecord(self.nominal, len(record), self.units.step)
+        unstated: Sequence[OnModelError] = self.entries
+        return beyond_errors(model, estimate, unstated, plant.information(record))
+
+    def _not_now(self, samples: int) -> str:
+        """Why nothing is looked for; empty where it is."""
+        if not self.looks:
+            return "solver.any_spectrum: false (or --fast)"
+        nominal = self.nominal
+        seconds = _SECONDS * samples * nominal.inputs * nominal.model.outputs * len(nominal.model.names)
+        if seconds > _LONGEST:
+            return "the record is long"
+        try:
+            return f"{what_ended()} left no time" if seconds > seconds_left() else ""
+        except OutOfTimeError:
+            return f"{what_ended()} left no time"
+
+    def _remedy(self, design: Result) -> str:
+        """The advice, and before it the cheapest spectrum that is found to leave no rivals."""
+        best = (np.inf, "")
+        for words, solved in self.richer.items():
+            try:
+                seconds_left()
+                other = solved()
+            except _ENDS:
+                continue
+            if other.get("foreseen", {}).get("rivals") == []:
+                best = min(
+                    best, (_price(other), f"spectrum: {words} leaves none{_instead(design, other)}; or ")
+                )
+            if best[0] <= _CHEAP * _price(design):
+                break
+        return best[1] + self.advice
+
+
+def _price(design: Result) -> float:
+    """What a design takes: its cost, or its samples; nothing where it is the best of a given cost."""
+    kind = design["objective"]["kind"]
+    return float(design["cost"] if kind == "least_cost" else design["samples"])
+
+
+def _instead(design: Result, other: Result) -> str:
+    """What another design takes."""
+    kind = design["objective"]["kind"]
+    if kind == "shortest_experiment":
+        return f", with {other['samples']} samples instead of {design['samples']}"
+    if kind == "least_cost":
+        return f", at a cost of {other['cost']:.4g} instead of {design['cost']:.4g}"
+    return ""

@@ -1,0 +1,340 @@
+"""Design -> the record to be applied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.cost import Weight, weights_of
+from inputdesign_cli.design.convex.demands import FEW
+from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
+from inputdesign_cli.monte_carlo.excitations import Redrawn
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.signal import (
+    Bounds,
+    DesignedSpectrum,
+    Record,
+    SignalGenerator,
+    SignalSettings,
+    Target,
+    best_record,
+    limited_responses,
+    peak_share,
+)
+from inputdesign_cli.signal.evaluation import MET
+
+# Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
+# those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
+_UNTOLD = 1e-12
+_TAKES_PART = 1e-6
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """How a record is handed over.
+
+    Args:
+        operating_points: (r,) what is added to the record of each input; None when nothing was asked.
+        also: files beside signal.csv: "mat", "npz", "h", "wav".
+        full_scale: what full scale stands for in a WAV file; the largest value when None.
+        sampling_rate: samples a second.
+    """
+
+    operating_points: Array | None = None
+    also: tuple[str, ...] = ()
+    full_scale: float | None = None
+    sampling_rate: float = 1.0
+
+
+@dataclass(frozen=True)
+class RecordRequest:
+    """What a spec asks of its record.
+
+    Args:
+        bounds: on single samples; those on powers are the design's.
+        cost: weights of the powers, see `Target`.
+        band: of the excitation, in rad per sample.
+        step: time between samples in the unit of the experiment's frequencies.
+        samples: length; that of the experiment when None.
+        meets: whether the record itself is to meet the accuracy; else it has the power of the design.
+        most_samples: the longest experiment, where one is looked for.
+        longest: samples of the longest record that is computed at all.
+        limit_keys: of the spec, for what limits single samples.
+        stated_method: whether the spec states the kind of signal.
+        others: kinds of signals that may stand in for one that does not fit.
+        units: in which lengths are told.
+    """
+
+    settings: SignalSettings
+    bounds: Bounds
+    cost: Mapping[PowerKind, Weight]
+    units: Units
+    band: tuple[float, float] = (0.0, np.pi)
+    step: float = 1.0
+    samples: int | None = None
+    meets: bool = True
+    most_samples: int | None = None
+    longest: int = 2**20
+    limit_keys: tuple[str, ...] = ()
+    stated_method: bool = False
+    others: tuple[SignalSettings, ...] = ()
+    delivery: Delivery = Delivery()
+
+    def length(self, experiment: int) -> int:
+        """Samples of the record of an experiment of so many: whole periods of held values."""
+        block = self.settings.block
+        return -(-(self.samples or experiment) // block) * block
+
+    @property
+    def searched(self) -> bool:
+        """Whether a record that misses the accuracy is not an answer, so that others are looked for."""
+        return self.bounds.hard and self.settings.level is None
+
+    def feasible(self, experiment: int, least: int) -> bool:
+        """Whether a record of this length is computed, with at least so many values a period."""
+        samples = self.length(experiment)
+        return samples <= self.longest and self.settings.period(samples) >= least
+
+
+@dataclass(frozen=True)
+class Made:
+    """A record with what it realises: the request that made it, and the design whose spectrum it has.
+
+    `input_power` limits that design, where it is not the one that was asked for.
+    """
+
+    record: Record | None
+    request: RecordRequest
+    design: Design
+    input_power: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def entry(self) -> dict[str, Json]:
+        """What `signal` of the result adds about another spectrum."""
+        return {} if self.input_power is None else {"spectrum_of": {"input_power": self.input_power}}
+
+
+def make_record(
+    request: RecordRequest, design: Design, experiment_samples: int, *, first: bool = False
+) -> Record | None:
+    """The best of several records of the designed spectrum.
+
+    Best is the least power that meets the requirements of every scenario by the record itself, or the best
+    criterion of the plant where it is worst. None when
+    no excitation is needed, or when the record would be too short (criteria per sample without
+    `signal.samples`) or longer than any that is computed.
+
+    Args:
+        experiment_samples: samples of the experiment, and of the record where the request states no other.
+        first: whether to take the first that meets the requirements, whatever it costs.
+    """
+    problem, settings = design.problem, request.settings
+    # In the coordinates of this design, which are those of its requirements.
+    experiment = replace(problem.experiment, samples=experiment_samples)
+    samples = request.length(experiment_samples)
+    feasible = request.feasible(experiment_samples, least_period(experiment.inputs))
+    if not design.result.x.any() or not feasible:
+        return None
+    upper = tuple(
+        (limit.kind, limit.channel, limit.bound)
+        for limit in problem.limits
+        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single ones are limited
+    )
+    bounds = replace(request.bounds, powers=upper)
+    meets = problem.goal != "factor" and request.meets
+    cost = design_cost(design, request.cost)
+    plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
+    scores = [_score(scenario.requirements) for scenario in problem.scenarios]
+    bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in problem.scenarios]
+
+    def target_at(numbers: Sequence[int]) -> Target:
+        def largest(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
+            return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+
+        least = partial(largest, bounding) if meets else None
+        return Target(partial(largest, scores), meets, request.cost, cost, least)
+
+    spectrum = designed_spectrum(request, design, experiment.inputs)
+
+    limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
+    generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
+    others = {n: FiniteRecord(plant, samples, request.step) for n, plant in enumerate(plants)}
+
+    def beyond_peaks(record: Array, which: Iterable[int]) -> list[int]:
+        return _worst_few({n: peak_share(others[n], bounds, record) for n in which}, MET)
+
+    numbers, limiting = _binding(design), [0]
+    if len(plants) > 1 and bounds.hard:  # those that answer most to one record do so to others
+        values = generator.values(np.random.default_rng(settings.seed))
+        limiting += beyond_peaks(np.repeat(values, settings.hold, axis=0), range(1, len(plants)))
+
+    def together(which: Sequence[int]) -> FiniteRecords:
+        return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
+
+    while True:
+        at, target = together(numbers), target_at(numbers)
+        record = best_record(generator, at, target, bounds, first=first, limiting=together(limiting))
+        least = max(record.worst_ratio, MET) if meets else record.worst_ratio
+        left = [n for n in range(len(plants)) if n not in numbers]
+        missed = _worst_few({n: _ratio_at(others[n], scores[n], record) for n in left}, least)
+        beyond = _worst_few({n: _power_share(others[n], upper, record) for n in left if n not in missed}, MET)
+        higher = beyond_peaks(record.samples, [n for n in others if n not in limiting])
+        if not (missed or beyond or higher):
+            return record
+        numbers += [*missed, *beyond]
+        limiting += higher
+
+
+def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:
+    """The numbers of the largest that are larger: what serves these serves most of the others."""
+    return sorted((n for n, figure in figures.items() if figure > most), key=lambda n: -figures[n])[:FEW]
+
+
+def peak_at(request: RecordRequest, design: Design, record: Record) -> Callable[[Experiment], float] | None:
+    """The largest share of a limit on single samples that a record uses at a plant; None: it is the same."""
+    bounds, n = request.bounds, len(record.samples)
+    if bounds.output is None and (design.problem.experiment.loop is None or not bounds.hard):
+        return None
+
+    def share(plant: Experiment) -> float:
+        return peak_share(FiniteRecord(replace(plant, samples=n), n, request.step), bounds, record.samples)
+
+    return share
+
+
+def _binding(design: Design) -> list[int]:
+    """The nominal plant, and the scenarios that bind the design."""
+    shares = design.result.certificate.shares
+    return [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
+
+
+def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Record) -> float:
+    """The worst ratio of a record at one plant."""
+    try:
+        return score(plant.information(record.samples))
+    except np.linalg.LinAlgError:
+        return np.inf
+
+
+def _power_share(
+    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
+) -> float:
+    """The largest share of a limit on powers that a record uses at one plant, where the plant takes part."""
+    powers = {
+        kind: plant.mean_squares(kind, record.samples)
+        for kind, _, _ in limits
+        if plant.experiment.depends_on_plant(kind)
+    }
+    used = (
+        float(powers[kind].sum() if channel is None else powers[kind][channel]) / most
+        for kind, channel, most in limits
+        if kind in powers
+    )
+    return max(used, default=0.0)
+
+
+def ratio_before(design: Design, step: float) -> float:
+    """The worst ratio of what is known before any excitation, at the plant where it is worst.
+
+    Args:
+        step: the sample time, in the unit of the experiment's frequencies.
+    """
+    ratios = []
+    for scenario in design.problem.scenarios:
+        silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)
+        score = _largest(scenario.requirements, lambda r, M: r.least(M))
+        try:
+            ratios.append(score(silent.information(np.zeros((1, scenario.experiment.inputs)))))
+        except np.linalg.LinAlgError:
+            return np.inf
+    return max(ratios)
+
+
+def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
+    """Samples of records as long as the experiment, in whole periods; None where none are computed."""
+    whole = replace(request, samples=None)
+    inputs, samples = experiment.inputs, experiment.samples
+    return whole.length(samples) if whole.feasible(samples, least_period(inputs)) else None
+
+
+def redrawn(request: RecordRequest, design: Design, inputs: int, samples: int) -> Redrawn:
+    """Other records of the designed spectrum, of so many samples, phases of sinusoids uniformly."""
+    settings, found = request.settings, design.result
+    if settings.phases != "random":
+        settings = replace(settings, phases="orthogonal")
+    spectrum = designed_spectrum(request, design, inputs)
+    generator = SignalGenerator(spectrum, settings, samples, request.band)
+    return Redrawn("design", generator, found.basis, found.x)
+
+
+def given_record(
+    request: RecordRequest,
+    experiment: Experiment,
+    spectrum: DesignedSpectrum,
+    ratio: Callable[[Array], float],
+) -> Record | None:
+    """One record of a spectrum that was given, of its power as far as the limits on samples allow.
+
+    None when it would be too short or too long.
+    """
+    settings = replace(request.settings, candidates=1, most_candidates=1)
+    samples = request.length(experiment.samples)
+    if not request.feasible(experiment.samples, least_period(experiment.inputs)):
+        return None
+    limited = partial(limited_responses, experiment, request.bounds, request.step, settings.hold)
+    generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
+    plant = FiniteRecord(experiment, samples, request.step)
+    return best_record(generator, plant, Target(ratio), request.bounds)
+
+
+def designed_spectrum(request: RecordRequest, design: Design, inputs: int) -> DesignedSpectrum:
+    """The spectrum of a design, for values as far apart as asked."""
+    return DesignedSpectrum.of(design.result.basis, design.result.x, inputs=inputs, step=request.step)
+
+
+def least_period(inputs: int) -> int:
+    """Values that a period must have: two, and with several inputs eight in the block of each."""
+    return 2 if inputs == 1 else 8 * inputs
+
+
+def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
+    """The largest ratio of several requirements as a function of the information of a record; 0 for none.
+
+    It raises `LinAlgError` where rounding would decide: the record tells parameters apart by less than that.
+    """
+    return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
+
+
+def _largest(
+    requirements: Sequence[Requirement], of: Callable[[Requirement, Array], float]
+) -> Callable[[Array], float]:
+    def ratio(information: Array) -> float:
+        eigenvalues = np.linalg.eigvalsh(information)
+        if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
+            raise np.linalg.LinAlgError
+        return max((of(requirement, information) for requirement in requirements), default=0.0)
+
+    return ratio
+
+
+def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
+    """What ranks records: a criterion by itself, to be large, other requirements by their worst ratio."""
+    criterion = criterion_of(requirements)
+    if criterion is None:
+        return worst_ratio(requirements)
+    return lambda information: -criterion.level(information)
+
+
+def design_cost(design: Design, weights: Mapping[PowerKind, Weight]) -> float:
+    """What the powers of a design cost at these weights."""
+    at, x = design.problem.on(design.result.basis), design.result.x
+    return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))

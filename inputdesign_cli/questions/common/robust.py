@@ -1,0 +1,238 @@
+"""Designs for every plant that the true one might be: what was drawn, what the design keeps there.
+
+All that is said of plants that were not drawn is said under the distribution of the draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.design.convex.cost import Paid
+from inputdesign_cli.design.convex.designs import Design, solve_design
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.question import Alternative, Question
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.information import jointly_whitened
+from inputdesign_cli.questions.common.region import Region
+
+CONFIDENCE = 0.999
+"""Of the statements on plants that were not drawn."""
+MET = 1.0 + 1e-6
+# While the dearest plants are sought a rough optimum will do.
+_ROUGH = 1e-4
+_TAKES_PART = 1e-6
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Plants with parameters `thetas` (S, k), and how many were drawn until so many were stable."""
+
+    thetas: Array
+    plants: tuple[Alternative, ...]
+    drawn: int
+
+    @property
+    def rejected(self) -> int:
+        """How many were unstable."""
+        return self.drawn - len(self.plants)
+
+    def only(self, kept: Sequence[int]) -> Batch:
+        """The plants with these numbers."""
+        return replace(self, thetas=self.thetas[list(kept)], plants=tuple(self.plants[i] for i in kept))
+
+
+@dataclass(frozen=True)
+class Kept:
+    """How near a plant comes to missing what is asked: ratio over what is admitted, and where.
+
+    `cost` is that of the design at the plant, where that is looked at.
+    """
+
+    share: float
+    frequency: float | None = None
+    cost: float = 0.0
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The worst plant that was found in a region, at `theta` (k,), and what it keeps.
+
+    `tried` plants were looked at in the last search; `added` were found before and are served by the design.
+    """
+
+    region: str
+    theta: Array
+    kept: Kept
+    tried: int
+    added: int
+
+
+@dataclass(frozen=True)
+class Plants:
+    """The scenarios of a design.
+
+    Args:
+        batch: the plants beside the nominal one.
+        source: the key of the spec that they come from.
+        names: of the k parameters.
+        r_adm: as the spec has it.
+        paid: see `Problem`.
+        discard: how many of the plants the design may leave out.
+        afresh: draws others from the same distribution, a few at a time; None where plants were listed.
+        fresh: how many of these were asked for.
+        at: the plant with parameters (k,), None where they are none; not given where plants were listed.
+        unknowns: of the program, None where they have no number.
+        region: where the design is to serve the worst plant that is found, too; `searched` what was found.
+    """
+
+    batch: Batch
+    source: str
+    names: tuple[str, ...]
+    r_adm: str
+    paid: Paid
+    discard: int = 0
+    afresh: Callable[[], Iterator[Batch]] | None = None
+    fresh: int = 0
+    at: Callable[[Array], Alternative | None] | None = None
+    unknowns: int | None = None
+    region: Region | None = None
+    searched: Searched | None = None
+
+
+def without_dearest(question: Question, design: Design, discard: int) -> list[int]:
+    """The numbers of the `others` that stay when those that raise the optimum most are left out, one by one.
+
+    Of the plants that bind those of the largest multipliers go first, and others take their place.
+    """
+    kept = list(range(len(question.others)))
+    while discard > 0:
+        weight = design.result.certificate.shares[1:]
+        dear = [n for n in np.argsort(-weight, kind="stable").tolist() if weight[n] > _TAKES_PART]
+        # Half of those that bind at a time: a plant that goes frees others.
+        gone = set(dear[: min(discard, max(len(dear) // 2, 1))])
+        if not gone:
+            break
+        kept = [number for place, number in enumerate(kept) if place not in gone]
+        discard -= len(gone)
+        if discard > 0:
+            fewer = replace(question, others=[question.others[number] for number in kept])
+            design = solve_design(fewer, tolerance=_ROUGH, any_spectrum_tolerance=None)
+    return kept
+
+
+def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
+    """How near each scenario of the problem comes to missing what the design promises; the nominal one first.
+
+    Args:
+        problem: of the design, on the basis of its answer.
+        samples: of the delivered experiment.
+    """
+    return _worst(problem, design, delivered(problem, design, samples))
+
+
+def _worst(
+    problem: Problem, design: Design, informations: NDArray[np.float64], above: float = -np.inf
+) -> list[Kept]:
+    """The same with M_s (S, k, k), a share up to `above` being told as 0."""
+    worst = [Kept(0.0)] * len(problem.scenarios)
+    for side in (False, True):
+        admitted = _admitted(design.problem, design, side=side)
+        for index, violation in problem.demands.violations(informations, above=above * admitted, side=side):
+            number, share = problem.demands.asked[index].scenario, violation.ratio / admitted
+            if share > worst[number].share:
+                worst[number] = Kept(share, violation.frequency)
+    return worst
+
+
+def delivered_samples(design: Design) -> int:
+    """Of the experiment: a whole number where the shortest one is sought."""
+    if design.problem.goal != "samples":
+        return design.problem.experiment.samples
+    return max(int(np.ceil(design.result.s * (1 - 1e-9))), 1)
+
+
+def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.float64]:
+    """(S, k, k): what the spectrum tells of each scenario over so many samples."""
+    if problem.goal != "samples":
+        return design.result.informations
+    return problem.fixed_information + samples * (
+        problem.scaled_information + problem.excited(design.result.x)
+    )
+
+
+def _admitted(problem: Problem, design: Design, *, side: bool) -> float:
+    """The ratio that a requirement may have: where the best accuracy is sought the one that is reached."""
+    return float(np.sqrt(design.result.objective)) if problem.goal == "factor" and not side else 1.0
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A plant that the design was not made for: what it keeps, and what is asked there."""
+
+    kept: Kept
+    asked: tuple[Requirement, ...]
+
+
+def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Tried]:
+    """What plants keep that the design was not made for.
+
+    Args:
+        above: a share up to this one is told as 0, since no peak as low is searched to the last digit.
+    """
+    seconds_left()
+    try:
+        at = _at(design, samples, batch.plants)
+        kept = _worst(at, design, at.informations(design.result.x), above)
+        if at.paid == "worst" and at.goal == "cost":
+            costs = [cost.at(design.result.x) for cost in at.costs]
+            kept = [replace(one, cost=costs[i % len(costs)]) for i, one in enumerate(kept)]
+    except (np.linalg.LinAlgError, IdesignError):
+        if len(batch.plants) > 1:  # one of them is to blame, or more
+            each = (batch.only([place]) for place in range(len(batch.plants)))
+            return [tried for own in each for tried in tried_on(design, samples, own, above=above)]
+        (plant,) = batch.plants  # the experiment does not tell everything of it
+        own = plant.at(plant.experiment)
+        return [Tried(Kept(np.inf), (*own.requirements, *own.side))]
+    asked = ((*scenario.requirements, *scenario.side) for scenario in at.scenarios)
+    return [Tried(*both) for both in zip(kept, asked, strict=True)]
+
+
+def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:
+    """Parameters (k,) that data of the design may tell where this is the true plant: one draw.
+
+    None where the experiment does not tell them all.
+    """
+    try:
+        alone = _at(design, samples, [plant])
+        (information,) = alone.informations(design.result.x)
+        root = alone.experiment.factor @ np.linalg.cholesky(information)
+        scatter = np.linalg.solve(root.T, rng.standard_normal(len(root)))
+    except (np.linalg.LinAlgError, IdesignError):
+        return None
+    return plant.experiment.model.theta + scatter
+
+
+def _at(design: Design, samples: int, plants: Sequence[Alternative]) -> Problem:
+    """What is asked at plants that the design was not made for, each in coordinates of its own."""
+    on = design.problem.on(design.result.basis)
+    power = max(on.power("excitation").at(design.result.x), np.finfo(float).tiny)
+    of_length = [replace(plant.experiment, samples=samples) for plant in plants]
+    whitened = jointly_whitened(of_length, power)
+    first, *others = (plant.at(own) for plant, own in zip(plants, whitened, strict=True))
+    return replace(
+        design.problem,
+        experiment=first.experiment,
+        requirements=first.requirements,
+        side=first.side,
+        others=tuple(others),
+        limits=(),
+        basis=on.basis,
+        finer=None,
+    )

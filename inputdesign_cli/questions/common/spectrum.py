@@ -1,0 +1,162 @@
+"""The designed or given spectrum as result entry, table and curves, and where its power pays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.outcome.curves import OptimalityCurves, SpectrumCurves
+from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.spectrum import Basis, TabulatedSpectrum, best_directions, matrices
+
+_POINTS = 800
+# Logarithmic axes start where the band does, or three decades below its end if it starts at zero.
+_DECADES = 1e-3
+_ZERO = 1e-5
+_PRICED = 1e-12
+_SUPPORT = 1e-3
+_ROUNDING = 1e-9
+
+
+def axis(lo: float, hi: float, extra: Array) -> Array:
+    """Frequencies that look smooth on a logarithmic axis, with the `extra` ones among them."""
+    start = lo if lo > _ZERO * hi else _DECADES * hi
+    inside = extra[(extra >= start) & (extra <= hi)]
+    smooth = [np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2)]
+    w = _apart(np.concatenate([*smooth, inside]), _ROUNDING, 0.0)
+    w[-1] = hi
+    return w
+
+
+def distinct(w: Array, highest: float) -> Array:
+    """One frequency for each cluster within 0.3 %: the exchange visits an optimum several times.
+
+    Below a millionth of the `highest` of the band, the first stands for all.
+    """
+    return _apart(w, 3e-3, 1e-6 * highest)
+
+
+def _apart(w: Array, relative: float, absolute: float) -> Array:
+    """The frequencies in order, without those that hardly differ from the one before."""
+    ordered = np.sort(w)
+    return ordered[np.diff(ordered, prepend=-np.inf) > np.maximum(relative * ordered, absolute)]
+
+
+def hermitian_columns(values: NDArray, symbol: str) -> dict[str, Array]:
+    """Columns phi_11, phi_12_re, phi_12_im, phi_22, .. of values (n, r, r); phi of one input."""
+    if values.shape[1] == 1:
+        return {symbol: values[:, 0, 0].real}
+    columns = {}
+    for i in range(values.shape[1]):
+        columns[f"{symbol}_{i + 1}{i + 1}"] = values[:, i, i].real
+        for j in range(i + 1, values.shape[2]):
+            columns[f"{symbol}_{i + 1}{j + 1}_re"] = values[:, i, j].real
+            columns[f"{symbol}_{i + 1}{j + 1}_im"] = values[:, i, j].imag
+    return columns
+
+
+def spectrum_curves(
+    units: Units,
+    basis: Basis | TabulatedSpectrum,
+    x: Array,
+    band: tuple[float, float],
+    *,
+    white: float | None = None,
+) -> tuple[Table, SpectrumCurves]:
+    """spectrum.csv and its plot: a density over the band, or sinusoids with their powers.
+
+    Args:
+        band: of the excitation, in the unit of the experiment.
+        white: the flat level to compare with.
+    """
+    if basis.has_density:
+        w = np.unique(np.concatenate([[band[0]], axis(*band, basis.knots)]))
+        symbol, values = "phi", matrices(basis.density(x, w)).astype(complex)
+    else:
+        w, values = basis.lines(x)
+        symbol = "power"
+    frequency = w / units.frequency
+    table = Table({units.frequency_header: frequency, **hermitian_columns(values, symbol)})
+    curves = SpectrumCurves(
+        frequency,
+        values,
+        white=white,
+        lines=not basis.has_density,
+        symbol=units.excitation,
+        band=(band[0] / units.frequency, band[1] / units.frequency),
+    )
+    return table, curves
+
+
+def with_periodogram(
+    units: Units, table: Table, curves: SpectrumCurves, samples: Array
+) -> tuple[Table, SpectrumCurves]:
+    """The spectrum with the smoothed periodogram of each channel of the record (n, r) over it.
+
+    Lines are left as they are.
+    """
+    if curves.lines:
+        return table, curves
+    shown, columns = [], {}
+    for a, column in enumerate(samples.T):
+        w, smooth = _smoothed_periodogram(column, units.sample_time)
+        # Per rad/sample in discrete time, per rad per time unit in continuous time, as the design.
+        density = smooth * (1.0 if units.sampled else units.sample_time)
+        shown.append(np.interp(curves.frequency, w, density))
+        columns[f"phi_record{f'_{a + 1}{a + 1}' if units.inputs > 1 else ''}"] = shown[-1]
+    return Table({**table.columns, **columns}), replace(curves, record=np.stack(shown, axis=1))
+
+
+def _smoothed_periodogram(samples: Array, step: float) -> tuple[Array, Array]:
+    """Frequencies in rad per unit of the `step`, and the smoothed periodogram there of samples (n,)."""
+    periodogram = np.abs(np.fft.rfft(samples)) ** 2 / samples.size
+    reach = int(samples.size**0.4 / 4)
+    window = np.ones(2 * reach + 1) / (2 * reach + 1)
+    smooth = np.convolve(np.pad(periodogram, reach, mode="reflect"), window, mode="valid")
+    return 2 * np.pi * np.arange(periodogram.size) / samples.size / step, smooth
+
+
+def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCurves] | None:
+    """optimality.csv and its plot: the worth of the best direction at each frequency over its price.
+
+    By the bound over every spectrum: at most one everywhere, and one where power pays. None where there is
+    no such bound.
+    """
+    anything = design.any_spectrum
+    if anything is None:
+        return None
+    price, value = anything.certificate.price, anything.certificate.value
+    if price is None or value is None:
+        return None
+    lines, powers = anything.basis.lines(anything.x)
+    # By what is paid, not by power: power is almost free near DC in a loop with integral action.
+    paid = np.einsum("nab,nba->n", matrices(price.density(lines)), powers).real
+    support = lines[paid > _SUPPORT * paid.sum()]
+    w = axis(*design.problem.experiment.band, support)
+    costs = price.density(w)
+    size = np.einsum("naa->n", matrices(costs)).real
+    seen = size > _PRICED * size.max()
+    ratio, _ = best_directions(costs[seen], value.density(w)[seen])
+    marks = distinct(np.maximum(support, w[0]), w[-1])
+    frequency = w[seen] / units.frequency
+    table = Table({units.frequency_header: frequency, "ratio": ratio})
+    return table, OptimalityCurves(frequency, ratio, marks / units.frequency)
+
+
+def spectrum_entry(units: Units, basis: Basis, x: Array) -> dict[str, Json]:
+    """What `result.json` says of a designed spectrum."""
+    return {name: plain_complex(value) for name, value in basis.described(x, units.frequency).items()}
+
+
+def plain_complex(values: Json) -> Json:
+    """Complex numbers as {re, im}; all else as it is."""
+    if not isinstance(values, np.ndarray) or not np.iscomplexobj(values):
+        return values
+    if values.ndim == 0:
+        return {"re": float(values.real), "im": float(values.imag)}
+    return [plain_complex(part) for part in values]

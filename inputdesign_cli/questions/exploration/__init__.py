@@ -1,0 +1,1 @@
+"""Find a model in a log without a spec."""

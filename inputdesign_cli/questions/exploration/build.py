@@ -1,0 +1,196 @@
+"""A model that was found in a log -> a complete spec, commented, and what `identify` makes of it."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
+from inputdesign_cli.identification.explore import Found, output_error_form
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.questions.assessment.build import build_identification
+from inputdesign_cli.questions.assessment.identify import Identification
+from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.tasks.build.log import Log
+
+_MOST_SAMPLES = 100_000
+_DIGITS = 6
+# Before a title, in the quotes of a string.
+_DOUBTED = '"On a model that deserves no trust: '
+
+
+def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
+    """A spec that `idesign solve` accepts: the model, and the most informative input of that power."""
+    power = [float(x) for x in np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)]
+    most = max(power)
+    power = [x if x > 0.0 else most for x in power]
+    low, high = log.u.min(axis=0), log.u.max(axis=0)
+    half = 0.5 * (high - low)
+    half = np.where(half > 0.0, half, half.max())
+    # Six digits of what the input moves by: a level far from zero takes more.
+    places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in half]
+    levels, widths = (
+        [round(float(x), n) for x, n in zip(values, places, strict=True)]
+        for values in (0.5 * (low + high), half)
+    )
+    single = len(power) == 1
+    blocks = blocks_of(found.model)
+    blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
+    structures = ", ".join(
+        f"{'y' if found.model.outputs == 1 else f'y{i + 1}'}: {c.orders.family}"
+        for i, c in enumerate(found.taken)
+    )
+    kind = (
+        f"plants in s by their parameters (times in {log.time_unit}), their inputs held between samples"
+        if any(c.orders.physical for c in found.taken)
+        else "A y = (B/F) u + (C/D) e, polynomials in q^-1"
+    )
+    names = ", ".join(
+        f"{channel} is {' '.join(column.split())}"
+        for channel, column in log.names.items()
+        if channel != "time"
+    )
+    samples = min(len(log.y), _MOST_SAMPLES)
+    limit, amplitude = _numbers([float(f"{x:.6g}") for x in power]), _numbers(widths)
+    ranges = " and ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True))
+    offset = levels[0] if single else levels
+    source = " ".join(" and ".join(path.name for path in sources).split())
+    text = f"""\
+# Written by `idesign explore` from {source}.
+# `idesign solve FILE` designs what it asks; every entry can be changed here or by --set key=value.
+title: {json.dumps(f"The next experiment after {source}")}
+
+sample_time: {log.step!r}          # in time_unit; frequencies are in rad per time_unit
+time_unit: {log.time_unit}
+
+# What the record tells: {kind} ({structures}).
+# {names}
+"""
+    for key, block in blocks.items():
+        if key == "noise" and drawn:
+            text += (
+                f"# Roots of {' and '.join(drawn)} on the circle, drawn into it by one in {len(log.y)}:\n"
+                "# so many samples tell no more, and noise that never fades would count for any experiment.\n"
+            )
+        text += "\n".join([f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())])
+        text += "\n"
+    text += f"""
+experiment:
+  samples: {samples}              # as long as the record; how long may the next one be?
+
+# What the next experiment is for. D: the most informative one within the limits. To ask for an accuracy at
+# the least cost instead, replace these lines by
+#   accuracy: {{model_error: {{relative: 0.05, confidence: 0.95}}}}  # add band: [..] if you like
+accuracy: {{criterion: D}}
+limits:
+  input_power: {limit}            # mean square about the mean, as in the record
+  # amplitude: {amplitude}         # with it every sample stays within the range of the log, {ranges}
+
+# The family of spectra to search, and the signal to apply: about the middle of the range of the log.
+spectrum: {{type: fir, order: 20}}
+signal: {{type: filtered_noise, seed: 1, offset: {json.dumps(offset)}}}
+"""
+    return text
+
+
+def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
+    """A spec that says at its head, and in its title, why its model deserves no trust, and of a loop.
+
+    Args:
+        loop: whether inputs seem to answer the outputs.
+    """
+    told = [f"No model of this record deserves trust, and no design on this one: {one}" for one in reasons]
+    if loop:
+        told.append(
+            "The inputs seem to answer the outputs, as in a loop. Then identify and assess need its "
+            "controller, experiment: {controller: {numerator: [..], denominator: [..]}}; solve then designs "
+            "in the loop."
+        )
+    lines = [textwrap.fill(one, 110, initial_indent="# ", subsequent_indent="#   ") for one in told]
+    head, title, rest = text.partition("\ntitle: ")
+    doubted = f"{title}{_DOUBTED}{rest[1:]}" if reasons else title + rest
+    return "\n".join([head, *lines]) + doubted
+
+
+def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:
+    """The block with roots of C and D no nearer to the unit circle than a record of so many samples tells.
+
+    With it the letters of those that were nearer.
+    """
+    drawn = dict(noise)
+    for letter in {"C", "D"} & noise.keys():
+        rows = noise[letter]
+        several = isinstance(rows[0], list)
+        polynomials = [_contracted(row, 1.0 - 1.0 / samples) for row in (rows if several else [rows])]
+        drawn[letter] = polynomials if several else polynomials[0]
+    return drawn, sorted(letter for letter in noise if drawn[letter] != noise[letter])
+
+
+def _contracted(polynomial: Sequence[float], limit: float) -> list[float]:
+    """In q^-1, all roots scaled by one factor so that they are within a circle; as it is where they are."""
+    radius = float(np.abs(np.roots(polynomial)).max(initial=0.0))
+    if radius <= limit:
+        return list(polynomial)
+    return [float(c * (limit / radius) ** k) for k, c in enumerate(polynomial)]
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """One number as it is, or a list."""
+    listed = ", ".join(f"{x:.10g}" for x in values)
+    return listed if len(values) == 1 else f"[{listed}]"
+
+
+def build_explored(text: str) -> Identification:
+    """What `identify` runs on, of a spec that was written for a log."""
+    return build_identification(parse_spec(text, "spec.yaml"))
+
+
+@contextmanager
+def naming_model(model: Spec) -> Iterator[None]:
+    """Errors of time name the file of the model, which is what counts otherwise than the data."""
+    try:
+        yield
+    except DataError as error:
+        place = model.locate("")
+        name = Path(place.file).name if place else "the model"
+        raise DataError([_named(one, name) for one in error.diagnostics]) from error
+
+
+def _named(one: Diagnostic, model: str) -> Diagnostic:
+    if one.code == "data-wrong-unit":
+        return replace(one, message=f"{one.message}: {model} does")
+    if "data_sample_time" not in one.details:
+        return one
+    hint = (
+        f"if {model} is of data sampled like these, write sample_time: {one.details['data_sample_time']:.6g} "
+        "in it; a model of another sample time cannot be judged by them"
+    )
+    return replace(one, message=f"{one.message} in {model}", hint=hint)
+
+
+def model_to_judge(spec: Spec) -> Model:
+    """The model of a spec that is to be judged by data.
+
+    Raises:
+        SpecError: it is neither of polynomials nor of transfer functions that are sampled.
+    """
+    model = build_model(spec)
+    try:
+        output_error_form(model)
+    except TypeError:
+        raise bad_spec(
+            "not-supported",
+            "models in state space, and in s without sample: zoh, cannot be judged by data in this version",
+            hint="idesign identify DATA --spec MODEL estimates them anew and shows the fit",
+            key="plant",
+        ) from None
+    return model

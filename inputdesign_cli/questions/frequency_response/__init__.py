@@ -1,0 +1,1 @@
+"""Design and measure frequency responses without a model."""

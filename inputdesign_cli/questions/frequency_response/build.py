@@ -1,0 +1,236 @@
+"""Spec -> the question of `accuracy.frequency_response`, checked before anything is computed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.design.response import Goal, ResponseLines
+from inputdesign_cli.errors import bad_spec, refuse
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
+from inputdesign_cli.questions.assessment.build import operating_point
+from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
+from inputdesign_cli.questions.building.model_error import positive_table
+from inputdesign_cli.questions.building.signal_settings import build_record_request
+from inputdesign_cli.questions.building.simulation import build_simulation
+from inputdesign_cli.questions.building.system import build_cost, build_model
+from inputdesign_cli.questions.frequency_response.build_lines import (
+    build_grid,
+    build_periods,
+    stated_response,
+)
+from inputdesign_cli.questions.frequency_response.measure import Measurement
+from inputdesign_cli.questions.frequency_response.solve import KEY, ResponseTask
+from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.spectrum import GivenMultisine
+from inputdesign_cli.tasks.build.header import build_header, build_units
+from inputdesign_cli.tasks.build.tables import has_column
+
+_GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
+_ZERO = 1e-12
+_LIMITS = ("energy", "spectrum")
+_SIGNAL = (
+    "hold",
+    "lines",
+    "amplitudes",
+    "ramp",
+    "bits",
+    "quantisation",
+    "scale",
+    "order",
+    "samples",
+    "start",
+)
+
+
+def build_response_task(spec: Spec) -> ResponseTask:
+    """The task, with all that can be wrong with it already complained of.
+
+    Raises:
+        SpecError: what this version does not design; lines that the period does not have.
+        DataError: a table cannot be used.
+    """
+    stated = stated_response(spec)
+    _check_supported(spec)
+    goal: Goal = "given" if not spec.designs else _GOALS[spec.goal]
+    periods = build_periods(spec)
+    model = build_model(spec)
+    grid = build_grid(spec, periods.period)
+    # The counted length is found where the shortest is asked for; all else is per sample of it.
+    counted = (
+        1 if goal == "samples" else periods.blocks * periods.kept(spec.experiment.samples) * periods.period
+    )
+    G = model.plant_at(grid.frequencies)
+    lines = ResponseLines(G, _noise(spec, model, grid), _admitted(spec, grid, G), stated.relative)
+    experiment = Experiment(model, counted)
+    return ResponseTask(
+        header=build_header(spec),
+        experiment=experiment,
+        grid=grid,
+        lines=lines,
+        periods=periods,
+        goal=goal,
+        given=_given(spec, grid),
+        cost=build_cost(spec),
+        limits=(*build_power_limits(spec), *implied_limits(spec)),
+        most_samples=spec.limits.samples,
+        tolerance=spec.solver.tolerance,
+        tabulated=stated.noise is not None,
+        asked=spec.experiment.samples,
+        record=build_record_request(spec, experiment.size),
+        simulation=build_simulation(spec, experiment),
+    )
+
+
+def build_measurement(spec: Spec) -> Measurement:
+    """How a frequency response is measured by data: the lines of the spec, or what the data excite.
+
+    Raises:
+        SpecError, DataError: see `build_response_task`.
+    """
+    asked = spec.accuracy.frequency_response is not None
+    return Measurement(
+        header=build_header(spec),
+        model=build_model(spec),
+        task=build_response_task(spec) if asked else None,
+        operating_point=operating_point(spec),
+    )
+
+
+def _admitted(spec: Spec, grid: HarmonicGrid, response: ComplexArray) -> NDArray[np.float64]:
+    """r_adm (L, p, r); infinite for entries of G that are zero, where a share of |G| is asked for.
+
+    Raises:
+        SpecError: `admissible-not-positive`.
+    """
+    stated, w, G = stated_response(spec), grid.frequencies, np.abs(response)
+    if stated.absolute is not None:
+        return np.full(G.shape, stated.absolute)
+    if stated.table is not None:
+        return _tabulated(spec, stated.table, w, "r_adm", G.shape[1:]).reshape(G.shape)
+    assert stated.relative is not None
+    units, found = build_units(spec), stated.relative * G
+    largest = G.max(axis=0)
+    for i, j in np.ndindex(G.shape[1:]):
+        if largest[i, j] <= _ZERO * largest.max():
+            found[:, i, j] = np.inf
+            continue
+        low = np.flatnonzero(G[:, i, j] <= _ZERO * largest[i, j])
+        if low.size:
+            raise bad_spec(
+                "admissible-not-positive",
+                f"G{units.entry(i, j)} vanishes at {units.named(w[low[0]])}: no share of it can be met",
+                hint=f"leave the line out, or write {KEY}.absolute",
+                key=f"{KEY}.relative",
+            )
+    if np.any(np.all(np.isinf(found), axis=(0, 1))):
+        raise bad_spec(
+            "admissible-not-positive",
+            "an input moves no output, so that a share of |G| says nothing of its lines",
+            hint=f"drop the input, or write {KEY}.absolute",
+            key=f"{KEY}.relative",
+        )
+    return found
+
+
+def _noise(spec: Spec, model: Model, grid: HarmonicGrid) -> Array:
+    """Phi_v (L, p): that of the model, or of a table."""
+    stated = stated_response(spec)
+    if stated.noise is not None:
+        return _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
+    return NoiseSpectrum.of(model).at(grid.period, grid.excited)
+
+
+def _tabulated(spec: Spec, name: str, w: Array, column: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """(L, entries): a column of a file at the lines, or one column for each output or entry."""
+    key = f"{KEY}.{'table' if column == 'r_adm' else 'noise'}"
+    band = (float(w[0]), float(w[-1]))
+    entries = int(np.prod(shape))
+    single = entries == 1 or not has_column(spec.resolve_path(name), f"{column}_", key=key)
+    if single:
+        return np.repeat(positive_table(spec, name, band, column, key).at(w)[:, None], entries, axis=1)
+    suffixes = ["_" + "".join(str(i + 1) for i in place) for place in np.ndindex(*shape)]
+    return np.stack([positive_table(spec, name, band, f"{column}{s}", key).at(w) for s in suffixes], axis=1)
+
+
+def _given(spec: Spec, grid: HarmonicGrid) -> Array | None:
+    """(L, 1): the powers that a given multisine has at the lines; None where powers are designed.
+
+    Raises:
+        SpecError: `not-supported`, `not-exciting`, `bad-period`.
+    """
+    given = spec.given
+    if given is None:
+        return None
+    match given:
+        case GivenMultisine() if spec.plant.inputs == 1:
+            sinusoids = list(zip(given.frequencies, given.rows[0], strict=True))
+        case _:
+            raise refuse(
+                "spectrum.given",
+                what="tell the deviations of a frequency response by this excitation",
+                hint="give {type: multisine, frequencies, amplitudes} of one input",
+            )
+    powers = np.zeros(grid.excited.size)
+    for n, (frequency, amplitude) in enumerate(sinusoids):
+        place = frequency * spec.sample_time * grid.period / (2.0 * np.pi)
+        if abs(place - np.rint(place)) > 1e-6 * place:
+            raise bad_spec(
+                "bad-period",
+                f"{frequency:.6g} rad/{spec.time_unit} is no harmonic of a period of {grid.period} samples",
+                hint="choose multiples of 2 pi over the duration of a period",
+                key=f"spectrum.given.frequencies[{n}]",
+            )
+        powers[grid.excited == int(np.rint(place))] = 0.5 * amplitude**2
+    silent = np.flatnonzero(powers <= 0.0)
+    if silent.size:
+        at = grid.frequencies[silent[0]] / spec.sample_time
+        raise bad_spec(
+            "not-exciting",
+            f"the given multisine has no power at the line {at:.6g} rad/{spec.time_unit}",
+            hint=f"add it to spectrum.given, or leave it out of {KEY}",
+            key="spectrum.given.frequencies",
+        )
+    return powers[:, None]
+
+
+def _check_supported(spec: Spec) -> None:
+    """Say plainly what is not done for a frequency response, rather than ignore it."""
+    others = [name for name in spec.accuracy.requirements if name != "frequency_response"]
+    for name in (*others, *spec.accuracy.goals):
+        what = f"handle {name} beside frequency_response"
+        raise refuse(f"accuracy.{name}", what=what, hint="keep one of them")
+    if not spec.plant.sampled:
+        what = "measure lines of a plant that is not sampled"
+        raise refuse("plant", what=what, hint="add sample: zoh")
+    if spec.closed_loop:
+        what, hint = "measure a frequency response in closed loop", "remove the controller"
+        raise refuse("experiment.controller", what=what, hint=hint)
+    if spec.experiment.prior is not None:
+        raise refuse("experiment.prior", what="use prior information here", hint="remove it")
+    if any(spec.noise.drifts):
+        what = "measure lines in noise that drifts"
+        raise refuse("noise.drift", what=what, hint="write a root of D inside the unit circle")
+    for name in spec.limits.stated(*_LIMITS):
+        what = f"enforce limits.{name} for a frequency response"
+        raise refuse(f"limits.{name}", what=what, hint="limit powers, amplitude or rate")
+    if spec.limits.band is not None:
+        what, hint = "take limits.band here", f"state {KEY}.band"
+        raise refuse("limits.band", what=what, hint=hint)
+    if spec.spectrum is not None and spec.designs:
+        what, hint = "take a family of spectra here", "remove spectrum: the lines are those of the accuracy"
+        raise refuse("spectrum", what=what, hint=hint)
+    if spec.solver.method != "exchange":
+        what = f"use the method {spec.solver.method} here"
+        raise refuse("solver.method", what=what, hint="remove method")
+    if spec.signal.type not in (None, "multisine"):
+        what = f"make {spec.signal.type} signals here"
+        raise refuse("signal.type", what=what, hint="use multisine")
+    for name in spec.signal.stated(*_SIGNAL):
+        raise refuse(f"signal.{name}", what=f"apply signal.{name} here", hint="remove it")
+    if spec.report.ellipses is not None:
+        raise refuse("report.ellipses", what="draw ellipses here", hint="remove report")

@@ -1,0 +1,1 @@
+"""The accuracy that a given excitation buys."""

@@ -1,0 +1,220 @@
+"""Spec -> the analysis of an excitation that is given: its spectrum, or its samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.findings.limits_not_kept import StatedLimits
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.questions.building.foresight import build_foresight
+from inputdesign_cli.questions.building.given_table import read_given_spectrum
+from inputdesign_cli.questions.building.limits import build_power_limits
+from inputdesign_cli.questions.building.model_error import (
+    build_calibration,
+    model_error_alpha,
+    unstated_errors,
+)
+from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
+from inputdesign_cli.questions.building.signal_checks import check_signal
+from inputdesign_cli.questions.building.signal_settings import build_record_request
+from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
+from inputdesign_cli.questions.building.system import (
+    build_cost,
+    build_experiment,
+    read_excitation_record,
+    record_step,
+)
+from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.common.robust import Plants
+from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
+from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.spectrum import (
+    GivenMultisine,
+    GivenSignal,
+    GivenSpectrum,
+    GivenTable,
+    GivenWhite,
+)
+from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
+from inputdesign_cli.tasks.build.header import build_header, build_units
+
+_REFUSED = ("spectrum", "energy")
+_OF_DESIGNS = ("objective", "campaign")
+# Keys of signals that mean something for a record that the tool makes.
+_MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
+
+
+def build_given(spec: Spec) -> GivenTask:
+    """The task of a given excitation: its requirements, if any, are checked, not met.
+
+    Raises:
+        SpecError, DataError: `nothing-given` when there is no excitation; see the builders of the parts.
+    """
+    if spec.spectrum is None or spec.spectrum.type != "given":
+        raise spec.complain(
+            "nothing-given",
+            "there is no excitation to analyse",
+            hint="give one, spectrum: {given: {type: white, power: 1}}, or design one: idesign solve SPEC",
+            key="spectrum",
+        )
+    check_supported(spec)
+    for name in spec.limits.stated(*_REFUSED):
+        raise spec.complain(
+            "not-supported",
+            f"this version does not compare a given excitation with limits.{name}",
+            hint="remove it",
+            key=f"limits.{name}",
+        )
+    for name in spec.stated(*_OF_DESIGNS):
+        raise spec.complain(
+            "not-supported", f"{name} is of designs, and this excitation is given", hint="remove it", key=name
+        )
+    _check_signal_is_open(spec, spec.spectrum)
+    check_signal(spec)
+    experiment = build_experiment(spec)
+    requirements = build_requirements(spec, experiment)
+    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    check_pairs(spec, experiment.model.names)
+    return GivenTask(
+        header=build_header(spec),
+        experiment=experiment,
+        requirements=requirements,
+        unstated=unstated_errors(spec, experiment),
+        excitation=_excitation(spec, spec.spectrum, experiment),
+        cost=build_cost(spec),
+        alpha=model_error_alpha(spec, experiment.model),
+        calibration=build_calibration(spec),
+        simulator=build_simulator(spec, experiment),
+        limits=_limits(spec),
+        record=build_record_request(spec, experiment.size),
+        ellipses=spec.report.ellipses,
+        simulation=build_simulation(spec, experiment),
+        foresight=build_foresight(spec, experiment, None),
+        criterion=build_criterion(spec, experiment),
+        plants=_build_plants(spec, experiment),
+    )
+
+
+def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
+    """Return the plants of `uncertainty`, at which the requirements are looked at.
+
+    Raises:
+        SpecError: `not-supported` where there is no requirement, and for what is known of the plant of the
+            spec alone: a criterion, costs, limits that depend on the plant.
+    """
+    stated, limits = spec.uncertainty, spec.limits
+    if stated is None:
+        return None
+    amplitude = limits.amplitude
+    depends = spec.closed_loop and limits.bounds_power
+    if depends or limits.output_power is not None or (amplitude is not None and amplitude.output is not None):
+        key, what = "limits", "look at limits that depend on the plant at several plants"
+    elif stated.cost not in (None, "nominal"):
+        key, what = "uncertainty.cost", "weigh what a given excitation costs at several plants"
+    elif spec.accuracy.criterion is not None or not spec.accuracy.requirements:
+        key, what = "uncertainty", "look at several plants without a requirement, or with a criterion"
+    else:
+        plants = build_plants(spec, experiment, None)
+        return None if plants is None else replace(plants, paid="nominal")
+    hint = "remove it, or uncertainty; a design holds for all plants: remove spectrum.given"
+    raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
+
+
+def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
+    """Refuse settings of the signal where the excitation leaves nothing to choose.
+
+    That is a record, and sinusoids in phase over several inputs.
+
+    Raises:
+        SpecError: `not-supported`.
+    """
+    kind = stated.given.type
+    fixed = kind == "signal" or (kind == "multisine" and spec.plant.inputs > 1)
+    for name in spec.signal.stated(*_MADE) if fixed else ():
+        if (name, spec.signal.type) == ("type", "multisine") or (name, spec.signal.phases) == (
+            "phases",
+            "random",
+        ):
+            continue
+        raise spec.complain(
+            "not-supported",
+            f"this version does not apply signal.{name} to this given excitation: its samples are settled",
+            hint="remove it",
+            key=f"signal.{name}",
+        )
+
+
+def _limits(spec: Spec) -> StatedLimits:
+    amplitude = spec.limits.amplitude
+    return StatedLimits(
+        powers=tuple(build_power_limits(spec)),
+        input=None if amplitude is None else amplitude.input,
+        output=None if amplitude is None else amplitude.output,
+        rate=spec.limits.rate,
+        samples=spec.limits.samples,
+    )
+
+
+def _excitation(spec: Spec, stated: GivenSpectrum, experiment: Experiment) -> GivenExcitation:
+    """The excitation that stands under `spectrum.given`.
+
+    A power of white excitation is spread evenly over the channels unless there is one for each. The
+    sinusoids of one frequency are in phase over the channels; a negative amplitude is in counterphase.
+
+    Raises:
+        DataError: its file cannot be used.
+    """
+    r = experiment.inputs
+    match stated.given:
+        case GivenSignal() as given:
+            return _recorded(spec, experiment, given)
+        case GivenWhite(power=power):
+            powers = np.array(power if isinstance(power, tuple) else [power / r] * r, dtype=float)
+            white = TabulatedSpectrum.white(powers, experiment.band)
+            return GivenExcitation.spectral("white", white, np.ones(1), experiment)
+        case GivenMultisine() as given:
+            frequencies, amplitudes = _sinusoids(spec, given)
+            constant = (frequencies <= 0.0) | (spec.plant.sampled & (frequencies >= np.pi))
+            size = np.linalg.norm(amplitudes, axis=1)
+            lines = LinesBasis(frequencies, amplitudes / size[:, None] + 0j, frequencies, np.ones(r))
+            x = np.where(constant, 1.0, 0.5) * size**2
+            return GivenExcitation.spectral(
+                "multisine", lines, x, experiment, sinusoids=(frequencies, amplitudes)
+            )
+        case GivenTable() as given:
+            basis, x = read_given_spectrum(spec, given.file, r)
+            return GivenExcitation.spectral("table", basis, x, experiment)
+
+
+def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
+    """Frequencies (L,) in the unit of the experiment and amplitudes (L, r), of those that are not zero."""
+    frequencies = np.array(given.frequencies) * build_units(spec).frequency
+    if spec.plant.sampled:
+        frequencies = np.minimum(frequencies, np.pi)
+    amplitudes = np.array(given.rows, dtype=float).T
+    there = np.any(amplitudes != 0.0, axis=1)
+    if not there.any():
+        raise spec.complain(
+            "not-exciting",
+            "all amplitudes are zero: nothing is excited",
+            hint="give the sinusoids amplitudes",
+            key="spectrum.given.amplitudes",
+        )
+    return frequencies[there], amplitudes[there]
+
+
+def _recorded(spec: Spec, experiment: Experiment, given: GivenSignal) -> GivenExcitation:
+    samples = read_excitation_record(spec, given.signal, "spectrum.given.signal")
+    plant = FiniteRecord(experiment, len(samples), record_step(spec))
+    power: dict[PowerKind, list[float]] = {
+        kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS
+    }
+
+    def information(coordinates: Experiment) -> Array:
+        return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
+
+    return GivenExcitation("signal", power, information, samples=samples)

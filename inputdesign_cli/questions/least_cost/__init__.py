@@ -1,0 +1,1 @@
+"""The cheapest, most accurate or shortest experiment within limits, with its proof."""

@@ -1,0 +1,283 @@
+"""The last check of a design: what is about to be written, reread, and evaluated by other means.
+
+The spectrum is that of `result.json` as text, not that of the solver. Its information comes from a rule of
+its own: four Gauss points on intervals of the grid on which peaks are sought.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev, legendre, polynomial
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.design.convex.cost import paid_for, weights_of
+from inputdesign_cli.design.convex.demands import Scenario
+from inputdesign_cli.design.convex.problem import Goal
+from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.text_formats import json_text
+from inputdesign_cli.plant import graded_grid
+from inputdesign_cli.questions.common.robust import kept_by
+from inputdesign_cli.questions.least_cost.outcome import Designed
+
+# Two ways to the same number may differ by this share of it.
+_APART = 1e-6
+# A plant that keeps less than this share of what is admitted is not looked at again.
+_DOUBTFUL = 0.9
+_NODES_AT_ONCE = 1024
+# Steps of the grid, a fortieth of the distance to a pole each, to an interval of the rule; fewer where the
+# spectrum itself varies faster.
+_STEPS = 4
+_FAST = 200
+# The highest peaks on the grid are looked at more closely, so many points at a time. Where r_adm of a plant
+# passes that of its floor they have kinks, at which what is missed is in proportion to the last step.
+_PEAKS, _ZOOMS, _INSIDE = 8, 8, 17
+_KNOWN = ("white", "fir", "polynomial")
+_TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
+
+
+def audit(done: Designed, result: Mapping[str, Json], *, on_grid: bool, loose: float = 0.0) -> None:
+    """Compare what the result claims with what its own spectrum gives, at the nominal plant and all others.
+
+    Args:
+        on_grid: the requirements hold on the grid of the papers' program only, and are not claimed between.
+        loose: what the value and its bounds may differ by where more than rounding parts them, as a share.
+
+    Raises:
+        InaccurateError: `internal-disagreement`.
+    """
+    apart = max(_APART, loose)
+    for claim in _Audit(done, json.loads(json_text(result)), apart).disagreements(on_grid):
+        raise InaccurateError.because(
+            "internal-disagreement",
+            claim,
+            hint="rescale the signals, restrict the band, or look for poles near the unit circle; if the "
+            "spec is plain, please report it: the spec is enough to see the same",
+            key="accuracy",
+        )
+
+
+@dataclass(frozen=True)
+class _Audit:
+    done: Designed
+    written: dict[str, Json]
+    apart: float
+
+    def disagreements(self, on_grid: bool) -> Iterator[str]:
+        """What the result claims and its spectrum does not give, one sentence each."""
+        yield from self._bounds()
+        if self.written["status"] == "nothing_needed":
+            return
+        goal, value = self.done.question.goal, self.written["objective"]["value"]
+        problem = self.done.design.problem
+        plants = [_Reread(self.done, self.written, scenario) for scenario in problem.scenarios]
+        for reread in self._doubtful(plants) if not on_grid else ():
+            yield from reread.missed(goal)
+        if goal == "factor":
+            yield from self._reached(plants, value)
+        weights = weights_of(self.done.cost)
+        costs = [
+            sum(w * plants[number].power(kind, channel) for kind, channel, w in weights)
+            for number in problem.paying
+        ]
+        cost = paid_for(problem.paid, costs)
+        if not abs(cost - self.written["cost"]) <= _APART * cost:
+            yield f"the spectrum costs {cost:.10g}, not {self.written['cost']:.10g}"
+        for limit in self.done.question.limits:
+            for number in (problem.limits[index].scenario for index in limit.everywhere(problem.limits)):
+                power = plants[number].power(limit.kind, limit.channel)
+                excess = power - limit.bound if limit.upper else limit.bound - power
+                if not excess <= _APART * limit.bound:
+                    yield f"{limit.key} is {limit.bound:.6g}, but the spectrum has {power:.10g}"
+
+    def _doubtful(self, plants: list[_Reread]) -> list[_Reread]:
+        """The nominal plant, and those that keep nearly all that is admitted."""
+        kept = kept_by(self.done.problem, self.done.design, self.done.experiment.samples)
+        pairs = list(zip(plants, kept, strict=True))
+        return [reread for n, (reread, one) in enumerate(pairs) if n == 0 or one.share > _DOUBTFUL]
+
+    def _bounds(self) -> Iterator[str]:
+        """No value lies beyond a bound that is called proved."""
+        objective = self.written["objective"]
+        value, largest = objective["value"], "upper_bound" in objective
+        size = max(abs(value), float(self.done.experiment.size) if objective["kind"] == "D" else 0.0)
+        for name in ("upper_bound", "lower_bound", "any_spectrum_bound"):
+            beyond = value - objective.get(name, value)
+            if not (beyond if largest else -beyond) <= self.apart * size:
+                yield f"the value {value:.10g} lies beyond {name} ({objective[name]:.10g})"
+
+    def _reached(self, plants: list[_Reread], value: float) -> Iterator[str]:
+        """The value of the best accuracy is that of the plant at which it is worst."""
+        criterion = self.done.problem.demands.criterion
+        if criterion is not None:
+            found = min(reread.criterion for reread in self._doubtful(plants))
+            size = float(self.done.experiment.size) if criterion.letter == "D" else abs(value)
+        else:
+            found, size = max(reread.worst_of_all for reread in self._doubtful(plants)), value
+        if not abs(found - value) <= self.apart * size:
+            yield f"the spectrum reaches {found:.10g}, not {value:.10g}"
+
+
+@dataclass(frozen=True)
+class _Reread:
+    """The written spectrum at one plant."""
+
+    done: Designed
+    written: dict[str, Json]
+    scenario: Scenario
+
+    def missed(self, goal: Goal) -> Iterator[str]:
+        """The requirements that are promised and not met."""
+        for requirement in self.scenario.side if goal == "factor" else self.scenario.requirements:
+            worst = self._worst(requirement)
+            if not worst <= 1.0 + _APART:
+                yield f"the design leaves {worst:.6g} times the error that {requirement.name} admits"
+
+    @property
+    def worst_of_all(self) -> float:
+        """The worst ratio of all requirements."""
+        return max(self._worst(requirement) for requirement in self.scenario.requirements)
+
+    @property
+    def criterion(self) -> float:
+        """The value of the criterion that is the goal."""
+        first = criterion_of(self.scenario.requirements)
+        assert first is not None
+        return first.value(first.level(self._information))
+
+    def _worst(self, requirement: Requirement) -> float:
+        """The largest ratio over the band, with its ends, also between the points of its grid."""
+        try:
+            np.linalg.cholesky(self._information)
+        except np.linalg.LinAlgError:
+            return np.inf
+        if not isinstance(requirement, OverFrequency):
+            return requirement.worst(self._information).ratio
+        grid, poles = requirement.grid, requirement.poles_on_the_circle[:, None]
+        beside = np.any((grid[:-1] < poles) & (poles < grid[1:]), axis=0)
+        between = (0.5 * (grid[1:] + grid[:-1]))[~beside]
+        w = np.sort(np.concatenate([grid, between]))
+        ratios = requirement.ratios(self._information, w)
+        # A resonance may stand higher between two points than at both, by more than the ways may differ.
+        padded = np.concatenate([[-np.inf], ratios, [-np.inf]])
+        peaks = np.flatnonzero((ratios >= padded[:-2]) & (ratios >= padded[2:]))
+        highest, found = peaks[np.argsort(-ratios[peaks])][:_PEAKS], float(np.max(ratios))
+        left, right = w[np.maximum(highest - 1, 0)], w[np.minimum(highest + 1, w.size - 1)]
+        for _ in range(_ZOOMS):
+            inside = np.linspace(left, right, _INSIDE)
+            ratios = requirement.ratios(self._information, inside.ravel()).reshape(inside.shape)
+            top, rows = np.argmax(ratios, axis=0), np.arange(highest.size)
+            found = max(found, float(np.max(ratios)))
+            left = inside[np.maximum(top - 1, 0), rows]
+            right = inside[np.minimum(top + 1, _INSIDE - 1), rows]
+        return found
+
+    @cached_property
+    def _experiment(self) -> Experiment:
+        """That of the delivered length, in the coordinates in which the requirements are stated."""
+        return replace(self.scenario.experiment, samples=self.done.experiment.samples)
+
+    @cached_property
+    def _information(self) -> Array:
+        """(k, k): what the written spectrum, the noise and what is known already tell."""
+        experiment = self._experiment
+        total = experiment.prior_information.copy()
+        for w, root in self._excitation:
+            total += experiment.samples * _outer(experiment.excitation_gradient(w) @ root[:, None])
+        if not experiment.model.continuous:
+            for w, weight in _rule(graded_grid(experiment.singularities, 0.0, np.pi), _STEPS):
+                rows = experiment.noise_gradient(w) * np.sqrt(weight)[:, None, None, None]
+                total += experiment.samples * _outer(rows)
+        return total
+
+    def power(self, kind: PowerKind, channel: int | None) -> float:
+        """The power of u, y or x: of all channels, or of one."""
+        rows = slice(None) if channel is None else slice(channel, channel + 1)
+        return sum(
+            float(np.sum(np.abs(self._experiment.response(kind, w)[:, rows] @ root) ** 2))
+            for w, root in self._excitation
+        )
+
+    @cached_property
+    def _excitation(self) -> list[tuple[Array, ComplexArray]]:
+        """Frequencies (n,) and roots (n, r, r) of the power at each; their powers add up."""
+        entry, unit = self.written["spectrum"], self.done.units.frequency
+        r = self._experiment.inputs
+        if "frequencies" in entry:
+            powers = _complex(entry["powers"]).reshape(-1, r, r)
+            return [(np.array(entry["frequencies"]) * unit, _root(powers))]
+        lo, hi = self._experiment.band
+        if "band" in entry:
+            lo, hi = (edge * unit for edge in entry["band"])
+        found, known = self.done.design.result, entry["type"] in _KNOWN
+        grid = graded_grid(self._experiment.singularities, lo, hi, knots=found.basis.knots)
+        steps = min(max(_FAST // max(entry.get("order", 0), 1), 1), _STEPS) if known else 1
+
+        def density(w: Array) -> ComplexArray:
+            if known:
+                return _density(entry, w, (lo, hi), r)
+            return (
+                found.basis.density(found.x, w).reshape(-1, r, r).astype(complex)
+            )  # a family from elsewhere
+
+        return [(w, _root(density(w) * weight[:, None, None])) for w, weight in _rule(grid, steps)]
+
+
+def _density(entry: Mapping[str, Json], w: Array, band: tuple[float, float], r: int) -> ComplexArray:
+    """(n, r, r): the density that an entry of `result.json` describes, by its definition."""
+    lo, hi = band
+    if entry["type"] == "white":
+        level = entry["power"] * np.pi / ((hi - lo) * r)
+        return np.broadcast_to(level * np.eye(r, dtype=complex), (w.size, r, r))
+    c = _complex(entry["coefficients"])
+    if entry["type"] == "fir":
+        lags = np.exp(-1j * np.outer(w, np.arange(1, len(c))))
+        later = np.tensordot(lags, c.reshape(-1, r, r)[1:], axes=1)
+        return np.asarray(c.reshape(-1, r, r)[0] + later + later.conj().swapaxes(1, 2))
+    m, x = entry["order"], 2.0 * (w - lo) / (hi - lo) - 1.0
+    norms = np.sqrt((2.0 * np.arange(m + 1) + 1.0) * np.pi / (hi - lo))
+    p = legendre.legvander(x, m) * norms if entry["basis"] == "legendre" else _TABLES[entry["basis"]](x, m)
+    S = c.reshape(m + 1, r, m + 1, r)
+    return np.asarray(0.5 * np.einsum("na,aibj,nb->nij", p, S, p, optimize=True), dtype=complex)
+
+
+def _rule(grid: Array, steps: int) -> Iterator[tuple[Array, Array]]:
+    """Nodes and weights of (1 / pi) integral over intervals of so many steps of a grid, some at a time."""
+    grid = np.append(grid[:-1:steps], grid[-1])
+    points, weights = legendre.leggauss(4)
+    half = 0.5 * np.diff(grid)
+    nodes = (0.5 * (grid[1:] + grid[:-1])[:, None] + half[:, None] * points).ravel()
+    scaled = (half[:, None] * weights / np.pi).ravel()
+    for start in range(0, nodes.size, _NODES_AT_ONCE):
+        part = slice(start, start + _NODES_AT_ONCE)
+        yield nodes[part], scaled[part]
+
+
+def _root(powers: ComplexArray) -> ComplexArray:
+    """R (n, r, r) with R R^* the powers, their rounding below zero cut off."""
+    if powers.shape[1] == 1:
+        return np.sqrt(np.maximum(powers.real, 0.0)).astype(complex)
+    values, vectors = np.linalg.eigh(powers)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])
+
+
+def _outer(F: ComplexArray) -> NDArray[np.float64]:
+    """Re sum of F_l F_m^* over frequencies and channels: (n, k, p, r) -> (k, k)."""
+    flat = np.moveaxis(F, 1, 0).reshape(F.shape[1], -1)
+    return np.asarray((flat @ flat.conj().T).real)
+
+
+def _complex(value: Json) -> ComplexArray:
+    """Nested lists of numbers, or of {re, im}."""
+    if isinstance(value, list):
+        return np.array([_complex(part) for part in value])
+    return np.asarray(complex(value["re"], value["im"]) if isinstance(value, dict) else complex(value))

@@ -1,0 +1,236 @@
+"""Spec -> the question of a convex design: everything that can be wrong comes to light here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from inputdesign_cli.design.convex.problem import Goal
+from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.questions.building.demand import check_design
+from inputdesign_cli.questions.building.endless import check_reach
+from inputdesign_cli.questions.building.foresight import build_foresight
+from inputdesign_cli.questions.building.free_directions import check_every_direction_counts
+from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
+from inputdesign_cli.questions.building.model_error import (
+    build_calibration,
+    model_error_alpha,
+    unstated_errors,
+)
+from inputdesign_cli.questions.building.parameters import check_known
+from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
+from inputdesign_cli.questions.building.signal_checks import check_signal
+from inputdesign_cli.questions.building.signal_settings import build_record_request
+from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
+from inputdesign_cli.questions.building.spectra import build_basis
+from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
+from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
+from inputdesign_cli.questions.least_cost.factor_columns import FewColumns
+from inputdesign_cli.questions.least_cost.grid_method import GridMethod
+from inputdesign_cli.questions.least_cost.solve import ConvexTask
+from inputdesign_cli.signal.settings import FROM_LEVELS
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.uncertainty import Uncertainty
+from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
+from inputdesign_cli.tasks.build.header import build_header
+
+_GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
+
+
+def build_convex(spec: Spec) -> ConvexTask:
+    """The task of a design for requirements and criteria that are convex in the information matrix.
+
+    Raises:
+        SpecError, DataError: see the builders of the parts; `not-identifiable`.
+    """
+    check_supported(spec)
+    experiment = build_experiment(spec)
+    requirements, side = build_asked(spec, experiment)
+    goal, cost = _GOALS[spec.goal], build_cost(spec)
+    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    check_pairs(spec, experiment.model.names)
+    check_signal(spec)
+    basis = build_basis(spec, experiment.inputs, excitation_band(spec))
+    grid = _grid_method(spec)
+    check_design(spec, experiment, basis)
+    counted = replace(experiment, samples=1) if goal == "samples" else experiment
+    plants = build_plants(spec, counted, basis)
+    question = Question(
+        experiment=counted,
+        basis=basis,
+        goal=goal,
+        requirements=requirements,
+        side=side,
+        cost=cost if goal == "cost" else {},
+        limits=[*build_power_limits(spec), *([] if grid else implied_limits(spec))],
+        densities=build_density_limits(spec, experiment),
+        others=[] if plants is None else plants.batch.plants,
+        paid="nominal" if plants is None else plants.paid,
+    )
+    check_every_direction_counts(spec, question)
+    reach, solver = check_reach(spec, question), spec.solver
+    if reach.band is not None:
+        question = _approaching(question, reach.band)
+    # What no spectrum attains is proved as what every spectrum reaches.
+    loose = basis.free and goal == "factor" and not reach.attained
+    tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
+    bounded = solver.any_spectrum and reach.bounded
+    alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)
+    return ConvexTask(
+        header=build_header(spec),
+        question=question,
+        experiment=experiment,
+        cost=cost,
+        alpha=alpha,
+        exact=None
+        if calibration is None
+        else ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment)),
+        tolerance=tolerance,
+        any_spectrum_tolerance=solver.any_spectrum_tolerance if bounded else None,
+        reach=reach,
+        most_samples=spec.limits.samples,
+        plants=plants,
+        ellipses=spec.report.ellipses,
+        grid=grid,
+        columns=_few_columns(spec, basis),
+        record=build_record_request(spec, experiment.size),
+        unstated=unstated_errors(spec, experiment),
+        stated=stated_bounds(spec),
+        simulation=build_simulation(spec, experiment),
+        foresight=build_foresight(spec, experiment, _designed_alone),
+    )
+
+
+def _approaching(question: Question, band: tuple[float, float]) -> Question:
+    """The question with every spectrum, and a free one, on this band."""
+    if not question.basis.free:
+        return replace(question, anywhere=band)
+    experiment = replace(question.experiment, band=band)
+    return replace(question, experiment=experiment, basis=LinesBasis.anywhere(*band, experiment.inputs))
+
+
+def _designed_alone(spec: Spec) -> Result:
+    """The result of a design that is looked at beside another one: no bounds, and none beside it in turn."""
+    task = build_convex(spec)
+    alone = None if task.foresight is None else replace(task.foresight, richer={})
+    return replace(task, foresight=alone, any_spectrum_tolerance=None).solve().result
+
+
+def check_supported(spec: Spec) -> None:
+    """Say plainly what is not designed here, rather than ignore it.
+
+    Raises:
+        SpecError: `not-supported`.
+    """
+
+    def refuse(key: str, what: str, hint: str) -> Exception:
+        return spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
+
+    for name, asked in (
+        ("closed_loop_error", spec.accuracy.closed_loop_error),
+        ("mean_squared_error", spec.accuracy.mean_squared_error),
+    ):
+        if asked is not None:
+            raise refuse(
+                f"accuracy.{name}", f"handle {name} here", "state the accuracy as model_error or a criterion"
+            )
+    if spec.limits.energy is not None:
+        raise refuse("limits.energy", "enforce limits.energy here", "limit input_power, its mean a sample")
+    if spec.solver.method == "alternating":
+        raise refuse("solver.method", "use the alternating method here", "use exchange or lmi")
+    if spec.signal.order is not None:
+        raise refuse("signal.order", "fit rational filters here", "remove it: noise comes from a long filter")
+    if not spec.plant.sampled:
+        _check_interpolated(spec)
+    if spec.uncertainty is not None:
+        _check_robust(spec, spec.uncertainty)
+
+
+def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
+    """What is not designed for several plants at once."""
+    spectrum, error = spec.spectrum, spec.accuracy.error
+    columns = spectrum is not None and spectrum.type == "polynomial" and spectrum.factor_columns is not None
+    if columns:
+        what, hint = "hold a robust design to few factor columns", "remove spectrum.factor_columns"
+    elif spec.solver.method == "lmi":
+        what, hint = "write a robust design as the papers' program", "use method: exchange"
+    elif error is not None and error.region == "ellipsoid" and uncertainty.r_adm == "fixed":
+        what, hint = "take a fixed r_adm over the whole ellipsoid", "use r_adm: own, or region: first_order"
+    elif error is not None and error.calibrated is not None:
+        what, hint = "calibrate an exact confidence at several plants", "write confidence: 0.95"
+    else:
+        return
+    raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key="uncertainty")
+
+
+def check_pairs(spec: Spec, known: Sequence[str]) -> None:
+    """Raise `SpecError` (`unknown-parameter`) where `report.ellipses` names what the model does not have."""
+    for n, pair in enumerate(spec.report.ellipses or ()):
+        for m, name in enumerate(pair):
+            check_known(spec, known, name, f"report.ellipses[{n}][{m}]")
+
+
+def _check_interpolated(spec: Spec) -> None:
+    """In continuous time samples are interpolated within their band: between them there are no levels."""
+    signal = spec.signal
+    levels = signal.type in FROM_LEVELS
+    if levels or signal.hold is not None or signal.bits is not None:
+        key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
+        raise spec.complain(
+            "not-supported",
+            "a plant in s is driven by the band-limited interpolation of the samples, which has no levels "
+            "and holds nothing between them",
+            hint="write plant.sample: zoh for a signal that is held between samples, or use a multisine",
+            key=f"signal.{key}",
+        )
+
+
+def _grid_method(spec: Spec) -> GridMethod | None:
+    """The papers' own program is for one requirement, a bound on the model error to first order.
+
+    Raises:
+        SpecError: `not-supported` for any other question.
+    """
+    if spec.solver.method != "lmi":
+        return None
+    error, stated = spec.accuracy.error, spec.limits
+    # Limits on single samples bind the signal, not the spectrum.
+    limited = stated.model_dump(exclude={"amplitude", "rate"}, exclude_none=True)
+    plain = (
+        spec.goal == "least_cost"
+        and spec.accuracy.requirements in (("model_error",), ("loop",))
+        and error is not None
+        and error.region == "first_order"
+        and (spec.spectrum is None or spec.spectrum.type in ("fir", "white"))
+        and spec.plant.inputs == spec.plant.outputs == 1
+        and spec.plant.sampled
+        and not limited
+    )
+    if not plain:
+        raise spec.complain(
+            "not-supported",
+            "solver.method lmi is the papers' program: the least cost of a FIR spectrum of one input for "
+            "model_error alone, without limits",
+            hint="use method: exchange, which does the rest, at every frequency",
+            key="solver.method",
+        )
+    return GridMethod(int(spec.solver.grid), spec.solver.positivity)
+
+
+def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
+    """`factor_columns`: a factor of few columns is for criteria under upper power limits."""
+    spectrum = spec.spectrum
+    if spectrum is None or spectrum.type != "polynomial" or spectrum.factor_columns is None:
+        return None
+    plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
+    floors = any(not limit.upper for limit in build_power_limits(spec))
+    if not isinstance(basis, PolynomialBasis) or not plain or floors or spec.limits.spectrum is not None:
+        raise spec.complain(
+            "not-supported",
+            "factor_columns is for a criterion under upper limits on powers",
+            hint="remove factor_columns: the default, a factor of full rank, is the true optimum",
+            key="spectrum.factor_columns",
+        )
+    return FewColumns(spectrum.factor_columns, spec.signal.seed or 0)

@@ -1,0 +1,180 @@
+"""Designs and records that keep an exact confidence: alpha is calibrated to what simulated estimates do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.accuracy.calibration import Calibration, Coverage, with_alpha
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
+from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.questions.common.confidence import (
+    SETTLED,
+    Confidence,
+    bounded_errors,
+    settled_alpha,
+    too_few,
+    too_many,
+)
+from inputdesign_cli.questions.common.record import Made, RecordRequest, as_long, redrawn, worst_ratio
+from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates, Simulator
+from inputdesign_cli.questions.least_cost.outcome import Designed
+from inputdesign_cli.questions.least_cost.record_search import fitting_record
+from inputdesign_cli.signal import Record
+from inputdesign_cli.spectrum import flat_basis
+
+# A record that needs a larger alpha is made anew, this often at the most.
+_RECORDS = 4
+# Simulated experiments correct the design this often at the most, until they change alpha by this share.
+_CORRECTIONS, _CORRECTED = 5, 0.01
+# Where other runs do not bear the correction out, so many times as many correct.
+_SETS = 4
+
+MakeDesign = Callable[[Question, Confidence], tuple[Designed, dict[str, Json]]]
+Known = Callable[[Record | None], Array | None]
+
+
+@dataclass(frozen=True)
+class ExactConfidence:
+    """The confidence that is asked of the answer to a question; `usual` is the chi-squared alpha.
+
+    Without a `simulator` asymptotic theory tells how estimates scatter.
+    """
+
+    calibration: Calibration
+    usual: float
+    question: Question
+    simulator: Simulator | None
+
+    def designed(self, design: MakeDesign, request: RecordRequest) -> tuple[Designed, dict[str, Json]]:
+        """The design that needs just the alpha that it is for, and what the solver did.
+
+        Raises:
+            InfeasibleError, InaccurateError: see `settled_alpha`, `SimulatedEstimates.corrected`.
+        """
+        calibration, designs, sets = self.calibration, 0, 1
+        alpha, simulated, coverage = self._first_alpha(), None, None
+        for _ in range(_CORRECTIONS):
+            done, how = self._settled(design, calibration, alpha)
+            designs += how["designs"]
+            alpha, simulated, coverage = done.confidence.alpha, self._simulated(done, request, sets), None
+            if simulated is None:
+                break
+            errors, before = bounded_errors(done.problem.requirements), calibration.excess
+            corrected = simulated.corrected(calibration, errors, done.information)
+            if abs(corrected.excess / before - 1.0) <= _CORRECTED:
+                coverage, asked = self._coverage(done, done.information, simulated), calibration.probability
+                if sets > 1 or not (too_few(coverage, asked) or too_many(coverage, asked)):
+                    break
+                sets = _SETS
+                corrected = replace(simulated, sets=sets).corrected(calibration, errors, done.information)
+            calibration = corrected
+            alpha *= corrected.excess / before
+        coverage = coverage or self._coverage(done, done.information, simulated)
+        confidence = Confidence(done.confidence.alpha, self.usual, done.confidence.calibration, coverage)
+        return replace(done, confidence=confidence), {**how, "designs": designs}
+
+    def _settled(
+        self, design: MakeDesign, calibration: Calibration, start: float
+    ) -> tuple[Designed, dict[str, Json]]:
+        """The design that needs just the alpha that it is for by this calibration."""
+        found = dict[float, tuple[Designed, dict[str, Json]]]()
+
+        def needed(alpha: float) -> float | None:
+            try:
+                found[alpha] = design(
+                    self.question.at_alpha(alpha), Confidence(alpha, self.usual, calibration)
+                )
+            except InfeasibleError:  # a smaller alpha may do
+                return None
+            done = found[alpha][0]
+            return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
+
+        done, how = found[settled_alpha(needed, start)]
+        return done, {**how, "designs": len(found)}
+
+    def recorded(self, done: Designed, made: Made, request: RecordRequest, known: Known) -> Made:
+        """The record `made`, or one that keeps the confidence by its own samples.
+
+        A record distributes its information otherwise than the design, so that it may need a larger alpha.
+
+        Args:
+            known: the information (k, k) of a record; None where it leaves a parameter undetermined.
+        """
+        design, alpha, sets = done.design, done.confidence.alpha, 1
+        for _ in range(_RECORDS):
+            information = known(made.record)
+            if information is None or not (made.record and made.record.met):
+                return made
+            needed = self._needed(done, made.record, information, sets)
+            if needed <= alpha * (1.0 + SETTLED) and sets == 1:
+                told = self.of_record(done, made.record, information)
+                if too_few(told, self.calibration.probability):
+                    sets = _SETS
+                    needed = self._needed(done, made.record, information, sets)
+            if needed <= alpha * (1.0 + SETTLED):
+                break
+            alpha = needed
+            stricter = tuple(with_alpha(design.problem.requirements, alpha))
+            design = replace(design, problem=replace(design.problem, requirements=stricter))
+            made = fitting_record(request, done.question.at_alpha(alpha), design, done.experiment.samples)
+        information = known(made.record)
+        if made.record is None or information is None:
+            return made
+        ratio = worst_ratio(done.problem.requirements)(information)
+        return replace(made, record=replace(made.record, worst_ratio=ratio))
+
+    def _needed(self, done: Designed, record: Record, information: Array, sets: int) -> float:
+        """The alpha of these samples, which tell this much (k, k)."""
+        errors, calibration = bounded_errors(done.problem.requirements), self.calibration
+        simulated = self._of_samples(record)
+        if simulated is not None:
+            calibration = replace(simulated, sets=sets).corrected(calibration, errors, information)
+        return calibration.alpha(errors, information)
+
+    def of_record(self, done: Designed, record: Record, information: Array) -> Coverage:
+        """How many of fresh estimates keep the bounds with these samples, which tell this much (k, k)."""
+        return self._coverage(done, information, self._of_samples(record))
+
+    def _coverage(self, done: Designed, information: Array, simulated: SimulatedEstimates | None) -> Coverage:
+        errors = bounded_errors(done.problem.requirements)
+        within = self._reached(errors, done.information)
+        coverage = self.calibration.coverage(errors, information, within)
+        return coverage if simulated is None else simulated.checked(coverage, errors, within)
+
+    def _simulated(self, done: Designed, request: RecordRequest, sets: int) -> SimulatedEstimates | None:
+        """Estimates of records of the designed spectrum; None where they are not asked for, or not made."""
+        samples = as_long(request, done.experiment)
+        if self.simulator is None or samples is None or not done.design.result.x.any():
+            return None
+        drawn = redrawn(request, done.design, done.experiment.inputs, samples)
+        found = self.simulator.of(drawn, samples)
+        return found and replace(found, sets=sets)
+
+    def _of_samples(self, record: Record) -> SimulatedEstimates | None:
+        if self.simulator is None:
+            return None
+        return self.simulator.of_record(record.samples)
+
+    def _reached(self, errors: Sequence[ModelError], information: Array) -> float:
+        """What r_adm is multiplied by: where the best accuracy is sought, the ratio that was reached."""
+        if self.question.goal != "factor":
+            return 1.0
+        return max(error.worst(information).ratio for error in errors)
+
+    def _first_alpha(self) -> float:
+        """That of white excitation where the least cost is sought, lest the first design be out of reach."""
+        question, experiment = self.question, self.question.experiment
+        power = white_power(question) if question.goal == "cost" else 0.0
+        if power == 0.0:
+            return self.usual
+        flat = replace(question, basis=flat_basis(experiment))
+        problem = whitened_problem(flat, np.full(experiment.inputs, power / experiment.inputs))
+        errors = bounded_errors(problem.requirements)
+        return self.calibration.alpha(errors, problem.information(np.array([power])))

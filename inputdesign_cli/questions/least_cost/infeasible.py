@@ -1,0 +1,150 @@
+"""Why nothing meets the requirements within the limits, and what would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.feasible import UnreachableError
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.outcome.rounding import rounded_up
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.within_limits import Bought, StatedBound, named
+from inputdesign_cli.questions.least_cost.needed_factor import needed_factor
+from inputdesign_cli.spectrum import LinesBasis
+
+_TOLERANCE = 1e-5
+_ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare
+
+
+def explain(
+    units: Units,
+    question: Question,
+    unreachable: UnreachableError,
+    stated: Sequence[StatedBound] = (),
+    *,
+    samples_of_record: Callable[[int], int | None] = lambda _: None,
+) -> InfeasibleError:
+    """The proof that came with the failure, in the words of the spec.
+
+    Args:
+        stated: the numbers of the spec that can be loosened.
+        samples_of_record: how many samples a record takes where a spectrum takes so many; None: not known.
+    """
+    problem, nearest = unreachable.problem, unreachable.nearest
+    bought = Bought(units, stated, question.limits, problem, nearest)
+    involved = bought.involved
+    if unreachable.limits_alone:
+        return _contradiction(involved, nearest.certificate.bound)
+    missed = (problem.demands.requirement(index) for index, _ in nearest.active)
+    names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
+    try:
+        parts = _what_would_do(unreachable, question, involved)
+    except OutOfTimeError:  # that it is infeasible is proved
+        parts = []
+    message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
+    hint = (
+        "raise the limit, or loosen the accuracy: a spectrum can keep errors "
+        f"{rounded_up(bought.factor * _ROOM, 4)} times as large as asked, a record somewhat larger ones"
+    )
+    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
+        # Within the same limits information grows in proportion to the length.
+        longer = int(np.ceil(question.experiment.samples * nearest.objective))
+        hint += f"; with {longer} samples a spectrum can"
+        enough = samples_of_record(longer)
+        if enough is not None:
+            hint += f"; with {units.length(enough)} (and signal.samples, if stated) a record can"
+    if _within_reach_of_any(question):
+        hint += "; spectrum: {type: free} can meet it"
+    if problem.densities and question.limits:
+        hint += "; limits.spectrum takes part"
+    key = involved[0].key if involved else "limits"
+    return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
+
+
+def _what_would_do(
+    unreachable: UnreachableError, question: Question, involved: Sequence[PowerLimit]
+) -> list[str]:
+    """Which limits are exhausted, and what they would have to be."""
+    needs = {limit: _needed(unreachable, limit) for limit in involved if limit.upper}
+    parts = [f"{named(limit)} is exhausted" for limit, need in needs.items() if not need]
+    parts += [need for need in needs.values() if need]
+    if not any(needs.values()):
+        parts.append(_together(unreachable, question))
+    return parts
+
+
+def _together(unreachable: UnreachableError, question: Question) -> str:
+    """What all upper limits would have to be."""
+    upper = {limit.key: limit for limit in question.limits if limit.upper}
+    raised = [limit for limit in question.limits if limit.upper]
+    densities = [density for density in question.densities if density.upper]
+    # The optimum of the goal "factor" meets the accuracy within limits and densities so many times as large.
+    factor = unreachable.nearest.objective if densities else needed_factor(unreachable, raised)
+    if factor is None:
+        return "no change of the upper limits is enough"
+    times = f"would have to be {rounded_up(factor)} times as large"
+    if not upper:
+        return f"limits.spectrum {times}"
+    if any(limit.implied for limit in upper.values()):  # what the spec limits there is not a power
+        own = {key: _own_factor(limit, factor) for key, limit in upper.items()}
+        own |= {density.key: factor for density in densities}
+        listed = " and ".join(f"{key} {rounded_up(each)} times" for key, each in own.items())
+        times = f"would have to be as large as a spectrum needs, {listed}, and larger for a record"
+    return f"no change of a single limit is enough; all of them together {times}"
+
+
+def _own_factor(limit: PowerLimit, factor: float) -> float:
+    """By what the number of the spec is multiplied where its power is multiplied by `factor`."""
+    return float(np.sqrt(factor)) if limit.implied else factor
+
+
+def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
+    """What the limit would have to be with the others kept; empty if that does not help."""
+    factor = needed_factor(unreachable, [limit])
+    if factor is None:
+        return ""
+    least = factor * limit.bound
+    channel = "" if limit.channel is None else f" {limit.channel + 1}"
+    needs = f"needs {limit.kind}{channel} power >= {rounded_up(least)}"
+    if limit.implied:
+        peak = np.sqrt(limit.bound)
+        least_peak = rounded_up(float(np.sqrt(least)))
+        sample = limit.of_samples
+        return (
+            f"{needs}, {sample} of {least_peak} at least, but {sample} of {peak:.6g} leaves {limit.bound:.6g}"
+        )
+    return f"{needs}, limit is {limit.bound:.6g}"
+
+
+def _within_reach_of_any(question: Question) -> bool:
+    """Whether some spectrum of another type meets what this type cannot (densities are left out)."""
+    if question.densities or question.basis.free:
+        return False
+    experiment = question.experiment
+    anything = LinesBasis.anywhere(*experiment.band, experiment.inputs)
+    try:
+        solve_design(replace(question, basis=anything), tolerance=_TOLERANCE)
+    except (UnreachableError, OutOfTimeError, np.linalg.LinAlgError):
+        return False
+    return True
+
+
+def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError:
+    lower = [limit for limit in involved if not limit.upper]
+    upper = [limit for limit in involved if limit.upper]
+    names = ", ".join(dict.fromkeys(limit.key for limit in (*lower, *upper))) or "limits.spectrum"
+    where = [*lower, *upper][0].key if involved else "limits"
+    return InfeasibleError.because(
+        "contradictory-limits",
+        f"no spectrum of this type keeps to {names}: the upper limits would have to be {proved:.4g} "
+        "times as large for the lower ones to be reached",
+        "lower min, or raise max",
+        where,
+    )

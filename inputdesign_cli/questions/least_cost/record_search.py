@@ -1,0 +1,248 @@
+"""Where no record of the cheapest spectrum fits within limits on samples: other signals, other spectra.
+
+What costs least need not fit: where outputs are dear the inputs may be strong, and noise has high peaks.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.design.convex.designs import Design, solve_design
+from inputdesign_cli.design.convex.feasible import UnreachableError
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.questions.common.record import (
+    Made,
+    RecordRequest,
+    design_cost,
+    designed_spectrum,
+    least_period,
+    make_record,
+    ratio_before,
+)
+from inputdesign_cli.questions.least_cost.shortest_record import ShortestRecord, Way, longest_search
+from inputdesign_cli.questions.least_cost.too_short import refuse_too_short
+from inputdesign_cli.questions.least_cost.too_tight import too_tight
+from inputdesign_cli.signal import Record
+
+# From the design towards the least input power that meets the accuracy, with a little room there.
+_SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
+_ROOM = 1.02
+_TOLERANCE = 1e-5
+# Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
+_LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
+# Spectra are compared on so many frequencies, by the share of their power that lies elsewhere.
+_LINES, _SAME_SHAPE = 256, 0.01
+_WORDS = {
+    "filtered_noise": "noise",
+    "multisine": "a multisine",
+    "binary": "a binary signal",
+    "ternary": "a signal of three levels",
+    "slewed": "a signal of ramps between two levels",
+}
+
+
+def fitting_record(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:
+    """The record of the design; where none is found that meets the accuracy, one that does.
+
+    Tried are spectra of less input power, and other kinds of signals; for a shortest experiment longer
+    records. A kind that the spec states is not replaced: the error names the one that would do.
+
+    Args:
+        samples: of the experiment.
+
+    Raises:
+        InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
+    """
+    if _sought(request, question):
+        # A spectrum may take fewer samples than any record has.
+        samples = max(samples, least_period(design.problem.experiment.inputs) * request.settings.block)
+    record = make_record(request, design, samples)
+    plain = Made(record, request, design)
+    if record is None:
+        return plain
+    if record.met or not request.searched:
+        refuse_too_short(request, design.problem.experiment, record)
+        return plain
+    misses, tried, remedy = [record], Counter[str](), ""
+    for of, spectrum, power in _others(request, question, design):
+        other = Made(make_record(of, spectrum, samples), of, spectrum, power)
+        if other.record is not None and other.record.met:
+            if not request.stated_method or of is request:
+                return _told(request, design, other)
+            limited = "" if power is None else f" with limits.input_power: {power:.4g}"
+            remedy = f"a record of this length does with signal.type: {of.settings.method}{limited}"
+            break
+        tried[_words(of)] += 1
+        misses += [other.record] if other.record is not None else []
+    return _longer(plain, misses, question, tried, remedy)
+
+
+def _sought(request: RecordRequest, question: Question) -> bool:
+    """Whether the length of the record is looked for."""
+    return question.goal == "samples" and request.samples is None
+
+
+def _others(
+    request: RecordRequest, question: Question, design: Design
+) -> Iterator[tuple[RecordRequest, Design, float | None]]:
+    """What else there is, with the limit on the input power: the nearest to what was asked first."""
+    spectra: list[tuple[Design, float | None]] = []
+    for power, spectrum in _of_less_power(question, design):
+        spectra.append((spectrum, power))
+        yield request, spectrum, power
+    for kind in _kinds(request):
+        for spectrum, limit in ((design, None), *spectra[:1], *spectra[-1:]):
+            yield kind, spectrum, limit
+
+
+def _of_less_power(question: Question, design: Design) -> Iterator[tuple[float, Design]]:
+    """Designs for the same question under ever tighter limits on the input power."""
+    if question.goal != "cost" or set(question.cost) == {"input"}:
+        return
+    own = design.problem.on(design.result.basis).power("input", None).at(design.result.x)
+    cheapest = solve_design(replace(question, cost={"input": 1.0}), tolerance=_TOLERANCE)
+    least = _ROOM * cheapest.result.objective
+    for share in _SHARES if least < own else ():
+        power = float(f"{least * (own / least) ** share:.4g}")
+        limited = replace(question, limits=[*question.limits, PowerLimit("input", power)])
+        yield power, solve_design(limited, tolerance=_TOLERANCE)
+
+
+def _told(request: RecordRequest, design: Design, other: Made) -> Made:
+    """The other record, its cost told against the design that was asked for, and a note."""
+    record = other.record
+    assert record is not None
+    asked, own = (design_cost(each, request.cost) for each in (design, other.design))
+    extra = (1.0 + record.extra_power) * own / asked - 1.0
+    limit = other.input_power
+    spectrum = (
+        "that spectrum" if limit is None else f"another spectrum, that of limits.input_power: {limit:.4g}"
+    )
+    asked_for = "cheapest" if design.problem.goal == "cost" else "designed"
+    kind, limits = _WORDS.get(record.method, record.method), " and ".join(request.limit_keys)
+    note = (
+        f"no record of {_words(request)} with the {asked_for} spectrum was found that meets the accuracy "
+        f"within {limits}; the record is {kind} with {spectrum}"
+    )
+    return replace(other, record=replace(record, extra_power=extra), notes=(note,))
+
+
+def _words(request: RecordRequest) -> str:
+    method = request.settings.method
+    return _WORDS.get(method, method)
+
+
+def _longer(
+    plain: Made, misses: Sequence[Record], question: Question, tried: Counter[str], remedy: str
+) -> Made:
+    """The longer record of a shortest experiment, or the error with what was tried besides.
+
+    Raises:
+        InfeasibleError: `limits-too-tight`.
+    """
+    request = plain.request
+    sought = _sought(request, question)
+    allowed = request.most_samples if sought else 0
+    search = ShortestRecord(
+        _ways(plain, question, sought),
+        request.settings.block,
+        longest_search(len(misses[0].samples), allowed, request.longest),
+        ratio_before(plain.design, request.step),
+    )
+    found = search.search(misses)
+    longer = None if found is None else found.record
+    if found is not None and longer is not None and (allowed is None or len(longer.samples) <= allowed):
+        other = found.request.settings.method != request.settings.method
+        return replace(found, notes=(f"the record is {_words(found.request)}",) if other else ())
+    raise too_tight(
+        request,
+        misses[0],
+        longer,
+        allowed,
+        tried=tried,
+        remedy=remedy,
+        needed=search.needed,
+        searched=search.longest,
+        longest_tried=search.tried,
+    )
+
+
+def _ways(plain: Made, question: Question, sought: bool) -> list[Way]:
+    """What is tried at a length: the kinds of signals, with the spectrum of the design, then the cheapest.
+
+    Where a length is only told, one record of each kind is enough.
+    """
+    request, design = plain.request, plain.design
+    kinds = [request, *([] if request.stated_method else _kinds(request))]
+    if not sought:
+        kinds = [
+            replace(kind, settings=replace(kind.settings, candidates=1, most_candidates=1)) for kind in kinds
+        ]
+
+    @cache
+    def cheapest(samples: int) -> Design | None:
+        """That of a stated length, if it is another spectrum than that of the design."""
+        stated = replace(question.of_length(samples), goal="cost", cost=request.cost)
+        try:
+            found = solve_design(stated, tolerance=_TOLERANCE, any_spectrum_tolerance=None)
+        except UnreachableError:
+            return None
+        return None if _alike(request, design, found) else found
+
+    def way(kind: RecordRequest, spectrum: Callable[[int], Design | None]) -> Way:
+        of_any_length = replace(kind, samples=None)
+
+        def made(samples: int) -> Made | None:
+            of = spectrum(samples)
+            record = None if of is None else make_record(of_any_length, of, samples, first=True)
+            return None if of is None else Made(record, kind, of)
+
+        return made
+
+    spectra: list[Callable[[int], Design | None]] = [lambda _: design]
+    if sought:
+        spectra.append(cheapest)
+    return [way(kind, spectrum) for spectrum in spectra for kind in kinds]
+
+
+def _kinds(request: RecordRequest) -> list[RecordRequest]:
+    """Other kinds of signals that may stand in."""
+    return [replace(request, settings=settings) for settings in request.others]
+
+
+def _alike(request: RecordRequest, one: Design, other: Design) -> bool:
+    """Whether two designs have spectra of one shape."""
+    inputs = one.problem.experiment.inputs
+    lines = [designed_spectrum(request, design, inputs).lines(_LINES).powers for design in (one, other)]
+    if lines[0].shape != lines[1].shape:
+        return False
+    shapes = [powers / np.einsum("naa->", powers).real for powers in lines]
+    return float(np.abs(shapes[0] - shapes[1]).sum()) < _SAME_SHAPE
+
+
+def samples_of_record(request: RecordRequest, question: Question, samples: int) -> int | None:
+    """The samples of a record that is found to meet the accuracy where a spectrum takes so many."""
+    for _ in range(_LENGTHS):
+        samples = max(int(np.ceil(samples * _LONGER)), 2)
+        if samples > _TRIED:
+            return None
+        stated = question.of_length(samples)
+        try:
+            design = solve_design(stated, tolerance=_ROUGH, any_spectrum_tolerance=_ANY)
+            of_any_length = replace(request, samples=None)
+            record = make_record(of_any_length, design, samples)
+        except (OutOfTimeError, UnreachableError):
+            return None
+        if record is None or record.met:
+            return samples if record is not None else None
+        if not np.isfinite(record.worst_ratio):
+            return None
+        samples = int(np.ceil(samples * record.worst_ratio**2))
+    return None

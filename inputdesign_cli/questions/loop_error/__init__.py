@@ -1,0 +1,1 @@
+"""The excitation whose model gives the controller with the least error."""

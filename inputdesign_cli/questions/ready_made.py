@@ -1,0 +1,219 @@
+"""Signals that need no spec, as records with units, and what they excite."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.outcome.curves import SignalCurves, SpectrumCurves
+from inputdesign_cli.outcome.results import Curves, Json, Results, Table, typed
+from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
+from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
+from inputdesign_cli.signal.shift_register import register_length
+from inputdesign_cli.specification.models.sizes import SIZES
+
+_USUAL = 1000
+
+
+@dataclass(frozen=True)
+class ReadyMade:
+    """What signal is asked for.
+
+    Attributes:
+        kind: prbs, multisine, chirp or steps.
+        bits: of the register of a prbs; None: as many as the samples take without repetition.
+        number: lines of a multisine, levels of steps.
+        band: of a multisine or a chirp, in rad per time unit; None: all frequencies.
+        samples: None: one period, or 1000.
+        levels: least and largest value of each input.
+        hold: samples for which each value of a prbs stands.
+        periods: equal ones, of a multisine.
+    """
+
+    kind: str
+    bits: int | None = None
+    number: int | None = None
+    band: tuple[float, float] | None = None
+    samples: int | None = None
+    levels: tuple[tuple[float, float], ...] = ((-1.0, 1.0),)
+    hold: int = 1
+    periods: int = 1
+    odd: bool = False
+    seed: int = 0
+    sample_time: float = 1.0
+    time_unit: str = "s"
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.levels)
+
+
+def make_signal(asked: ReadyMade) -> Results:
+    """The record as signal.csv, its figures, and what it excites.
+
+    Raises:
+        SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.
+    """
+    u, period = _made(asked)
+    _check_apart(u, asked)
+    record = scaled(u, asked.levels)
+    time = asked.sample_time * np.arange(len(u), dtype=float)
+    channels = {f"u{i + 1}": column for i, column in enumerate(record.T)}
+    entry: dict[str, Json] = {
+        "type": asked.kind,
+        "samples": len(record),
+        "period": period,
+        "sample_time": asked.sample_time,
+        "time_unit": asked.time_unit,
+        "channels": {},
+    }
+    for name, one in zip(channels, excites(record), strict=True):
+        entry["channels"][name] = {
+            "mean": one.mean,
+            "power": one.power,
+            "peak": one.peak,
+            "crest_factor": one.crest_factor,
+            "order_of_excitation": one.order,
+            "band": [edge / asked.sample_time for edge in one.band],
+        }
+    return Results(
+        typed({"format": 1, "status": "made", "signal": entry}),
+        "",
+        asked.time_unit,
+        {"signal": Table({f"time_{asked.time_unit}": time, **channels})},
+        {"signal": SignalCurves(time, channels), "spectrum": _lines(asked, record)},
+    )
+
+
+def _made(asked: ReadyMade) -> tuple[Array, int]:
+    """The record (N, inputs) from -1 to 1, and its period."""
+    rng, r = np.random.default_rng(asked.seed), asked.inputs
+    if asked.kind == "prbs":
+        bits = asked.bits or register_length(-(-(asked.samples or _USUAL) // asked.hold))
+        period = asked.hold * (2**bits - 1)
+        samples = asked.samples or period
+        _check_size(max(samples, asked.hold), r, whole_period=asked.samples is None)
+        values = prbs(bits, -(-samples // asked.hold), r, rng)
+        return np.repeat(values, asked.hold, axis=0)[:samples], min(period, samples)
+    samples = asked.samples or _USUAL
+    _check_size(samples, r)
+    if asked.kind == "multisine":
+        return _multisine(asked, samples, rng), samples // asked.periods
+    if asked.kind == "chirp":
+        if r > 1:
+            raise bad_spec(
+                "not-supported",
+                "a chirp has one frequency at a time, so that several inputs would be told apart by nothing",
+                hint="use a multisine for several inputs, or one chirp after the other",
+            )
+        _check_turns(asked, samples)
+        return chirp(samples, _band(asked)), samples
+    if asked.number is not None and asked.number > samples:
+        raise bad_spec(
+            "too-large",
+            f"{asked.number} levels are more than the {samples} samples",
+            hint=f"write at most --steps {samples}, or more --samples",
+        )
+    return steps(asked.number or 2, samples, r, rng), samples
+
+
+def _check_apart(u: Array, asked: ReadyMade) -> None:
+    """Raise `SpecError` (`bad-period`) where some input (N, r) is a combination of the others."""
+    if asked.inputs == 1:
+        return
+    moved = u - u.mean(axis=0)
+    rank = int(np.linalg.matrix_rank(moved.T @ moved, hermitian=True))
+    if rank == asked.inputs:
+        return
+    longer = f"--prbs {(asked.inputs + 1).bit_length()} or more" if asked.kind == "prbs" else "more levels"
+    raise bad_spec(
+        "bad-period",
+        f"of {asked.inputs} inputs over {len(u)} samples, {asked.inputs - rank} follow from the others, "
+        "so that what they do could not be told apart",
+        hint=f"write {longer}, and --samples enough for them",
+    )
+
+
+def _check_turns(asked: ReadyMade, samples: int) -> None:
+    """Raise `SpecError` (`bad-period`) where a chirp would not turn once, and so not cover its range."""
+    lo, hi = _band(asked)
+    turn = math.ceil(4.0 * math.pi / (lo + hi))
+    if samples >= turn:
+        return
+    most = SIZES["samples of a ready-made signal"].most
+    hint = f"write --samples {turn} or more"
+    if turn > most:
+        least = 4.0 * math.pi / most / asked.sample_time
+        ends = f"{least:.3g} rad/{asked.time_unit}"
+        hint = f"write a band whose ends sum to {ends} or more, or a longer --sample-time"
+    raise bad_spec(
+        "bad-period",
+        f"over {samples} samples the chirp makes less than one turn, so that it neither covers its range nor "
+        "excites its band",
+        hint=hint,
+    )
+
+
+def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> None:
+    """Raise `SpecError` (`too-large`) for records that would take long, or more memory than there is."""
+    size = SIZES["samples of a ready-made signal"]
+    fit = size.most // inputs
+    if samples <= fit:
+        return
+    each = f" for each of {inputs} inputs" if inputs > 1 else ""
+    raise bad_spec(
+        "too-large",
+        f"the signal has {samples} samples{each}, and {fit} fit: {size.why}",
+        hint=f"write {'fewer --prbs BITS, a shorter --hold, or ' * whole_period}--samples {fit} at most",
+    )
+
+
+def _multisine(asked: ReadyMade, samples: int, rng: np.random.Generator) -> Array:
+    whole = asked.periods * asked.inputs
+    if samples % whole or samples // whole < 3:
+        each = f" for each of {asked.inputs} inputs" if asked.inputs > 1 else ""
+        raise bad_spec(
+            "bad-period",
+            f"{samples} samples do not make {asked.periods} equal periods{each}",
+            hint=f"write --samples {max(samples // whole, 3) * whole}",
+        )
+    try:
+        one = multisine(samples // whole, asked.inputs, _band(asked), asked.number, rng, odd=asked.odd)
+    except TooFewHarmonicsError as error:
+        raise bad_spec(
+            "too-few-lines",
+            f"a period of {samples // whole} samples has {error.there} harmonics in the band, and "
+            f"{asked.number or 'at least one'} are asked for",
+            hint="take more --samples, a wider --band, or fewer lines",
+        ) from None
+    return np.tile(one, (asked.periods, 1))
+
+
+def _band(asked: ReadyMade) -> tuple[float, float]:
+    """In rad/sample."""
+    lo, hi = asked.band or (0.0, math.inf)
+    nyquist = math.pi / asked.sample_time
+    if asked.band is not None and hi > nyquist * (1 + 1e-4):
+        raise bad_spec(
+            "beyond-nyquist",
+            f"the band reaches {hi:g}, beyond the Nyquist frequency {nyquist:.6g} rad/{asked.time_unit}",
+            hint="frequencies are in rad per time unit and end at pi / sample time",
+        )
+    return lo * asked.sample_time, min(hi, nyquist) * asked.sample_time
+
+
+def _lines(asked: ReadyMade, record: Array) -> Curves:
+    """The powers of the lines of the record, means left out."""
+    columns = np.fft.rfft(record - record.mean(axis=0), axis=0)[1:] / len(record)
+    powers = 2.0 * np.abs(columns) ** 2
+    if len(record) % 2 == 0:
+        powers[-1] *= 0.5
+    kept = np.any(powers > 1e-9 * powers.max(initial=1e-300), axis=1)
+    w = 2.0 * np.pi * np.arange(1, len(powers) + 1) / len(record) / asked.sample_time
+    diagonal = np.einsum("lr,rs->lrs", powers[kept], np.eye(record.shape[1])).astype(complex)
+    return SpectrumCurves(w[kept], diagonal, lines=True)

@@ -1,0 +1,1 @@
+"""The regressors with the least mean squared error of a reduced-order regression."""

@@ -1,0 +1,228 @@
+"""Moments of the regressors with the least mean-squared error, or the least energy for a given error."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.regression import (
+    OutOfReachError,
+    Regression,
+    design_toeplitz,
+    energy_bound,
+    error_bound,
+    least_energy,
+    least_error,
+)
+from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
+from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
+from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
+from inputdesign_cli.outcome.curves import Curves, MomentsCurves
+from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.questions.common.plain_signal import signal_results
+from inputdesign_cli.questions.regression.outcome import (
+    MomentsDesign,
+    RegressionTerms,
+    error_curves,
+    moments_result,
+    trial_entry,
+)
+from inputdesign_cli.questions.regression.regressors import (
+    RegressorRecord,
+    RegressorSettings,
+    realise_regressors,
+)
+
+KEY = "accuracy.mean_squared_error"
+
+
+@dataclass(frozen=True)
+class TrueNoise:
+    """The noise of the true system: its variance, or its size relative to the output without it."""
+
+    variance: float | None
+    relative_std: float | None
+
+    def of(self, quiet: Array) -> float:
+        """Its variance, from the output (N,) without noise."""
+        if self.relative_std is not None:
+            return float(self.relative_std**2 * np.mean(quiet**2))
+        assert self.variance is not None
+        return self.variance
+
+
+@dataclass(frozen=True)
+class RegressionTrial:
+    """The Monte Carlo study: the true parameters, other inputs to try, and noise if not the nominal."""
+
+    theta: Array
+    runs: int
+    seed: int
+    compare: tuple[Contender, ...]
+    noise: TrueNoise | None
+
+
+@dataclass(frozen=True)
+class RegressionTask:
+    """A design of moments, and its study where the spec has the true parameters.
+
+    `alternating` and `tolerance` (the relative gap to be proved) are for Toeplitz moments, `seed` for
+    their starts.
+    """
+
+    terms: RegressionTerms
+    alternating: bool
+    tolerance: float
+    seed: int
+    signal: RegressorSettings
+    trial: RegressionTrial | None
+
+    def solve(self) -> Results:
+        """The design, its proof, its signal and its curves.
+
+        Raises:
+            SpecError: `bad-period` when signal.periods does not fit.
+            InfeasibleError: `target-out-of-reach`.
+            InaccurateError: `target-undecided`.
+        """
+        return self._solved()[1]
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """The same, and least-squares estimates of theta_1 in many runs of y = Phi theta + v.
+
+        Raises:
+            SpecError: there is no simulation, or the record is too short, or an input to compare with is
+                not available for regressions; and what `solve` raises, as it does.
+        """
+        trial = self.trial
+        if trial is None:
+            raise bad_spec(
+                "missing-key",
+                "a regression is simulated with its true parameters, and there are none",
+                hint="write simulation: {runs: 10000, plant: {parameters: [..]}}, the estimated ones first",
+                key="simulation",
+            )
+        record, results = self._solved()
+        if record is None:
+            raise bad_spec(
+                "wrong-shape",
+                f"{self.signal.samples} samples are too few to realise these moments",
+                hint="set experiment.samples",
+                key="experiment.samples",
+            )
+        regression = self.terms.regression
+        if trial.noise is not None:
+            regression = replace(regression, variance=trial.noise.of(record.Phi @ trial.theta))
+        seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
+        inputs = {"design": self._tried(trial, regression, record.Phi, seeds[0], executor)}
+        for name, drawn, noise in zip(trial.compare, seeds[1::2], seeds[2::2], strict=True):
+            Phi = contending_regressors(
+                name,
+                record.channels.shape,
+                delayed=regression.n if self.terms.toeplitz else None,
+                energy=float(np.sum(record.Phi**2)),
+                rng=np.random.default_rng(drawn),
+            )
+            inputs[name] = self._tried(trial, regression, Phi, noise, executor)
+        study = {"runs": trial.runs, "seed": trial.seed, "inputs": inputs}
+        return replace(results, outcome=typed({**results.result, "simulation": study}))
+
+    def _tried(
+        self,
+        trial: RegressionTrial,
+        regression: Regression,
+        Phi: Array,
+        seed: np.random.SeedSequence,
+        executor: Executor | None,
+    ) -> dict[str, object]:
+        found = run_experiments(regression, Phi, trial.theta, runs=trial.runs, seed=seed, executor=executor)
+        return trial_entry(regression, Phi, trial.theta, found)
+
+    def _solved(self) -> tuple[RegressorRecord | None, Results]:
+        started = time.perf_counter()
+        terms = self.terms
+        design = self._toeplitz() if terms.toeplitz else self._free()
+        solved = time.perf_counter()
+        record = realise_regressors(self.signal, terms.regression, design.R, design.rho, terms.target)
+        result = moments_result(terms, design)
+        units = terms.header.units
+        tables: dict[str, Table] = {}
+        curves: dict[str, Curves] = {"error": error_curves(terms, design)}
+        moments = MomentsCurves(design.R, terms.regression.m)
+        if record is not None:
+            result["signal"] = record.entry
+            tables["signal"], curves["signal"] = signal_results(units, record.channels)
+            if record.lines is not None:
+                w, power = record.lines.frequencies / units.frequency, record.lines.powers
+                tables["spectrum"] = Table({units.frequency_header: w, "line_power": power})
+                nyquist = np.pi / units.sample_time
+                moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
+        curves["moments"] = moments
+        result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
+        return record, Results(typed(result), terms.header.resolved_spec, units.time_unit, tables, curves)
+
+    def _free(self) -> MomentsDesign:
+        regression, target, energy = self.terms.regression, self.terms.target, self.terms.energy
+        if target is not None:
+            R = least_energy(regression, target)
+            bound = energy_bound(regression, target, R)
+        else:
+            assert energy is not None
+            R = least_error(regression, energy)
+            bound = error_bound(regression, energy)
+        return MomentsDesign(R, None, regression.error(R), bound, 1e-9, {"method": "closed_form"})
+
+    def _toeplitz(self) -> MomentsDesign:
+        terms = self.terms
+        try:
+            found = design_toeplitz(
+                terms.regression,
+                target=terms.target,
+                energy=terms.energy,
+                tolerance=self.tolerance,
+                rng=np.random.default_rng(self.seed),
+                alternating=self.alternating,
+            )
+        except OutOfReachError as error:
+            assert terms.target is not None
+            raise _out_of_reach(terms.regression, terms.target, error) from error
+        how: dict[str, object] = {
+            "method": "alternating" if self.alternating else "sequential_convex",
+            "starts": found.starts,
+            "solves": found.solves,
+            "nodes": found.nodes,
+            "tolerance": self.tolerance,
+        }
+        if found.assumed:
+            how["assumed_smallest_eigenvalue"] = found.assumed
+        return MomentsDesign(found.R, found.rho, found.split, found.bound, self.tolerance, how)
+
+
+def _out_of_reach(
+    regression: Regression, target: float, error: OutOfReachError
+) -> InfeasibleError | InaccurateError:
+    bias = error.bias * float(np.linalg.norm(regression.estimated))
+    smallest, largest = (regression.neglected_norm * bias) ** 2, float(np.sqrt(target)) / bias
+    hint = (
+        f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}; "
+        "or estimate more parameters"
+    )
+    if not error.proved:
+        message = (
+            f"no Toeplitz moments were found that reach a mean-squared error of {target:.7g} (the least "
+            f"biased ones leave {smallest:.7g} at any energy), nor was it proved that there are none"
+        )
+        return InaccurateError.because("target-undecided", message, hint=hint, key=f"{KEY}.target")
+    unit = regression.n * regression.variance * float(np.sum(regression.estimated**2)) / target
+    proof = f"proved for every energy up to {error.proved * unit:.3g}"
+    if error.assumed:
+        proof += f" and R11 / r_0 with eigenvalues above {SMALLEST_EIGENVALUE:g}"
+    message = (
+        f"no Toeplitz moments reach a mean-squared error of {target:.7g} ({proof}): the bias alone "
+        f"leaves {smallest:.7g}"
+    )
+    return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=f"{KEY}.target")

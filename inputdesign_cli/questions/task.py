@@ -1,0 +1,90 @@
+"""What every kind of question answers, and the one dispatch: which kind a spec asks.
+
+A kind is imported when it is asked for, so that a command waits for its own alone.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.specification import Spec
+
+
+class Task(Protocol):
+    """A question, built from a spec once; what can be wrong before anything long is computed was told then.
+
+    Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`), not its
+    place in a file: the dispatch adds that (`Spec.place`).
+    """
+
+    def solve(self) -> Results:
+        """The answer: a design with its proof, or what a given excitation buys."""
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """The answer, with the experiment tried many times on the true system.
+
+        Args:
+            executor: where batches of runs are computed (default: in this process).
+        """
+
+
+def _check_uncertainty(spec: Spec) -> None:
+    """Raise `SpecError` (`not-supported`) where what is asked is not looked at for several plants."""
+    accuracy = spec.accuracy
+    elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
+    if spec.uncertainty is None or not (elsewhere or spec.plant.kind == "regression"):
+        return
+    raise spec.complain(
+        "not-supported",
+        "this kind of design is not looked at for several plants at once",
+        hint="remove uncertainty, or ask for a design with model_error, information or a criterion",
+        key="uncertainty",
+    )
+
+
+def build_analysis(spec: Spec) -> Task:
+    """The task of a given excitation, whatever is asked of it.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    _check_uncertainty(spec)
+    if spec.accuracy.frequency_response is not None and not spec.designs:
+        from inputdesign_cli.questions.frequency_response.build import build_response_task
+
+        return build_response_task(spec)
+    from inputdesign_cli.questions.given.build import build_given
+
+    return build_given(spec)
+
+
+def build_task(spec: Spec) -> Task:
+    """The task of a spec; everything that can be wrong with the spec comes to light here.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    _check_uncertainty(spec)
+    if spec.campaign is not None:
+        from inputdesign_cli.questions.campaign.build import build_campaign
+
+        return build_campaign(spec)
+    if not spec.designs:
+        return build_analysis(spec)
+    if spec.accuracy.frequency_response is not None:
+        from inputdesign_cli.questions.frequency_response.build import build_response_task
+
+        return build_response_task(spec)
+    if spec.plant.kind == "regression":
+        from inputdesign_cli.questions.regression.build import build_regression_task
+
+        return build_regression_task(spec)
+    if spec.accuracy.closed_loop_error is not None:
+        from inputdesign_cli.questions.loop_error.build import build_loop_error_task
+
+        return build_loop_error_task(spec)
+    from inputdesign_cli.questions.least_cost.build import build_convex
+
+    return build_convex(spec)

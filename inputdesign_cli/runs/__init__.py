@@ -1,1 +1,0 @@
-"""What a run leaves: results, its directory, tables, provenance and golden values."""

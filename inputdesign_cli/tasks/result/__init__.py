@@ -1,1 +1,0 @@
-"""Mathematical objects to numbers, curves and tables with units."""

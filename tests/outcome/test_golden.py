@@ -1,0 +1,208 @@
+"""The comparator says what agrees, what does not and why; a bad golden file is explained."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
+from inputdesign_cli.outcome.golden import compare
+from inputdesign_cli.outcome.golden_file import load_golden
+from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.sweeps.verbs import execute
+
+SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
+
+GOOD = """\
+title: Two runs
+runs:
+  - name: one
+    spec: a.yaml
+    quantities:
+      - {path: objective.value, expected: 2, absolute: 1e-3, why: rounding, source: closed form}
+      - path: "power.input[1]"
+        label: second power
+        expected: -4.0
+        relative: 1.0e-2
+        why: printed with two digits
+        source: paper, Section 9
+  - name: two
+    spec: sub/b.yaml
+    command: analyse
+    overrides: [experiment.samples=10, "spectrum={type: white}"]
+    quantities:
+      - {path: cost, expected: 1, absolute: 0.5, why: w, source: s}
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "g.yaml"
+    path.write_text(text)
+    return path
+
+
+def diagnostics(tmp_path, text):
+    with pytest.raises(SpecError) as caught:
+        load_golden(written(tmp_path, text))
+    return caught.value.diagnostics
+
+
+def test_a_golden_file_is_read(tmp_path):
+    golden = load_golden(written(tmp_path, GOOD))
+    assert golden.title == "Two runs"
+    one, two = golden.runs
+    assert (one.name, one.command, one.overrides) == ("one", "solve", ())
+    assert golden.spec_of(one) == tmp_path / "a.yaml"
+    assert golden.spec_of(two) == tmp_path / "sub" / "b.yaml"
+    assert two.command == "analyse"
+    assert two.overrides == ("experiment.samples=10", "spectrum={type: white}")
+    assert [q.tolerance for q in one.quantities] == pytest.approx([1e-3, 4e-2])
+    assert [q.name for q in one.quantities] == ["objective.value", "second power"]
+
+
+def test_rows_compare_with_the_tolerance(tmp_path):
+    golden = load_golden(written(tmp_path, GOOD))
+    results = {
+        "one": {"objective": {"value": 2.0009}, "power": {"input": [0.0, -4.05]}},
+        "two": {"cost": 1.5},
+    }
+    rows = compare(golden, results)
+    assert [row.passed for row in rows] == [True, False, True]
+    assert rows[0].deviation == pytest.approx(9e-4)
+    assert rows[1].deviation == pytest.approx(-0.05)
+    assert rows[1].as_dict()["source"] == "paper, Section 9"
+
+
+@pytest.mark.parametrize(
+    ("results", "notes"),
+    [
+        ({}, ["the run has no result"] * 3),
+        (
+            {"one": {"objective": 5, "power": {"input": [1.0]}}, "two": InfeasibleError([])},
+            ["the result has no objective.value", "the result has no power.input[1]", ""],
+        ),
+        (
+            {"one": {"objective": {"value": "x"}, "power": {"input": [0, None]}}, "two": {"cost": math.nan}},
+            ["objective.value is not a number", "power.input[1] is not a number", ""],
+        ),
+    ],
+)
+def test_what_is_not_there_does_not_agree(tmp_path, results, notes):
+    rows = compare(load_golden(written(tmp_path, GOOD)), results)
+    assert [row.note for row in rows] == notes
+    assert not any(row.passed for row in rows)
+
+
+def test_execute_runs_the_verb_with_the_overrides(tmp_path, monkeypatch):
+    monkeypatch.setattr("inputdesign_cli.sweeps.verbs.load_spec", lambda *a: a)
+    verb = lambda spec: Results(typed({"spec": spec}), resolved_spec="")  # noqa: E731
+    monkeypatch.setattr("inputdesign_cli.questions.analyse", verb)
+    golden = load_golden(written(tmp_path, GOOD))
+    expected = (tmp_path / "sub" / "b.yaml", ["experiment.samples=10", "spectrum={type: white}"])
+    assert execute(golden, golden.runs[1])["spec"] == list(expected)
+
+
+def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch):
+    def fails(error):
+        def verb(spec):
+            raise error
+
+        return verb
+
+    golden = load_golden(written(tmp_path, GOOD))
+    monkeypatch.setattr("inputdesign_cli.sweeps.verbs.load_spec", lambda *a: a)
+    infeasible = InfeasibleError([])
+    monkeypatch.setattr("inputdesign_cli.questions.solve", fails(infeasible))
+    assert execute(golden, golden.runs[0]) is infeasible
+    monkeypatch.setattr("inputdesign_cli.questions.solve", fails(bad_spec("x", "y")))
+    with pytest.raises(SpecError):
+        execute(golden, golden.runs[0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "key"),
+    [
+        ("expected: 2,", "expected: two,", 6, "runs[0].quantities[0].expected"),
+        ("expected: 2,", "expected: .nan,", 6, "runs[0].quantities[0].expected"),
+        ("absolute: 1e-3", "absolute: -1e-3", 6, "runs[0].quantities[0].absolute"),
+        ("absolute: 1e-3, ", "", 6, "runs[0].quantities[0]"),
+        ("absolute: 1e-3", "absolute: 1e-3, relative: 1", 6, "runs[0].quantities[0]"),
+        ("label: second", "lable: second", 8, "runs[0].quantities[1].lable"),
+        ('"power.input[1]"', '"power..input"', 7, "runs[0].quantities[1].path"),
+        ("command: analyse", "command: divine", 15, "runs[1].command"),
+        ("name: two", "name: one", 13, "runs[1].name"),
+        ("spec: sub/b.yaml", "spec: []", 14, "runs[1].spec"),
+        ("overrides: [", "overrides: [[1], ", 16, "runs[1].overrides[0]"),
+        ("title: Two runs", "title: Two runs\ntitle: again", 2, "title"),
+    ],
+)
+def test_complaints_name_the_line_and_the_key(tmp_path, old, new, line, key):
+    assert old in GOOD
+    (diagnostic,) = diagnostics(tmp_path, GOOD.replace(old, new))
+    assert diagnostic.key == key
+    assert diagnostic.location.file == str(tmp_path / "g.yaml")
+    assert diagnostic.location.line == line
+    assert diagnostic.location.text == GOOD.replace(old, new).splitlines()[line - 1]
+
+
+def test_a_missing_key_is_named(tmp_path):
+    (diagnostic,) = diagnostics(tmp_path, GOOD.replace("why: rounding, ", ""))
+    assert '"why"' in diagnostic.message
+    assert diagnostic.location.line == 6
+
+
+def test_all_problems_are_reported_at_once(tmp_path):
+    text = GOOD.replace("expected: 2,", "expected: two,").replace("command: analyse", "command: divine")
+    assert len(diagnostics(tmp_path, text)) == 2
+
+
+@pytest.mark.parametrize("text", ["", "- a", "runs: 5", "runs: [", "runs:\n\t- x", "runs: [5]"])
+def test_what_is_no_golden_file(tmp_path, text):
+    assert diagnostics(tmp_path, text)
+
+
+def test_a_missing_golden_file(tmp_path):
+    with pytest.raises(SpecError, match=r"nowhere\.yaml"):
+        load_golden(tmp_path / "nowhere.yaml")
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_the_shipped_files_are_sound(path):
+    golden = load_golden(path)
+    for run in golden.runs:
+        assert golden.spec_of(run).is_file()
+        assert run.quantities
+        for quantity in run.quantities:
+            assert quantity.why
+            assert quantity.source == "closed form" or quantity.source.startswith(("paper, ", "independent"))
+
+
+def test_the_reconstruction_is_called_one():
+    (path,) = [path for path in SHIPPED if path.stem == "flexible_transmission"]
+    golden = load_golden(path)
+    assert "reconstruction" in golden.title
+    assert all("reconstruction" in q.name for run in golden.runs for q in run.quantities)
+
+
+def test_figures_of_the_paper_and_recomputed_ones_agree_with_each_other():
+    """Where both stand side by side, the recomputed one lies within the tolerance of the printed one."""
+    pairs = 0
+    for path in SHIPPED:
+        for run in load_golden(path).runs:
+            for printed in run.quantities:
+                if not printed.source.startswith("paper"):
+                    continue
+                for other in run.quantities:
+                    if other.path == printed.path and other is not printed:
+                        assert abs(other.expected - printed.expected) <= printed.tolerance
+                        pairs += 1
+    assert pairs >= 7
+
+
+@pytest.mark.parametrize("spec", sorted((Path(__file__).parents[2] / "specs").glob("*.yaml"))[::5])
+def test_a_spec_in_place_of_a_golden_file_is_told_as_one(spec):
+    with pytest.raises(SpecError) as raised:
+        load_golden(spec)
+    (one,) = raised.value.diagnostics
+    assert one.code == "golden-is-spec"
+    assert f"`idesign validate {spec}`" in one.hint

@@ -1,0 +1,295 @@
+"""A run directory is whole or absent, and never a mixture of two runs."""
+
+import errno
+import hashlib
+import json
+import os
+import pathlib
+import platform
+import shutil
+from contextlib import suppress
+from importlib import metadata
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome import replacing
+from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.run_directory import read_run, write_run
+from tests.support.run_directories import a_run, marks, names, write_with_figures
+
+
+def test_the_files_of_a_run(tmp_path):
+    paths = write_with_figures(a_run("first", optimality=True), tmp_path / "runs" / "a")
+    assert [path.name for path in paths] == [
+        "spec.yaml",
+        "signal.csv",
+        "optimality.csv",
+        "signal.png",
+        "optimality.png",
+        "figures.json",
+        "result.json",
+    ]
+    assert names(tmp_path / "runs" / "a") == {path.name for path in paths}
+    assert names(tmp_path / "runs") == {"a"}
+    assert (tmp_path / "runs" / "a" / "signal.png").read_bytes() == b"drawn"
+
+
+def test_figures_can_be_left_out(tmp_path):
+    write_run(a_run("first"), tmp_path / "a")
+    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
+
+
+def test_the_result_names_its_software_and_its_spec(tmp_path):
+    write_run(a_run("first"), tmp_path / "a")
+    result = json.loads((tmp_path / "a" / "result.json").read_text())
+    assert result["spec_sha256"] == hashlib.sha256((tmp_path / "a" / "spec.yaml").read_bytes()).hexdigest()
+    assert result["environment"]["python"] == platform.python_version()
+    assert result["environment"]["numpy"] == metadata.version("numpy")
+    assert set(result["environment"]) >= {"platform", "idesign", "scipy", "cvxpy", "clarabel"}
+
+
+def test_read_run_returns_what_was_written(tmp_path):
+    write_with_figures(a_run("first"), tmp_path / "a")
+    result = read_run(tmp_path / "a")
+    assert result["title"] == "first"
+    assert result["objective"] == {"kind": "least_cost", "value": 5.0}
+    assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png", "figures.json"}
+
+
+def test_a_later_run_replaces_an_earlier_one_and_its_stale_figure(tmp_path):
+    write_with_figures(a_run("first", optimality=True), tmp_path / "a")
+    write_with_figures(a_run("second"), tmp_path / "a")
+    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "figures.json", "result.json"}
+    assert marks(tmp_path / "a") == {"second"}
+
+
+def test_files_of_the_user_survive(tmp_path):
+    write_with_figures(a_run("first", optimality=True), tmp_path / "a")
+    (tmp_path / "a" / "notes.txt").write_text("mine")
+    (tmp_path / "a" / "photo.png").write_text("mine")
+    (tmp_path / "a" / "data").mkdir()
+    write_with_figures(a_run("second"), tmp_path / "a")
+    assert (tmp_path / "a" / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "a" / "photo.png").read_text() == "mine"
+    assert (tmp_path / "a" / "data").is_dir()
+
+
+def test_a_file_of_the_user_is_never_overwritten(tmp_path):
+    (tmp_path / "spec.yaml").write_text("mine")
+    with pytest.raises(OutputError) as caught:
+        write_with_figures(a_run("first"), tmp_path)
+    assert caught.value.diagnostics[0].code == "output-not-a-run"
+    assert "spec.yaml" in caught.value.diagnostics[0].message
+    assert names(tmp_path) == {"spec.yaml"}
+    assert (tmp_path / "spec.yaml").read_text() == "mine"
+
+
+def test_a_run_into_an_empty_directory(tmp_path):
+    (tmp_path / "a").mkdir()
+    write_run(a_run("first"), tmp_path / "a")
+    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
+
+
+def test_a_link_to_a_directory_stays_a_link(tmp_path):
+    (tmp_path / "disc").mkdir()
+    (tmp_path / "a").symlink_to(tmp_path / "disc")
+    write_run(a_run("first"), tmp_path / "a")
+    assert (tmp_path / "a").is_symlink()
+    assert (tmp_path / "disc" / "result.json").is_file()
+
+
+def test_a_destination_that_is_a_file(tmp_path):
+    (tmp_path / "a").write_text("mine")
+    with pytest.raises(OutputError) as caught:
+        write_with_figures(a_run("first"), tmp_path / "a")
+    assert caught.value.diagnostics[0].code == "output-not-a-directory"
+    assert (tmp_path / "a").read_text() == "mine"
+
+
+def test_a_destination_below_a_file(tmp_path):
+    (tmp_path / "a").write_text("mine")
+    with pytest.raises(OutputError) as caught:
+        write_with_figures(a_run("first"), tmp_path / "a" / "b")
+    assert caught.value.diagnostics[0].code == "output-not-writable"
+
+
+def contents(directory) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+class Saboteur:
+    """Makes the n-th of the file operations of the run fail, and every operation before it work."""
+
+    def __init__(self, monkeypatch, failing: int, error: BaseException):
+        self.count, self.failing, self.error = 0, failing, error
+        for owner, name in (
+            (pathlib.Path, "write_text"),
+            (pathlib.Path, "rename"),
+            (pathlib.Path, "replace"),
+            (pathlib.Path, "mkdir"),
+            (os, "fsync"),
+        ):
+            monkeypatch.setattr(owner, name, self.wrap(getattr(owner, name)))
+
+    def wrap(self, original):
+        def operation(*args, **kwargs):
+            self.count += 1
+            if self.count == self.failing:
+                raise self.error
+            return original(*args, **kwargs)
+
+        return operation
+
+
+def count_operations(monkeypatch, write) -> int:
+    with monkeypatch.context() as patch:
+        saboteur = Saboteur(patch, -1, OSError())
+        write()
+    return saboteur.count
+
+
+ERRORS = [
+    (OSError(errno.ENOSPC, "No space left on device"), OutputError),
+    (PermissionError(errno.EACCES, "Permission denied"), OutputError),
+    (KeyboardInterrupt(), KeyboardInterrupt),
+]
+
+
+@pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
+def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch, error, raised):
+    steps = count_operations(monkeypatch, lambda: write_run(a_run("first"), tmp_path / "probe"))
+    assert steps > 6
+    for step in range(1, steps):
+        place = tmp_path / f"step{step}"
+        place.mkdir()
+        with monkeypatch.context() as patch:
+            Saboteur(patch, step, error)
+            with pytest.raises(raised):
+                write_run(a_run("first"), place / "a")
+        assert names(place) == set(), step
+
+
+@pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
+@pytest.mark.parametrize("exchange", [True, False])
+def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(
+    tmp_path, monkeypatch, error, raised, exchange
+):
+    if not exchange:
+        monkeypatch.setattr(replacing, "_exchange", lambda: None)
+    write_with_figures(a_run("first", optimality=True), tmp_path / "probe")
+    steps = count_operations(monkeypatch, lambda: write_run(a_run("second"), tmp_path / "probe"))
+    assert steps > 12
+    old = tmp_path / "a"
+    write_with_figures(a_run("first", optimality=True), old)
+    (old / "notes.txt").write_text("mine")
+    before = contents(old)
+    outcomes = []
+    for step in range(1, steps + 1):
+        with monkeypatch.context() as patch:
+            Saboteur(patch, step, error)
+            with suppress(raised):
+                write_run(a_run("second"), old)
+                assert not (exchange and raised is KeyboardInterrupt)
+        assert names(tmp_path) == {"a", "probe"}, step
+        outcomes.append(contents(old) == before)
+        if not outcomes[-1]:
+            # What fails in the exchange leads to moves; what fails after it, to a new run in place.
+            assert exchange or step == steps
+            assert marks(old) == {"second"}
+            assert (old / "notes.txt").read_text() == "mine"
+            shutil.rmtree(old)
+            write_with_figures(a_run("first", optimality=True), old)
+            (old / "notes.txt").write_text("mine")
+            before = contents(old)
+    assert outcomes.count(True) > 8
+
+
+def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch):
+    """The state of the directory before each single move: with a result.json, all files are of its run."""
+    write_with_figures(a_run("first"), tmp_path / "a")
+    seen = []
+
+    def observe(original):
+        def operation(*args, **kwargs):
+            if (tmp_path / "a" / "result.json").exists():
+                seen.append(marks(tmp_path / "a"))
+            return original(*args, **kwargs)
+
+        return operation
+
+    with monkeypatch.context() as patch:
+        for name in ("rename", "replace"):
+            patch.setattr(pathlib.Path, name, observe(getattr(pathlib.Path, name)))
+        write_with_figures(a_run("second"), tmp_path / "a")
+    seen.append(marks(tmp_path / "a"))
+    assert all(len(found) == 1 for found in seen)
+    assert seen[0] == {"first"}
+    assert seen[-1] == {"second"}
+
+
+def test_a_disc_that_fills_up_while_writing(tmp_path, monkeypatch):
+    """The error comes from the write itself, after the file has been opened and half written."""
+    real_open = pathlib.Path.open
+
+    class Full:
+        def __init__(self, file):
+            self.file = file
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *exc):
+            self.file.close()
+
+        def write(self, text):
+            self.file.write(text[:3])
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    def open_full(self, *args, **kwargs):
+        file = real_open(self, *args, **kwargs)
+        return Full(file) if self.name == "signal.csv" else file
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pathlib.Path, "open", open_full)
+        with pytest.raises(OutputError) as caught:
+            write_run(a_run("first"), tmp_path / "a")
+    assert caught.value.diagnostics[0].code == "output-full"
+    assert names(tmp_path) == set()
+
+
+def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
+    bad = Results(typed({"format": 1, "value": np.nan}), resolved_spec="")
+    with pytest.raises(ValueError, match=r"result\.value"):
+        write_with_figures(bad, tmp_path / "a")
+    assert names(tmp_path) == set()
+
+
+@pytest.mark.parametrize(
+    ("files", "code"),
+    [
+        ({}, "run-missing"),
+        ({"result.json": "{"}, "run-unreadable"),
+        ({"result.json": "[]"}, "run-unreadable"),
+        ({"result.json": "[" * 100_000}, "run-unreadable"),
+        ({"result.json": '{"format": 1, "files": [1, null]}'}, "run-unreadable"),
+        ({"result.json": '{"format": 1, "files": 7}'}, "run-unreadable"),
+        ({"result.json": json.dumps({"format": 1, "files": ["x" * 300]})}, "run-unreadable"),
+        ({"result.json": json.dumps({"format": 1, "files": ["\ud800"]})}, "run-unreadable"),
+        ({"result.json": '{"format": %s}' % ("1" * 10_000)}, "run-unreadable"),
+        ({"result.json": '{"format": 1, "files": ["spec.yaml"]}'}, "run-incomplete"),
+    ],
+)
+def test_read_run_explains_what_is_wrong(tmp_path, files, code):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(DataError) as caught:
+        read_run(tmp_path)
+    assert caught.value.diagnostics[0].code == code
+
+
+def test_read_run_of_no_directory(tmp_path):
+    with pytest.raises(DataError) as caught:
+        read_run(tmp_path / "nowhere")
+    assert caught.value.diagnostics[0].code == "run-missing"

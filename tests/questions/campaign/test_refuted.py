@@ -1,0 +1,97 @@
+"""Campaigns whose model lacks something end as soon as the data say so, and not by chance before."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from tests.support.campaigns import SPEC, planned, written
+
+TWO_POLES = [1.0, -1.3, 0.42]  # where the model has one
+
+
+def recorded(directory, path, seed=5):
+    """What a plant with another pole answers to the part that comes next."""
+    times, u = planned(directory).T
+    n = len(np.loadtxt(directory / "signal.csv", delimiter=",", skiprows=1, ndmin=2))
+    e = np.random.default_rng(seed).standard_normal(2000)[: len(u)]
+    y = lfilter([0.0, 1.4], TWO_POLES, u) + e
+    return written(path, times[-n:], u[-n:], y[-n:])
+
+
+def until_it_ends(run, directory, folder, *options, most=12):
+    """Exit code and result of the last part."""
+    for part in range(most):
+        given = recorded(directory, folder / f"r{part}.csv")
+        code, out, err = run("next", "c", given, "--json", "--no-figures", *options)
+        assert code in (0, 1, 5), err
+        if json.loads(out)["status"] != "running":
+            break
+    return code, json.loads(out)
+
+
+def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
+    code, result = until_it_ends(run, begun, tmp_path)
+    assert code == 5
+    assert result["status"] == "undecided"
+    assert result["samples"] < 0.5 * result["campaign"]["max_samples"]
+    told = result["notes"][0]
+    assert f"ends after {result['samples']} of at most 600 samples" in told
+    assert "idesign explore c/record_??.csv" in told
+    assert not (begun / "signal.csv").exists()
+    # More records are not taken, unless it is said that it goes on.
+    code, _, err = run("next", "c", tmp_path / "r0.csv")
+    assert code == 2
+    assert "--regardless" in err
+    before = result["samples"]
+    code, out, _ = run("next", "c", "--regardless", "--json", "--no-figures")
+    assert code == 0
+    assert json.loads(out)["status"] == "running"
+    code, result = until_it_ends(run, begun, tmp_path)
+    assert result["samples"] > before
+    assert code == 5, "a verdict cannot rest on a structure that is refuted"
+
+
+def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
+    until_it_ends(run, begun, tmp_path)
+    assert run("next", "c", "--withdraw", 1, "--no-figures")[0] in (0, 5)
+    notes = json.loads((begun / "result.json").read_text())["notes"]
+    assert not any("record_01.csv" in note or "record_??" in note for note in notes)
+
+
+def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
+    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 60, stop: never}"))
+    assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
+    code, result = until_it_ends(run, tmp_path / "c", tmp_path)
+    assert result["samples"] == 200
+    assert code == 5
+
+
+def test_a_record_is_not_withdrawn_and_forgiven_at_once(run, begun):
+    code, _, err = run("next", "c", "--withdraw", 1, "--regardless")
+    assert code == 2
+    assert "--regardless" in err
+
+
+@pytest.mark.slow
+def test_right_models_are_seldom_refuted_at_any_part():
+    """White records of a first-order plant, looked at after each of 30 parts."""
+    from inputdesign_cli import parse_spec
+    from inputdesign_cli.identification import identify
+    from inputdesign_cli.questions.campaign.build import build_campaign
+
+    study = build_campaign(parse_spec(SPEC, overrides=["campaign.block=20"])).study
+    model, rules = study.true.model, study.rules
+    assert rules.schedule.looks == 30
+    refuted = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        u, e = rng.standard_normal((2, 1, 600, 1))
+        caused, noise = model.simulate(u, e, 1.0)
+        y = (caused + noise)[0]
+        refuted += any(
+            rules.refuted(identify(model, u[0, :n], y[:n], start=model.theta, rest=True, near=True))
+            for n in range(40, 601, 20)
+        )
+    assert refuted <= 4

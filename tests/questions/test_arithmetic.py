@@ -1,0 +1,118 @@
+"""A result follows the units it is asked in; what leaves the range of arithmetic is an error with its key."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
+from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.questions.arithmetic import finite, most_extreme, sound_arithmetic
+
+BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}"
+CRITERION = "accuracy: {criterion: D}\nlimits: {input_power: 1}"
+
+
+def objective(asked, *, variance=1.0, gain=3.6):
+    text = (
+        f"plant: {{B: [0, {gain}], F: [1, -0.7]}}\nnoise: {{C: [1, -0.9], variance: {variance}}}\n{asked}\n"
+    )
+    return solve(parse_spec(f"{text}experiment: {{samples: 50}}\nspectrum: {{type: fir, order: 3}}")).result[
+        "objective"
+    ]
+
+
+@pytest.mark.parametrize("power", [-40, -20, 20, 40])
+def test_designs_follow_their_units_over_eighty_powers_of_ten(power):
+    unit = 10.0**power
+    plain, other = objective(BOUND)["value"], objective(BOUND, variance=unit)["value"]
+    assert other / unit == pytest.approx(plain, rel=1e-6)
+    half = 10.0 ** (power / 2)
+    assert objective(BOUND, gain=3.6 * half)["value"] * unit == pytest.approx(plain, rel=1e-6)
+    # c1 is told by the noise alone, in its own unit; b1 and f1 lose by the variance.
+    better = objective(CRITERION, variance=1 / unit)["value"]
+    assert better == pytest.approx(objective(CRITERION)["value"] + 2 * math.log(unit), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("noise.variance", "noise: {variance: 1.0e-300}"),
+        ("sample_time", "sample_time: 1.0e+300"),
+        ("accuracy.model_error.alpha", "accuracy: {model_error: {relative: 0.01, alpha: 1.0e-300}}"),
+        ("accuracy.standard_deviation.b1", "accuracy: {standard_deviation: {b1: 1.0e-300}}"),
+        ("plant.B[1]", "plant: {B: [0, 1.0e+300], F: [1, -0.7]}"),
+        ("experiment.prior.information[0][0]", "experiment: {prior: {information: [[1.0e+300, 0], [0, 1]]}}"),
+        ("signal.offset", "signal: {offset: 1.0e+90}\nexperiment: {samples: 50}"),
+    ],
+)
+def test_a_number_out_of_range_is_refused_by_its_key(key, text):
+    base = {"plant": "plant: {B: [0, 1], F: [1, -0.7]}", "noise": "noise: {variance: 1}", "accuracy": BOUND}
+    lines = [line for name, line in base.items() if not text.startswith(name)]
+    with pytest.raises(SpecError) as found:
+        solve(parse_spec("\n".join([*lines, text, "spectrum: {type: white}"])))
+    (diagnostic,) = found.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == ("out-of-range", key)
+
+
+@pytest.mark.parametrize("fault", [lambda: np.ones(1) / np.zeros(1), lambda: 1.0 / 0.0, lambda: 10.0**400])
+def test_what_arithmetic_cannot_hold_names_the_most_extreme_number(fault):
+    with pytest.raises(InaccurateError) as found, sound_arithmetic(("noise.variance", 12.0)):
+        fault()
+    (diagnostic,) = found.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == ("beyond-precision", "noise.variance")
+
+
+def test_the_most_extreme_number_is_the_farthest_from_one():
+    data = {"a": [1.0, {"b": 1e-9}], "c": 1e7, "d": 0.0, "e": True, "f": "1e99"}
+    assert most_extreme(data) == ("a[1].b", pytest.approx(9.0))
+    assert most_extreme({}) == ("", 0.0)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_no_result_holds_a_number_that_is_none(value):
+    good = Results(
+        typed({"cost": 1.0, "power": {"input": [1.0]}}), "", "s", {"spectrum": Table({"phi": np.ones(2)})}
+    )
+    assert finite(good, ("", 0.0)) is good
+    for bad in (
+        replace(good, outcome=typed({"cost": 1.0, "power": {"input": [value]}})),
+        replace(good, tables={"spectrum": Table({"phi": np.array([1.0, value])})}),
+    ):
+        with pytest.raises(InaccurateError) as found:
+            finite(bad, ("", 0.0))
+        assert found.value.diagnostics[0].code == "beyond-precision"
+
+
+def test_a_record_too_short_to_meet_the_accuracy_says_so():
+    text = f"plant: {{B: [0, 0, 0, 1], F: [1, -0.7]}}\nnoise: {{variance: 1}}\n{BOUND}\n"
+    with pytest.raises(InfeasibleError, match="no record of 3 samples") as found:
+        solve(parse_spec(text + "experiment: {samples: 3}"))
+    assert found.value.diagnostics[0].code == "record-too-short"
+
+
+def test_nothing_asked_needs_nothing():
+    text = "plant: {B: [0, 1], F: [1, -0.7]}\nnoise: {variance: 1}\naccuracy: {information: [[0, 0], [0, 0]]}"
+    found = solve(parse_spec(text)).result
+    assert (found["status"], found["cost"]) == ("nothing_needed", 0.0)
+
+
+def test_an_input_without_power_has_none():
+    text = """
+plant:
+  continuous:
+    numerator: [[[-1.4, 1.2], [-1.5]], [[0.5], [1.3]]]
+    denominator: [[[1, 2.9, 2.1], [1, 0.9]], [[1, 1], [1, 1.2, 1.6]]]
+noise: {variance: [[0.03, 0.02], [0.02, 0.26]]}
+spectrum: {type: polynomial, order: 4, band: [0, 3], basis: legendre}
+experiment: {samples: 500}
+limits: {input_power: 1}
+accuracy: {criterion: T}
+"""
+    found = solve(parse_spec(text)).result
+    assert min(found["power"]["input"]) >= 0.0
+    assert sum(found["power"]["input"]) == pytest.approx(1.0, rel=1e-6)

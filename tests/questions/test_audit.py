@@ -1,0 +1,108 @@
+"""The last check of a design passes what is right, and sees each way in which a result could lie."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.outcome.text_formats import plain
+from inputdesign_cli.questions.least_cost.audit import audit
+from inputdesign_cli.questions.least_cost.outcome import design_result
+from inputdesign_cli.questions.task import build_task
+
+PLANT = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+"""
+LEAST = PLANT + "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}\n"
+TWO = """
+plant: {B: [[[0, 1], [0, 0.4]], [[0, 0.3], [0, 0.8]]], F: [[[1, -0.8], [1, -0.5]], [[1, -0.6], [1, -0.7]]]}
+noise: {variance: [[1, 0.3], [0.3, 2]]}
+experiment: {samples: 500}
+"""
+DESIGNS = {
+    "fir": LEAST + "spectrum: {type: fir, order: 8}\n",
+    "white": LEAST + "spectrum: {type: white}\n",
+    "free": LEAST + "spectrum: {type: free}\n",
+    "lines": LEAST + "spectrum: {type: multisine, lines: 20}\n",
+    "band": LEAST + "spectrum: {type: polynomial, basis: chebyshev, order: 5, band: [0.02, 3.1]}\n",
+    "limited": LEAST + "limits: {output_power: 45}\nspectrum: {type: fir, order: 8}\n",
+    "loop": LEAST.replace("500}", "500, controller: {numerator: [0.1], denominator: [1, -1]}}")
+    + "spectrum: {type: fir, order: 8}\n",
+    "shortest": LEAST + "objective: shortest_experiment\nlimits: {input_power: 1}\n",
+    "criterion": TWO
+    + "accuracy: {criterion: D}\nlimits: {input_power: [1, 2]}\nspectrum: {type: fir, order: 3}\n",
+    "two": TWO + "cost: {input_power: 1}\naccuracy: {model_error: {absolute: 0.3}}\nspectrum: {type: free}\n",
+    "polynomial": TWO + "accuracy: {criterion: A}\nlimits: {input_power: 1}\n"
+    "spectrum: {type: polynomial, order: 3, band: [0.1, 2], coefficients: complex}\n",
+}
+
+
+@pytest.fixture(scope="module", params=DESIGNS)
+def designed(request):
+    task = build_task(parse_spec(DESIGNS[request.param]))
+    done, how = task.designed()
+    return done, plain(design_result(done, how, task.tolerance))
+
+
+def refused(done, result):
+    with pytest.raises(InaccurateError) as caught:
+        audit(done, result, on_grid=False)
+    assert caught.value.diagnostics[0].code == "internal-disagreement"
+
+
+def test_a_right_result_passes(designed):
+    done, result = designed
+    audit(done, result, on_grid=False)
+
+
+@pytest.mark.parametrize("factor", [0.999, 1.001])
+def test_a_spectrum_of_another_size_is_seen(designed, factor):
+    done, result = designed[0], copy.deepcopy(designed[1])
+    for key in ("coefficients", "powers"):
+        if key in result["spectrum"]:
+            result["spectrum"][key] = scaled(result["spectrum"][key], factor)
+    if result["spectrum"]["type"] == "white":
+        result["spectrum"]["power"] *= factor
+    refused(done, result)
+
+
+def test_a_line_that_was_dropped_is_seen(designed):
+    done, result = designed[0], copy.deepcopy(designed[1])
+    entry = result["spectrum"]
+    if "powers" not in entry:
+        return
+    sizes = [np.abs(np.sum(p)) if np.ndim(p) == 0 else 0.0 for p in entry["powers"]]
+    dropped = int(np.argmax(sizes))
+    del entry["frequencies"][dropped], entry["powers"][dropped]
+    refused(done, result)
+
+
+@pytest.mark.parametrize("name", ["lower_bound", "upper_bound", "any_spectrum_bound"])
+def test_a_value_beyond_its_bound_is_seen(designed, name):
+    done, result = designed[0], copy.deepcopy(designed[1])
+    objective = result["objective"]
+    if name not in objective:
+        return
+    step = 1e-4 * max(abs(objective["value"]), done.experiment.size)
+    objective[name] = objective["value"] + (-step if "upper_bound" in objective else step)
+    refused(done, result)
+
+
+def test_a_cost_of_another_spectrum_is_seen(designed):
+    done, result = designed[0], copy.deepcopy(designed[1])
+    if not done.cost:
+        return
+    result["cost"] *= 1.0 - 1e-4
+    refused(done, result)
+
+
+def scaled(value, factor):
+    if isinstance(value, list):
+        return [scaled(part, factor) for part in value]
+    if isinstance(value, dict):
+        return {name: factor * part for name, part in value.items()}
+    return factor * value

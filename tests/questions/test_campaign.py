@@ -1,0 +1,275 @@
+"""Campaigns: how an experiment is divided, what is built on after each part, and what the next one is."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from inputdesign_cli import parse_spec, simulate, solve
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.identification import identify, information_of_data
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.campaign.build import build_campaign, build_rules
+from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.rounds import continued
+from inputdesign_cli.questions.campaign.schedule import Schedule, Standing, ratio_of, standing
+from inputdesign_cli.questions.campaign.study import ways_of
+from inputdesign_cli.tasks.build.data import Data
+from tests.support.campaigns import SPEC, planner, record
+
+
+@pytest.mark.parametrize(
+    ("campaign", "takes"),
+    [
+        ("{block: 50}", [20, 50, 50, 50, 30, 50, 50]),
+        ("{block: 50, pilot: 10, max_samples: 230}", [10, 50, 50, 50, 40, 30]),
+        ("{stages: [50, 90, 60]}", [50, 90, 60, 60, 60]),
+        ("{pilot: {samples: 30, power: 1.0}}", [30] + 10 * [20] + [20, 20]),
+    ],
+)
+def test_an_experiment_is_divided_as_the_spec_says(campaign, takes):
+    schedule = build_rules(parse_spec(SPEC, overrides=[f"campaign={campaign}"])).schedule
+    done, found = 0, []
+    for _ in takes:
+        found.append(schedule.take(done))
+        # A plan is for all that is left, and never for less than its first part.
+        assert schedule.rest(done) == max(schedule.samples - done, found[-1])
+        done += found[-1]
+    assert found == takes
+
+
+@pytest.mark.parametrize(
+    ("campaign", "done", "take"),
+    [
+        ("{stages: [50, 90, 60]}", 49, 91),  # one sample of the first stage was not recorded
+        ("{stages: [50, 90, 60]}", 40, 10),
+        ("{stages: [50, 90, 60]}", 198, 60),
+        ("{block: 50}", 199, 50),
+        ("{block: 50}", 190, 10),
+        ("{block: 50, max_samples: 201}", 199, 2),
+    ],
+)
+def test_a_remainder_is_no_part_of_its_own(campaign, done, take):
+    """One sample would have to carry all that is missing."""
+    schedule = build_rules(parse_spec(SPEC, overrides=[f"campaign={campaign}"])).schedule
+    assert schedule.take(done) == take
+    assert schedule.rest(done) >= take
+
+
+def test_a_schedule_ends_at_its_longest():
+    schedule = Schedule((5,), 10, 20, 33)
+    done = 0
+    while take := schedule.take(done):
+        done += take
+    assert done == 33
+    assert schedule.looks == 5  # 5, 10, 5 and, beyond the 20 samples, 10 and 3
+
+
+@pytest.mark.parametrize(
+    ("overrides", "code"),
+    [
+        (["campaign.stages=[100, 50]", "campaign.block=null"], "conflicting-keys"),
+        (["campaign.block=300"], "conflicting-keys"),
+        (["campaign.max_samples=100"], "conflicting-keys"),
+        (["campaign.stages=[100, 100]"], "conflicting-keys"),
+        (["spectrum={given: {type: white, power: 1}}"], "not-supported"),
+        (["objective=best_accuracy", "limits.input_power=1"], "not-supported"),
+        (["campaign.blok=3"], "unknown-key"),
+    ],
+)
+def test_what_cannot_be_done_in_parts_is_told(overrides, code):
+    with pytest.raises(SpecError) as refused:
+        build_campaign(parse_spec(SPEC, overrides=overrides))
+    assert refused.value.diagnostics[0].code == code
+
+
+def test_information_is_that_of_the_samples_at_any_model():
+    u, y = record()
+    model = planner().nominal.model
+    for theta in ([3.6, -0.7], [3.2, -0.5]):
+        at = model.at(np.array(theta), np.array([[1.7]]))
+        b, f = theta
+        # y = b u(t-1) / (1 + f q^-1): by hand its derivatives.
+        gradient = np.array(
+            [lfilter([0, 1], [1, f], u[:, 0]), lfilter([0, 0, -b], np.convolve([1, f], [1, f]), u[:, 0])]
+        )
+        wanted = gradient @ gradient.T / 1.7
+        assert np.allclose(information_of_data(at, u, y), wanted, rtol=1e-10)
+    found = identify(model, u, y, rest=True)
+    assert np.allclose(
+        information_of_data(model.at(found.theta, found.noise), u, y), found.information, rtol=1e-6
+    )
+
+
+def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
+    u, y = record(40)
+    at, rules = planner(), build_rules(parse_spec(SPEC))
+    model = at.nominal.model.at(np.array([3.4, -0.73]), np.array([[1.2]]))
+    known = standing(at, model, lambda m: information_of_data(m, u, y), at.nominal.model)
+    assert known.share == 1.0
+    plan = at.plan(rules, known, 80, 5, None)
+    changes = {
+        "plant": {"B": [0, 3.4], "F": [1, -0.73]},
+        "noise": {"variance": 1.2},
+        "experiment": {"samples": 120, "prior": {"information": known.information.tolist()}},
+        "campaign": None,
+    }
+    by_hand = solve(parse_spec(SPEC, overrides=[f"{key}={json.dumps(x)}" for key, x in changes.items()]))
+    assert plan.cost == pytest.approx(by_hand.result["objective"]["value"], rel=1e-6)
+    assert plan.take == 60
+    assert len(plan.record) == 120
+    by_hand = solve(
+        parse_spec(
+            by_hand.resolved_spec,
+            overrides=["signal.seed=5", "signal.scale=design", "solver.any_spectrum=false"],
+        )
+    )
+    assert np.allclose(by_hand.signal, plan.record)
+    # What is kept of the plan is what the result says, with its bound.
+    told, kept = by_hand.result, plan.claim()
+    assert kept["objective"]["lower_bound"] == pytest.approx(told["objective"]["lower_bound"], rel=1e-9)
+    assert kept["objective"]["lower_bound"] <= kept["objective"]["value"] * (1 + 1e-9)
+    assert kept["spectrum"]["coefficients"] == pytest.approx(told["spectrum"]["coefficients"], rel=1e-9)
+    # The ratio is what the design says of the prior alone.
+    question = at.question(model, known.information)
+    assert ratio_of(question, question.information) == pytest.approx(known.ratio)
+
+
+def test_a_plan_that_ends_with_its_part_is_made_for_what_the_data_leave_open():
+    u, y = record(150)
+    spec = parse_spec(SPEC, overrides=["uncertainty={intervals: {b1: [3, 4]}, scenarios: 10, fresh: 0}"])
+    at = SpecPlanner(spec)
+    known = standing(at, at.nominal.model, lambda m: 0.2 * information_of_data(m, u, y), at.nominal.model)
+    costs = {}
+    for last in ("robust", "nominal"):
+        rules = build_rules(spec.with_(**{"campaign.last": last}))
+        assert at.plan(rules, known, 80, 5, None).kind == "nominal"  # something follows
+        plan = at.plan(rules, known, 150, 5, None)
+        assert plan.kind == last
+        costs[last] = plan.cost
+    assert costs["robust"] > costs["nominal"]
+
+
+COLOURED = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.1}, standard_deviation: {c1: 0.03}}
+spectrum: {type: fir, order: 4}
+signal: {candidates: 1}
+campaign: {stages: [100, 200], max_samples: 500}
+"""
+
+
+def test_where_no_power_is_enough_the_campaign_goes_on():
+    """var c1 = (1 - c1^2) / N by the noise alone: with c1 = 0 it takes 1111 samples, whatever is applied."""
+    at, rules = planner(COLOURED), build_rules(parse_spec(COLOURED))
+    first = at.plan(rules, None, 0, 5, None)
+    assert first.kind == "nominal"
+    model = at.nominal.model.at(np.array([3.6, 0.0, -0.7]), np.array([[1.0]]))
+    u, y = record(100)
+    known = standing(at, model, lambda m: information_of_data(m, u, y), at.nominal.model)
+    plan = at.plan(rules, known, 100, 5, first.cost)
+    assert (plan.kind, plan.claim, plan.take) == ("stopgap", None, 200)
+    assert "no power is enough" in plan.why
+    assert plan.cost == pytest.approx(first.cost)
+    assert np.mean(plan.record**2) == pytest.approx(first.cost, rel=1e-9)  # the power of the input is paid
+    half = at.plan(
+        build_rules(parse_spec(COLOURED, overrides=["campaign.power_cap=0.5"])), known, 100, 5, 2.0
+    )
+    assert half.cost == pytest.approx(1.0)
+
+
+def test_an_unstable_estimate_is_shrunk_to_the_last_stable_one():
+    u, y = record()
+    at = planner()
+    last = at.nominal.model
+    wild = last.at(np.array([3.0, -1.05]))
+    found = standing(at, wild, lambda m: information_of_data(m, u, y), last)
+    assert 0.0 < found.share < 1.0
+    assert found.model.radius <= at.farthest
+    expected = last.theta + found.share * (wild.theta - last.theta)
+    assert np.allclose(found.model.theta, expected)
+    assert not Standing(found.model, found.information, 0.5, found.share).met  # it decides nothing
+
+
+def test_records_whose_times_go_on_are_one():
+    units = Units("s", 0.5, True, False, 1, 1)
+    times = np.concatenate([0.5 * np.arange(4), 0.5 * np.arange(4, 7), 0.5 * np.arange(3)])
+    signal = np.zeros((10, 1))
+    data = Data(signal, signal, None, times, (4, 3, 3), (("a", 4), ("b", 3), ("c", 3)), ())
+    assert continued(data, units.sample_time).lengths == (7, 3)
+
+
+def test_whole_campaigns_are_simulated():
+    text = SPEC + "simulation: {runs: 2, seed: 2, compare: [white], plant: {B: [0, 3.2], F: [1, -0.75]}}\n"
+    overrides = [
+        "signal.candidates=1",
+        "campaign={stages: [60, 140]}",
+        "uncertainty={intervals: {b1: [3, 4]}, scenarios: 3, fresh: 0}",
+    ]
+    results = simulate(parse_spec(text, overrides=overrides))
+    told = results.result["simulation"]
+    assert list(told["inputs"]) == ["campaign", "one_shot", "one_shot_robust", "white"]
+    for entry in told["inputs"].values():
+        assert sum(entry[key] for key in ("stopped", "missed", "undecided", "unplanned")) == 2
+        low, high = entry["within_r_adm_true_limits"]
+        assert low <= entry["within_r_adm_true"] <= high
+    campaign = told["inputs"]["campaign"]
+    assert campaign["samples"]["mean"] >= 60
+    # The oracle is the design that knows the true plant.
+    known = ["signal.candidates=1", "campaign=null", "plant={B: [0, 3.2], F: [1, -0.75]}"]
+    solved = solve(parse_spec(SPEC, overrides=known))
+    truth, applied = solved.result, solved.tables["signal"].columns["u1"]
+    assert told["oracle_cost"] == pytest.approx(truth["cost"], rel=1e-6)
+    assert campaign["cost_over_oracle"]["mean"] == pytest.approx(
+        campaign["energy"]["mean"] / (200 * truth["cost"]), rel=1e-6
+    )
+    # Who knows the plant applies a record, too, and one that was chosen.
+    assert told["oracle_record_cost"] == pytest.approx(np.mean(applied**2), rel=1e-9)
+    assert campaign["cost_over_oracle_record"]["mean"] == pytest.approx(
+        campaign["energy"]["mean"] / np.sum(applied**2), rel=1e-9
+    )
+    # The first part has 60 samples and others 140, the last one perhaps less; in one shot there is one.
+    later = (campaign["samples"]["mean"] - 60) / 140
+    assert later <= campaign["parts"]["mean"] - 1.0 < later + 1.0
+    assert [told["inputs"][way]["parts"]["mean"] for way in ("one_shot", "white")] == [1.0, 1.0]
+    # The names of the numbers in campaigns.csv.
+    table, numbers = results.tables["campaigns"].columns, told["numbers"]
+    for way, name in enumerate(numbers["way"]):
+        ended = table["status"][table["way"] == way]
+        for status, ending in enumerate(numbers["status"]):
+            assert np.sum(ended == status) == told["inputs"][name][ending]
+    # Without anything to learn from, the experiment in one shot costs what its design costs.
+    shot = told["inputs"]["one_shot"]
+    assert shot["samples"]["mean"] == 200
+    assert shot["energy"]["mean"] == pytest.approx(200 * results.result["cost"], rel=0.3)
+    figures = draw_all(results)
+    assert {"true_ratio.png", "cost_coverage.png"} <= figures.keys()
+
+
+def test_simulated_campaigns_end_where_the_structure_is_refuted():
+    text = SPEC + "simulation: {runs: 3, seed: 2, plant: {B: [0, 1.4], F: [1, -1.3, 0.42]}}\n"
+    overrides = ["signal.candidates=1", "campaign={block: 20, max_samples: 600, last: nominal}"]
+    told = simulate(parse_spec(text, overrides=overrides)).result["simulation"]["inputs"]["campaign"]
+    assert told["undecided"] == 3
+    assert told["samples"]["mean"] < 300
+
+
+def test_ways_have_the_same_pilot():
+    spec = parse_spec(SPEC, overrides=["campaign={block: 50, pilot: {samples: 30, power: 0.1}}"])
+    ways = ways_of(build_campaign(spec).study)
+    assert ways["one_shot"].schedule.parts == (30, 200)
+    assert ways["campaign"].schedule.samples == 230
+
+
+@pytest.mark.slow
+def test_campaigns_keep_what_is_asked_from_a_wrong_model():
+    """A pole at 0.5 for 0.7: in one shot the money is lost; in parts it is not."""
+    text = SPEC.replace("-0.7", "-0.5") + "simulation: {runs: 40, plant: {B: [0, 3.6], F: [1, -0.7]}}\n"
+    told = simulate(parse_spec(text, overrides=["campaign={block: 20, last: nominal}"])).result["simulation"]
+    campaign, shot = told["inputs"]["campaign"], told["inputs"]["one_shot"]
+    assert campaign["within_r_adm_true_limits"][1] >= 0.95
+    assert campaign["cost_over_oracle"]["mean"] < shot["cost_over_oracle"]["mean"]

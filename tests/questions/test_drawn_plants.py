@@ -1,0 +1,164 @@
+"""The plants that `uncertainty` draws or lists: what is drawn again, and what is refused."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.questions.least_cost.build import build_convex
+from inputdesign_cli.questions.task import build_task
+from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS, complaint
+
+
+@pytest.mark.parametrize(
+    "prior",
+    [
+        f"covariance: {COVARIANCE}",
+        "information: [[100, 0, 0], [0, 1000, 0], [0, 0, 2500]]",
+        "covariance: [[0.01, 0], [0, 0.0004]], parameters: [b1, f1]",
+        "intervals: {b1: [3.3, 3.9], f1: [-0.75, -0.65]}",
+    ],
+)
+def test_plants_are_drawn_from_what_is_known(prior):
+    spec = parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, scenarios: 150}}"])
+    thetas = build_convex(spec).plants.batch.thetas
+    assert thetas.shape == (150, 3)
+    mean, spread = thetas.mean(axis=0), thetas.std(axis=0)
+    assert mean == pytest.approx([3.6, -0.9, -0.7], abs=0.03)
+    b1, c1, f1 = (0.1, 0.0316, 0.02) if "intervals" not in prior else (0.1732, 0.0, 0.02887)
+    assert spread == pytest.approx([b1, 0.0 if "b1, f1" in prior else c1, f1], rel=0.2)
+    again = build_convex(spec).plants.batch.thetas
+    np.testing.assert_array_equal(thetas, again)
+
+
+def test_a_record_and_a_model_file_tell_how_well_the_plant_is_known(tmp_path):
+    rng = np.random.default_rng(1)
+    np.savetxt(tmp_path / "first.csv", rng.normal(size=400), header="u", comments="")
+    (tmp_path / "model.yaml").write_text(
+        "estimate: {parameters: {b1: 3.6, c1: -0.9, f1: -0.7}, covariance: " + COVARIANCE + "}"
+    )
+    for asked in ("information: first.csv", "covariance: model.yaml", "information: model.yaml"):
+        spec = parse_spec(FIRST, overrides=[f"uncertainty={{{asked}, scenarios: 100}}"], folder=tmp_path)
+        thetas = build_convex(spec).plants.batch.thetas
+        if "model" in asked:
+            assert thetas.std(axis=0) == pytest.approx([0.1, 0.0316, 0.02], rel=0.2)
+        else:
+            # White input of power one: the variance of b1 is about that of a mean of 400 samples or more.
+            assert 0.02 < thetas[:, 0].std() < 0.2
+    moved = "estimate: {parameters: {b1: 4.6, c1: -0.9, f1: -0.7}, covariance: " + COVARIANCE + "}"
+    (tmp_path / "model.yaml").write_text(moved)
+    spec = parse_spec(FIRST, overrides=["uncertainty={covariance: model.yaml}"], folder=tmp_path)
+    with pytest.raises(SpecError, match=r"b1 is 4\.6 there and 3\.6 here"):
+        build_task(spec)
+
+
+def test_the_risk_sets_the_number_of_plants():
+    for order, risk, number in ((10, 0.1, 235), (6, 0.2, 85)):
+        asked = f"uncertainty={{covariance: {COVARIANCE}, risk: {risk}}}"
+        spec = parse_spec(FIRST, overrides=[asked, f"spectrum.order={order}"])
+        assert len(build_convex(spec).plants.batch.plants) == number
+
+
+@pytest.mark.parametrize(
+    ("text", "intervals", "name"),
+    [(PROCESS, "dead_time: [-1, 4]", "dead_time"), (PHYSICAL, "K: [-1, 3]", "K")],
+)
+def test_what_is_no_plant_is_drawn_again_and_counted(text, intervals, name):
+    """A fifth of the interval is a negative dead time; the root of a negative number is no gain."""
+    prior = f"uncertainty={{intervals: {{{intervals}}}, scenarios: 40, seed: 1}}"
+    batch = build_convex(parse_spec(text, overrides=[prior])).plants.batch
+    assert len(batch.plants) == 40
+    assert 2 <= batch.rejected <= 25
+    index = batch.plants[0].experiment.model.names.index(name)
+    assert np.all(batch.thetas[:, index] >= 0.0)
+
+
+def test_unstable_loops_are_drawn_again_and_counted():
+    """In this loop f1 < -1.02 or so is unstable."""
+    prior = "intervals: {f1: [-1.2, -0.6]}, scenarios: 60, seed: 3"
+    batch = build_convex(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}}}"])).plants.batch
+    assert len(batch.plants) == 60
+    assert batch.rejected > 0
+    for plant in batch.plants:
+        assert np.abs(plant.experiment.loop.closed_poles).max() < 0.9981
+
+
+@pytest.mark.parametrize(
+    ("text", "stated", "code", "key"),
+    [
+        (FIRST, "scenarios: [{f1: -0.6}, {a1: 0.3}]", "unknown-parameter", "uncertainty.scenarios[1]"),
+        (FIRST, "scenarios: [{f1: -1.6}]", "no-stable-plant", "uncertainty.scenarios[0]"),
+        (FIRST, "scenarios: [{f1: -1.0}]", "no-stable-plant", "uncertainty.scenarios[0]"),
+        (FIRST, "scenarios: [{c1: 1.0}]", "no-stable-plant", "uncertainty.scenarios[0]"),
+        (PROCESS, "scenarios: [{time_constant: 1.0e-3, dead_time: 2.0}]", "without-effect", "uncertainty"),
+        (FIRST, "scenarios: [{b1: 3}, {b1: 0}]", "not-a-plant", "uncertainty.scenarios[1]"),
+        (PROCESS, "scenarios: [{gain: 0}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PROCESS, "scenarios: [{time_constant: 0}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PROCESS, "scenarios: [{dead_time: -1.0e-3}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PHYSICAL, "scenarios: [{K: -1}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PHYSICAL, "scenarios: [{T: 5}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (FIRST, "covariance: [[1, 0], [0, 1]]", "wrong-shape", "uncertainty.covariance"),
+        (FIRST, "covariance: [[1, 0], [0, 1]], parameters: [b1, b9]", "unknown-parameter",
+         "uncertainty.covariance"),
+        (FIRST, "information: [[1, 0, 0], [0, 0, 0], [0, 0, 1]]", "not-positive-definite",
+         "uncertainty.information"),
+        (LOOP, "intervals: {b1: [-90, -30], f1: [-0.9, -0.7]}", "bad-interval", "uncertainty.intervals.b1"),
+        (LOOP, "covariance: [[1.0e+4, 0], [0, 1]]", "no-stable-plant", "uncertainty"),
+        (LOOP, "covariance: [[1, 0], [0, 1]], stable_within: 0.5", "no-stable-plant",
+         "uncertainty.stable_within"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_drawn_is_said(text, stated, code, key):
+    found = complaint(text, f"uncertainty={{{stated}}}")
+    assert (found.code, found.key) == (code, key)
+    assert found.hint
+
+
+@pytest.mark.parametrize(
+    ("stated", "code"),
+    [
+        ("seed: 3", "missing-key"),
+        (f"covariance: {COVARIANCE}, intervals: {{b1: [1, 5]}}", "conflicting-keys"),
+        (f"covariance: {COVARIANCE}, scenarios: [{{b1: 3}}]", "conflicting-keys"),
+        ("scenarios: [{b1: 3}], risk: 0.1", "conflicting-keys"),
+        (f"covariance: {COVARIANCE}, scenarios: 10, risk: 0.1", "conflicting-keys"),
+        ("covariance: [[1, 2], [2, 1]]", "not-positive-definite"),
+        ("covariance: [[1, 1], [1, 1]]", "not-positive-definite"),
+        ("scenarios: [{F: [1, -0.5, 0.2]}]", "not-a-number"),
+        ("intervals: {b1: [4, 3]}", "bad-interval"),
+        (f"covariance: {COVARIANCE}, scenarios: 5000", "too-large"),
+        (f"covariance: {COVARIANCE}, discard: 0.7", "out-of-range"),
+        (f"covariance: {COVARIANCE}, discard: 0.1, risk: 0.1", "conflicting-keys"),
+    ],
+)
+def test_what_contradicts_itself_is_said(stated, code):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(FIRST, overrides=[f"uncertainty={{{stated}}}"])
+    assert code in {found.code for found in caught.value.diagnostics}
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["solver.method=lmi"],
+        ["accuracy={criterion: D}", "limits={input_power: 1}",
+         "spectrum={type: polynomial, order: 4, band: [0, 3], factor_columns: 1}"],
+        ["accuracy={model_error: {relative: 0.1, region: ellipsoid}}", "uncertainty.r_adm=fixed"],
+        ["accuracy={model_error: {relative: 0.1, confidence: {exact: 0.95}}}"],
+    ],
+)  # fmt: skip
+def test_what_is_not_made_robust_is_said(overrides):
+    found = complaint(FIRST, "uncertainty={scenarios: [{b1: 3}]}", *overrides)
+    assert (found.code, found.key) == ("not-supported", "uncertainty")
+
+
+@pytest.mark.parametrize("listed", ["scenarios: [{dead_time: 900}]", "intervals: {dead_time: [1, 5000]}"])
+def test_a_dead_time_beyond_the_record_is_refused_at_every_plant(listed):
+    text = (
+        "sample_time: 1\nplant: {continuous: {gain: 2, time_constant: 10, dead_time: 2}, sample: zoh}\n"
+        "noise: {variance: 0.04}\nexperiment: {samples: 500}\naccuracy: {model_error: {relative: 0.1}}\n"
+        f"spectrum: {{type: fir, order: 6}}\nuncertainty: {{{listed}}}\n"
+    )
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(text))
+    assert caught.value.diagnostics[0].code == "delay-beyond-record"

@@ -1,0 +1,108 @@
+"""Durations in place of samples, and what channels are called."""
+
+import re
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import identify, parse_spec, solve
+from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.figures.plots import figure
+from inputdesign_cli.outcome.units import Units
+
+HEATER = """
+sample_time: 4.76
+plant: {continuous: {gain: 2.1, time_constant: 180, dead_time: 25}, sample: zoh}
+noise: {variance: 0.04}
+accuracy: {standard_deviation: {gain: 0.05}}
+spectrum: {type: multisine, lines: 60}
+signal: {candidates: 1}
+solver: {any_spectrum: false}
+"""
+CHANNELS = 'channels: {u1: {name: heating, unit: "%"}, y1: {unit: degC}}\n'
+
+
+def test_a_duration_is_as_many_samples_as_fit():
+    spec = parse_spec(HEATER + "experiment: {duration: 3600}\nlimits: {duration: 4760}\n")
+    assert (spec.experiment.samples, spec.limits.samples) == (756, 1000)
+    assert "duration: 3600" in spec.to_yaml()
+    assert "samples" not in spec.to_yaml()
+    costs = [
+        solve(parse_spec(f"{HEATER}experiment: {{{length}}}\n")).result["cost"]
+        for length in ("duration: 3600", "samples: 756")
+    ]
+    assert costs[0] == costs[1]
+
+
+@pytest.mark.parametrize(
+    ("extra", "code", "key"),
+    [
+        ("experiment: {duration: 3600, samples: 700}", "conflicting-keys", "experiment.duration"),
+        ("experiment: {duration: 3}", "out-of-range", "experiment.duration"),
+        ("experiment: {duration: -3}", "out-of-range", "experiment.duration"),
+        ("experiment: {duration: long}", "not-a-number", "experiment.duration"),
+        ("limits: {duration: 1}", "out-of-range", "limits.duration"),
+        ("channels: {u2: {unit: V}}", "unknown-name", "channels.u2"),
+        ("channels: {u1: {unit: 3}}", "not-a-text", "channels.u1.unit"),
+        ("channels: {u1: {unit: 'a, b'}}", "bad-name", "channels.u1.unit"),
+        ("channels: {u1: {units: V}}", "unknown-key", "channels.u1.units"),
+    ],
+)
+def test_what_is_wrong_is_told(extra, code, key):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(f"{HEATER}{extra}\n")
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == (code, key)
+
+
+def test_names_and_units_are_shown(tmp_path):
+    spec = parse_spec(f"{HEATER}{CHANNELS}experiment: {{samples: 120}}\n")
+    found = solve(spec)
+    assert list(found.tables["signal"].columns) == ["time_s", "u1 heating (%)"]
+    page = figure(found, "signal")
+    assert page.axes[0].get_ylabel() == "heating (%)"
+    u = np.array(found.tables["signal"].columns["u1 heating (%)"])
+    y = 2.1 * np.convolve(u, np.exp(-np.arange(200) / 38.0) / 38.0)[: u.size]
+    y += 0.01 * np.random.default_rng(0).standard_normal(u.size)
+    data = tmp_path / "log.csv"
+    rows = [f"{a!r},{b!r}" for a, b in zip(u.tolist(), y.tolist(), strict=True)]
+    data.write_text("\n".join(["u1 heating (%),y1 (degC)", *rows]))
+    fitted = identify(spec, data)
+    assert fitted.curves["fit"].panels[0].label == "(degC)"
+
+
+def test_an_excitation_has_the_unit_of_its_input():
+    units = Units("s", 1.0, True, True, 2, 1, {"u1": ("valve", "%"), "u2": ("", "V"), "y1": ("level", "")})
+    assert [units.label(name) for name in ("r1", "u1", "r2", "y1")] == ["(%)", "valve (%)", "(V)", "level"]
+    assert units.header("r2") == "r2 (V)"
+
+
+@pytest.mark.parametrize("lengths", [("duration", 0.5), ("samples", 1)], ids=["in seconds", "in samples"])
+def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
+    """The hint can be copied into the spec, and then suffices."""
+    word, unit = lengths
+    text = (
+        "sample_time: 0.5\nplant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {variance: 1}\n"
+        f"experiment: {{{word}: {{}}}}\naccuracy: {{model_error: {{relative: 0.05}}}}\n"
+        "limits: {amplitude: 0.25}\nspectrum: {type: fir, order: 8}\nsolver: {any_spectrum: false}\n"
+    ).replace("{}", "%s")
+    with pytest.raises(InfeasibleError) as caught:
+        solve(parse_spec(text % (400 * unit)))
+    (needed,) = re.findall(rf"experiment\.{word}: ([0-9.]+)", caught.value.diagnostics[0].hint)
+    assert solve(parse_spec(text % needed)).result["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_entries_are_titled_by_the_names_of_their_channels():
+    names = "channels: {u1: {name: valve}, u2: {name: pump}, y1: {name: level, unit: cm}}\n"
+    text = names + (
+        "plant: {B: [[[0, 1], [0, 0.5]]], F: [[[1, -0.5], [1, -0.7]]]}\nnoise: {variance: 0.1}\n"
+        "experiment: {samples: 200}\naccuracy: {criterion: D}\nlimits: {input_power: 1}\n"
+        "spectrum: {type: fir, order: 3}\nsignal: {candidates: 1}\nsolver: {any_spectrum: false}\n"
+    )
+    panels = solve(parse_spec(text)).curves["bound"].panels
+    assert [(panel.entry, panel.names) for panel in panels] == [
+        ((0, 0), "valve → level"),
+        ((0, 1), "pump → level"),
+    ]
+    unnamed = solve(parse_spec(text.replace(", y1: {name: level, unit: cm}", ""))).curves["bound"].panels
+    assert {panel.names for panel in unnamed} == {""}

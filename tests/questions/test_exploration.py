@@ -1,0 +1,343 @@
+"""From a raw log to a model and a spec that solves, and a verdict on other data."""
+
+import html
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.signal
+from typer.testing import CliRunner
+
+from inputdesign_cli.cli import app
+from inputdesign_cli.cli.summary import summary
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.questions import explore, identify, solve
+from inputdesign_cli.specification import load_spec, parse_spec
+from inputdesign_cli.tasks.build.log import read_log
+from inputdesign_cli.tasks.build.preparation import Preparation
+from tests.support.logs import lag_log
+
+STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
+
+PLANT = "plant: {B: [0, 1], F: [1, -0.7]}\n"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """What the command writes, of a log whose columns it finds by itself."""
+    folder = tmp_path_factory.mktemp("log")
+    log = lag_log(folder / "log.csv", samples=300)
+    done = CliRunner().invoke(app, ["explore", str(log), "-o", str(folder / "run")])
+    assert done.exit_code == 0, done.output
+    (folder / "stdout").write_text(done.stdout)
+    return folder / "run"
+
+
+def test_the_plant_of_a_log_is_found_and_trusted(run):
+    result = json.loads((run / "result.json").read_text())
+    told = result["exploration"]
+    assert told["reasons"] == []
+    assert (told["sample_time"], told["time_unit"]) == (0.5, "min")
+    (output,) = told["outputs"]
+    assert abs(output["delay"][0] - 3) <= 1
+    assert result["validation"]["simulation_fit_percent"] > 60.0
+
+
+def test_model_spec_figures_and_report_are_written(run):
+    names = {path.name for path in run.iterdir()}
+    assert {"model.yaml", "spec.yaml", "report.html", "structures.png", "fit.png"} <= names
+    assert {"frequency_response.png", "frequency_response.csv"} <= names
+
+
+def test_the_spec_that_is_written_solves_at_once(run):
+    text = (run / "spec.yaml").read_text()
+    assert "#" in text
+    design = solve(parse_spec(text, overrides=["signal=null", "spectrum.order=5"]))
+    assert design.result["status"] == "optimal"
+
+
+def test_the_model_is_judged_on_other_data(run, tmp_path):
+    other = lag_log(tmp_path / "other.csv", seed=1)
+    command = ["explore", str(other), "--validate", str(run / "model.yaml"), "--no-output"]
+    told = CliRunner().invoke(app, command)
+    assert told.exit_code == 0, told.output
+    assert "simulation explains" in told.stdout
+    judged = explore(other, model=load_spec(run / "model.yaml", design=False))
+    validation = judged.results.result["validation"]
+    _, u, y = np.loadtxt(other, delimiter=",", skiprows=1).T
+    e = y - scipy.signal.lfilter([0, 0, 0, 0.2], [1, -0.8], u - 40.0)  # about a level
+    fit = 100.0 * (1.0 - np.std(e) / np.std(y))
+    assert validation["simulation_fit_percent"] == pytest.approx(fit, abs=1.0)
+    assert validation["prediction_fit_percent"] == pytest.approx(fit, abs=1.0)
+
+
+def test_a_real_record_without_a_header_whose_times_jitter():
+    """Its noise integrates: D comes out on the unit circle, as near as a spec may have it."""
+    found = explore(STEP, Preparation(columns={"time": "1", "u1": "2", "y1": "3"}))
+    assert any("jitter" in note for note in found.results.result["notes"])
+    assert found.results.result["validation"]["simulation_fit_percent"] > 90.0
+    assert parse_spec(found.results.resolved_spec).sample_time == pytest.approx(1.0, abs=0.05)
+    parse_spec(found.results.files["model.yaml"].decode(), design=False)
+
+
+@pytest.mark.slow
+def test_two_heaters_are_told_by_their_first_half(tmp_path):
+    """ARX models by least squares, orders and delays to 8, chosen on that half, reach 89.0 and 91.1 %."""
+    columns = {"u1": "Heater 1", "u2": "Heater 2", "y1": "Temperature 1", "y2": "Temperature 2"}
+    head, *rows = STEP.with_name("two_heaters.txt").read_text().splitlines()
+    for name, part in (("first", rows[:100]), ("second", rows[100:])):
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *part]))
+    found = explore(tmp_path / "first.csv", Preparation(columns=columns))
+    model = tmp_path / "model.yaml"
+    model.write_bytes(found.results.files["model.yaml"])
+    assert found.results.result["identification"]["converged"]
+    judged = explore(
+        tmp_path / "second.csv", Preparation(columns=columns), model=load_spec(model, design=False)
+    )
+    first, second = judged.results.result["validation"]["simulation_fit_percent"]
+    assert first > 89.0 - 2.0
+    assert second > 91.1 - 2.0
+
+
+def test_an_input_without_effect_earns_no_trust(tmp_path):
+    """The best of many structures explains 22 % of the noise of these 20 unseen samples."""
+    path = lag_log(tmp_path / "log.csv", gain=0.0, samples=50, seed=1)
+    told = CliRunner().invoke(app, ["explore", str(path), "--no-output"])
+    assert told.exit_code == 1, told.output
+    assert "no trust" in told.stdout
+
+
+def test_an_integrator_earns_no_trust_and_is_offered(tmp_path):
+    """y(t) - y(t-1) = 0.02 u(t-1): the slope is told, time constant and static gain are not."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 125), 8)
+    y = np.cumsum(np.concatenate([[0.0], 0.02 * u[:-1]])) + 0.05 * rng.standard_normal(1000)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+    found = explore(log, Preparation(sample_time=1.0))
+    (reason,) = found.reasons
+    assert "integrator" in reason
+    assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.02, rel=0.05)
+    spec = re.search(r"in SPEC (sample_time: \S+) and (plant: .*)$", reason)
+    assert re.search(r"parameters: \{K: 0\.0\d+, L: ([\d.]+)\}", spec[2])[1] == "0.1", (
+        "it answers the next row"
+    )
+    result = identify(parse_spec(f"{spec[1]}\n{spec[2]}\n", design=False), log).result
+    assert result["identification"]["theta"]["K"] == pytest.approx(0.02, rel=0.02)
+    assert not any("is asked" in note for note in result["notes"]), "this spec asks for nothing"
+
+
+@pytest.mark.slow
+def test_an_integrator_that_no_stable_model_explains_is_offered(tmp_path):
+    """y(t) - y(t-1) = 0.05 u(t-3): estimates from the whole record end on the limit of stability."""
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 8)
+    y = np.cumsum(np.concatenate([np.zeros(3), 0.05 * u[:-3]])) + 0.1 * rng.standard_normal(800)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+    (reason,) = explore(log, Preparation(sample_time=1.0)).reasons
+    assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.05, rel=0.05)
+
+
+def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):
+    path = lag_log(tmp_path / "log.csv")
+    _, *rows = path.read_text().splitlines()
+    parts = [row.split(",") for row in rows]
+    path.write_text("time_min,u1,u2,y\n" + "".join(f"{time},3,{u},{y}\n" for time, u, y in parts))
+    notes = explore(path).results.result["notes"]
+    assert any(note.startswith("u1 never moves") for note in notes)
+    assert not any("persistently exciting" in note for note in notes)
+
+
+def test_a_loop_whose_input_is_a_share_of_the_output_is_told_as_one(tmp_path):
+    """u = -0.6 y explains y to the last digit: not for want of noise."""
+    rng = np.random.default_rng(0)
+    y = scipy.signal.lfilter([1.0], [1.0, -0.66], rng.standard_normal(200))  # 0.9 y - 0.4 * 0.6 y
+    path = tmp_path / "log.csv"
+    path.write_text("u,y\n" + "".join(f"{-0.6 * x!r},{x!r}\n" for x in y.tolist()))
+    with pytest.raises(DataError, match="data from a loop without excitation") as caught:
+        explore(path)
+    assert caught.value.diagnostics[0].hint.startswith("move the reference of the loop")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a,b\n1,2\n3,4\n", "which column of log.csv is the input"),
+        ("u,y\n" + "1,2\n" * 100, "same value"),
+        ("u,y\n" + "1,2\n2,1\n" * 5, "too few"),
+        ("time,u,y\n" + "".join(f"{9 - i},{i % 2},{i}\n" for i in range(9)), "do not increase"),
+        ("u,y\n" + "nan,2\n" * 40, "holds no number"),
+    ],
+)
+def test_logs_that_tell_nothing_are_refused(text, message, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(DataError, match=message):
+        explore(path)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 40])
+@pytest.mark.parametrize("scale", [1e-320, 1e-300, 1e-160, 1e160, 1e300, 1e308])
+def test_signals_beyond_arithmetic_are_refused_by_their_row(scale, samples, tmp_path):
+    rng = np.random.default_rng(3)
+    path = tmp_path / "log.csv"
+    rows = [f"{u:.3f},{scale * y!r}" for u, y in rng.uniform(0.5, 1.0, (samples, 2)).tolist()]
+    path.write_text("\n".join(["u,y", *rows]) + "\n")
+    for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
+        with pytest.raises(DataError) as found:
+            read(path)
+        (diagnostic,) = found.value.diagnostics
+        assert diagnostic.code == "beyond-precision"
+        assert diagnostic.location.line >= 2
+
+
+@pytest.mark.parametrize("times", [[3, 2, 1, 0], [0, 0, 1, 2], [0, 1, 1, 2], [1e17] * 4, [0, 2, 1, 3]])
+def test_times_that_do_not_increase_are_named_by_every_command(times, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u,y\n" + "".join(f"{t!r},{i % 2},{i}\n" for i, t in enumerate(times)))
+    wrong = 2 + next(i for i in range(1, 4) if times[i] <= times[i - 1])
+    for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
+        with pytest.raises(DataError, match="do not increase") as found:
+            read(path)
+        assert found.value.diagnostics[0].location.line == wrong
+        assert "sample_time" not in found.value.diagnostics[0].hint
+
+
+def test_a_sample_time_of_the_file_is_positive(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, u=np.arange(40.0), y=np.arange(40.0), Ts=-1.0)
+    for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
+        with pytest.raises(DataError, match="states the sample time -1"):
+            read(path)
+
+
+@pytest.mark.slow
+def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
+    path = lag_log(tmp_path / "log.csv", samples=400)
+    good = explore(path).results.result["notes"]
+    lines = path.read_text().splitlines()
+    for row in range(200, 250):
+        lines[row] = ",".join([*lines[row].split(",")[:2], lines[200].split(",")[2]])
+    path.write_text("\n".join(lines))
+    found = explore(path).results.result["notes"]
+    assert not any("stands still" in note for note in good)
+    reason, told = [note for note in found if "stands still" in note]
+    assert "rows 201 to 250" in told
+    assert reason.startswith("no trust: y stands still at ")
+
+
+def test_many_spikes_are_told(tmp_path):
+    """Of 400 samples 32, more than outliers are."""
+    path = lag_log(tmp_path / "log.csv", samples=400)
+    lines = path.read_text().splitlines()
+    rng = np.random.default_rng(0)
+    for row in rng.choice(np.arange(5, 395, 6), 32, replace=False):
+        time, u, y = lines[row].split(",")
+        lines[row] = f"{time},{u},{float(y) + 15.0}"
+    assert not any("spikes" in step for step in read_log(path, Preparation()).steps)
+    path.write_text("\n".join(lines))
+    (told,) = [step for step in read_log(path, Preparation()).steps if "spikes" in step]
+    assert told.startswith("y has 32 values (8 %) far from their neighbours")
+
+
+@pytest.mark.slow
+def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
+    """Of two inputs the second steps once only, at the end: plants in s with three poles cannot be told."""
+    rng = np.random.default_rng(0)
+    n = np.arange(200)
+    u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 40), 5), (n >= 195).astype(float)])
+    y = scipy.signal.lfilter([0, 0.2], [1, -0.8], u[:, 0]) + scipy.signal.lfilter(
+        [0, 0.3], [1, -0.6], u[:, 1]
+    )
+    rows = np.column_stack([n, u, y + 0.05 * rng.standard_normal(200)])
+    path = tmp_path / "log.csv"
+    path.write_text("time,u1,u2,y\n" + "\n".join(",".join(f"{x:.6g}" for x in row) for row in rows))
+    result = explore(path).results.result
+    (output,) = result["exploration"]["outputs"]
+    left = {structure["family"] for structure in output["structures"]}
+    assert not left & set(output["not_estimated"])
+    told = [note for note in result["notes"] if "model could be estimated" in note]
+    assert bool(told) == bool(output["not_estimated"])
+    assert {"FOPDT", "SOPDT", "TOPDT"} <= left | set(output["not_estimated"])
+    assert "u2 changes in 1 of its samples only" in told[0]
+    assert any("an input moves in one stretch of the record only" in note for note in result["notes"])
+
+
+@pytest.mark.slow
+def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)
+    pole = np.exp(-0.1)
+    y = scipy.signal.lfilter([0, 1 - pole], [1, -pole], u) + 0.05 * rng.standard_normal(300)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{k},{a:g},{b:.5f}\n" for k, (a, b) in enumerate(zip(u, y, strict=True)))
+    path.write_text(f"time,u,y\n{rows}")
+    found = explore(path).results
+    assert "L 0 +-" in summary(found.result, "s", [])
+    (told,) = [note for note in found.result["notes"] if note.startswith("L of a dead time")]
+    deviation = found.result["identification"]["standard_deviation"]["L"]
+    assert float(told.split(": ")[1].split()[0]) == pytest.approx(1.96 * deviation, rel=0.01)
+
+
+def test_what_is_said_of_the_choice_is_true(run):
+    """Best is only what no other structure exceeds; the figure is that of an estimate from one part."""
+    result = json.loads((run / "result.json").read_text())
+    (output,) = result["exploration"]["outputs"]
+    fits = [one["simulation_fit_percent"] for one in output["structures"]]
+    own = next(
+        one["simulation_fit_percent"]
+        for one in output["structures"]
+        if (one["family"], one["orders"], one["delay"])
+        == (output["structure"]["family"], output["structure"]["orders"], output["structure"]["delay"])
+    )
+    better = max(fit for fit in fits if fit is not None) - own
+    (note,) = (note for note in result["notes"] if note.startswith("y: "))
+    said = re.search(rf"chosen of {len(fits)} structures, of which (.*)", note)[1]
+    if better > 0.0:
+        assert float(re.search(r"by (\S+) points better", said)[1]) == pytest.approx(better, rel=0.06)
+    else:
+        assert "judges best" in said
+    told = summary(result, "min", [])
+    assert "estimated from the other alone (the parameters above: from the whole record)" in told
+    page = html.unescape((run / "report.html").read_text())
+    assert "estimated from one part of them alone, explains" in page
+    assert "not seen" not in told + page
+
+
+def test_the_page_is_among_the_files_that_are_named(run):
+    stdout = (run.parent / "stdout").read_text()
+    (named,) = re.findall(r"^files +.*?: (.*(?:\n .*)*)", stdout, re.MULTILINE)
+    there = {path.name for path in run.iterdir()}
+    assert set(re.split(r",\s+", named.strip())) == there
+    assert "report.html" in there
+
+
+@pytest.mark.parametrize("inputs", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
+    rng = np.random.default_rng(3)
+    u = 1e5 + np.repeat(rng.choice([0.0, 1.0, 5.0], (60, inputs), p=[0.6, 0.3, 0.1]), 5, axis=0)
+    y = scipy.signal.lfilter([0, 1], [1, -0.8], (u - 1e5).sum(axis=1)) + 0.1 * rng.standard_normal(300)
+    log = tmp_path / "log.csv"
+    head = [*(f"u{j + 1}" for j in range(inputs)), "y"]
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header=",".join(head), comments="", fmt="%.10g")
+    text = explore(log, Preparation(sample_time=1.0)).results.resolved_spec
+    assert parse_spec(text).limits.amplitude is None
+    allowed = parse_spec(text.replace("  # amplitude:", "  amplitude:"))
+    half, level = (np.atleast_1d(one) for one in (allowed.limits.amplitude.input, allowed.signal.offset))
+    np.testing.assert_allclose([level - half, level + half], [u.min(axis=0), u.max(axis=0)], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_a_steady_sinusoid_tells_no_plant_of_three_parameters(tmp_path):
+    """Gain 1 after three samples: amplitude and phase at 0.3 rad/sample are all that the record has."""
+    rng = np.random.default_rng(21)
+    u = np.sin(0.3 * np.arange(1400.0))
+    y = scipy.signal.lfilter([0, 0, 0, 0.06], [1, -1.5, 0.56], u) + 0.05 * rng.standard_normal(1400)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{a:.8g},{b:.8g}\n" for a, b in zip(u[600:], y[600:], strict=True))
+    path.write_text("u,y\n" + rows)
+    found = explore(path)
+    assert any("exciting of order 2 only" in reason for reason in found.reasons)

@@ -1,0 +1,176 @@
+"""Other dead times that a record of the design would leave are told before the experiment is done."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.signal
+
+from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
+from inputdesign_cli.compute.time_limit import time_limit
+from inputdesign_cli.questions import foresight, simulation
+from inputdesign_cli.questions.least_cost.build import build_convex
+from tests.support.heater import said
+
+H, SAMPLES, VARIANCE = 4.76, 720, 0.04
+HEATER = (2.1, 180.0, 25.0)
+RICHER = "{type: fir, order: 12}"
+LIMIT = 2.0 * np.log(1000.0)
+
+
+def plainly(T, L, u):
+    """e^(-Ls) / (T s + 1) on held inputs."""
+    whole, part = divmod(L, H)
+    a, first = np.exp(-H / T), 1.0 - np.exp(-(H - part) / T)
+    taps = np.concatenate([np.zeros(int(whole) + 1), [first, 1.0 - a - first]])
+    return scipy.signal.lfilter(taps, [1.0, -a], u)
+
+
+def excess(L, u):
+    """The least sum of squares over K and T of what another dead time leaves, over the variance: expected."""
+    y = HEATER[0] * plainly(*HEATER[1:], u)
+
+    def left(T):
+        shape = plainly(T, L, u)
+        return float(y @ y - (y @ shape) ** 2 / (shape @ shape))
+
+    return scipy.optimize.minimize_scalar(left, bounds=(40.0, 600.0), method="bounded").fun / VARIANCE
+
+
+def valleys(u):
+    """The dead times of the minima that a record leaves within the limit, the true one left out."""
+    grid = np.arange(0.5, 100.0, 1.0)
+    found = np.array([excess(L, u) for L in grid])
+    inner = np.flatnonzero((found[1:-1] < found[:-2]) & (found[1:-1] < found[2:])) + 1
+    return [grid[i] for i in inner if found[i] < LIMIT and abs(grid[i] - HEATER[2]) > 2.0]
+
+
+def solved(*overrides):
+    found = solve(load_spec("specs/heater.yaml", overrides))
+    columns = found.tables["signal"].columns
+    return found.result, next(values for name, values in columns.items() if name[0] in "ur")
+
+
+def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
+    result, u = solved()
+    scan, rivals = valleys(u), result["foreseen"]["rivals"]
+    assert scan
+    assert rivals
+    for rival in rivals:
+        assert min(abs(rival["theta"]["L"] - L) for L in scan) < 3.0
+        assert rival["ratio"] > 1.0
+    (note,) = [note for note in result["notes"] if "nearly as well" in note]
+    assert "{type: fir, order: 12} leaves none" in note
+    assert "plant.known: [L]" in note
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "undecided"), [("{type: multisine, lines: 120}", True), (RICHER, False)]
+)
+def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undecided, tmp_path):
+    _, u = solved(f"spectrum={spectrum}")
+    y = HEATER[0] * plainly(*HEATER[1:], u)
+    y += np.sqrt(VARIANCE) * np.random.default_rng(5).standard_normal(u.size)
+    path = tmp_path / "record.csv"
+    columns = np.column_stack([H * np.arange(u.size), u, y])
+    np.savetxt(path, columns, delimiter=",", header="time_s,u,y", comments="")
+    found = assess(load_spec("specs/heater.yaml"), path)
+    assessment = found.results.result["assessment"]
+    assert (found.verdict == "undecided") == undecided
+    assert assessment["verdict"] == found.verdict
+    assert assessment.get("causes", []) == (["undetermined"] if undecided else [])
+    assert ("do not determine the model" in said(found.results)) == undecided
+    assert "contradict the model" not in said(found.results)
+
+
+@pytest.mark.parametrize("spectrum", [RICHER, "{type: multisine, lines: 40}"])
+def test_where_a_plain_scan_finds_none_none_is_told(spectrum):
+    result, u = solved(f"spectrum={spectrum}")
+    assert valleys(u) == []
+    assert result["foreseen"] == {"rivals": []}
+    assert not any("nearly as well" in note for note in result.get("notes", []))
+
+
+def test_what_is_known_leaves_nothing_to_look_for():
+    result, _ = solved("plant.known=[L]", "accuracy={standard_deviation: {K: 0.05, T: 6}}")
+    assert "foreseen" not in result
+
+
+@pytest.mark.parametrize(
+    ("override", "longest", "reason"),
+    [("solver.any_spectrum=false", 20.0, "--fast"), ("title=a", 0.01, "the record is long")],
+)
+def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
+    monkeypatch.setattr(foresight, "_LONGEST", longest)
+    result, _ = solved(override)
+    assert "foreseen" not in result
+    assert any(reason in note and "was not looked at" in note for note in result["notes"])
+
+
+def test_without_time_nothing_is_begun():
+    asked = build_convex(load_spec("specs/heater.yaml"))
+    with time_limit(0.01):
+        foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), (), {})
+    assert foreseen.entry == {}
+    assert "solver.time_limit left no time" in foreseen.notes[0]
+
+
+@pytest.mark.slow
+def test_runs_that_begin_at_the_truth_say_how_many_would_end_elsewhere(monkeypatch):
+    monkeypatch.setattr(simulation, "_SEARCHED", 5)
+    spec = load_spec(
+        "specs/heater.yaml", ["simulation.runs=3", "experiment.samples=240", "signal.samples=240"]
+    )
+    result = simulate(spec).result
+    searched = result["simulation"]["inputs"]["design"]["searched"]
+    # The others are as likely, to a few tenths: nearly all records leave several, and some end there.
+    assert searched["runs"] == 5
+    assert searched["rivals"] >= 4
+    assert 1 <= searched["elsewhere"] <= 4
+    assert any(f"{searched['elsewhere']} of 5 records end" in note for note in result["notes"])
+
+
+OTHERS = {
+    "loop": "experiment={samples: 720, controller: {pid: {Kp: 0.5, Ti: 180}}}",
+    "duration": "experiment={duration: 1800}",
+    "held": "signal={type: binary, hold: 3, samples: 720, seed: 1}",
+    "shortest": "limits={input_power: 2}",
+}
+
+
+@pytest.mark.parametrize("override", OTHERS.values(), ids=OTHERS.keys())
+def test_all_kinds_of_experiments_are_foreseen(override):
+    assert "rivals" in solved(override)[0]["foreseen"]
+
+
+CHANNELS = """
+sample_time: 1
+plant:
+  continuous: {gain: [[1.0, 0.5]], time_constant: [[8, 12]], dead_time: [[2, 4]]}
+  sample: zoh
+noise: {variance: 0.01}
+experiment: {samples: 150}
+accuracy: {model_error: {relative: 0.2, band: [0.001, 0.3]}}
+spectrum: {type: multisine, lines: 40}
+signal: {type: multisine, samples: 150, seed: 1}
+"""
+
+
+def test_names_of_several_channels_can_be_pasted():
+    result = solve(parse_spec(CHANNELS)).result
+    for note in result.get("notes", []):
+        if "nearly as well" in note:
+            assert 'plant.known: ["dead_time[1,1]", "dead_time[1,2]"]' in note
+    assert "rivals" in result["foreseen"]
+
+
+def test_a_given_signal_is_looked_at_too(tmp_path):
+    _, u = solved()
+    np.savetxt(
+        tmp_path / "u.csv", np.column_stack([np.arange(u.size), u]), delimiter=",", header="t,u", comments=""
+    )
+    spec = load_spec(
+        "specs/heater.yaml", [f"spectrum={{given: {{signal: {tmp_path / 'u.csv'}}}}}", "signal={}"]
+    )
+    result = analyse(spec).result
+    assert result["foreseen"]["rivals"]
+    assert any("excite more frequencies" in note for note in result["notes"])

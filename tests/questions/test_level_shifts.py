@@ -1,0 +1,152 @@
+"""A change of load that no input shows: told where it is, left out of what is explored, and by --without."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import assess, identify, parse_spec
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import LevelShift
+from inputdesign_cli.identification.adequacy import ScoreTest
+from inputdesign_cli.questions import explore, level_shifts
+from inputdesign_cli.tasks.build.log import read_log
+from inputdesign_cli.tasks.build.preparation import Preparation
+
+K, T = 2.0, 12.0
+SPEC = f"""
+sample_time: 1
+plant: {{continuous: {{gain: {K}, time_constant: {T}, dead_time: 2}}, sample: zoh}}
+noise: {{variance: 0.01}}
+experiment: {{samples: 400}}
+accuracy: {{model_error: {{relative: 0.2, band: [0.001, 0.1]}}}}
+"""
+
+
+def rows_of(samples, at, seed):
+    """K/(T s + 1) e^-2s, inputs held for 15 to 45 samples, and from `at` on a load that acts with a lag."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], samples), rng.integers(15, 46, samples))[:samples]
+    pole = np.exp(-1.0 / T)
+    y = scipy.signal.lfilter([0.0, 0.0, 0.0, K * (1.0 - pole)], [1.0, -pole], u)
+    if at is not None:
+        y += -1.2 * np.expm1(-np.maximum(np.arange(samples) - at, 0.0) / 10.0)
+    return np.c_[np.arange(samples), u, y + 0.1 * rng.standard_normal(samples)]
+
+
+def saved(path, rows):
+    np.savetxt(path, rows, delimiter=",", header="time,u,y", comments="", fmt="%.10g")
+    return path
+
+
+def option_in(note):
+    """The rows that a note would leave out."""
+    name, first, last = re.search(r"--without (?:(\S+):)?(\d+)-(\d+)", note).groups("")
+    return (name, int(first), int(last))
+
+
+def shifts_in(notes):
+    return [note for note in notes if "stays so, though no input does that" in note]
+
+
+@pytest.mark.parametrize("at", [150, pytest.param(260, marks=pytest.mark.slow)])
+def test_explore_leaves_it_out_and_finds_the_plant(at, tmp_path):
+    log = saved(tmp_path / "log.csv", rows_of(400, at, 2))
+    found = explore([log], Preparation())
+    assert not found.reasons
+    (told,) = shifts_in(found.results.result["exploration"]["steps"])
+    assert "y rises about row" in told
+    name, first, last = option_in(told)
+    # Sample k stands in row k + 2.
+    assert first <= at + 3 <= last
+    theta, deviation = (
+        found.results.result["identification"][key] for key in ("theta", "standard_deviation")
+    )
+    assert theta["K"] == pytest.approx(K, rel=0.03)
+    assert abs(theta["K"] - K) < 3.5 * deviation["K"]
+    assert abs(theta["T"] - T) < 3.5 * deviation["T"]
+    # The option does the same.
+    again = explore([log], Preparation(without=((name, first, last),))).results.result
+    assert again["identification"]["theta"] == pytest.approx(theta, rel=1e-6)
+    assert not shifts_in(again["notes"])
+
+
+def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
+    log, spec = saved(tmp_path / "log.csv", rows_of(400, 200, 3)), parse_spec(SPEC)
+    (told,) = shifts_in(identify(spec, log).result["notes"])
+    judged = assess(spec, log)
+    assert judged.verdict == "undecided"
+    assert told in judged.results.result["assessment"]["undecided"]
+    without = Preparation(without=(option_in(told),))
+    assert not shifts_in(identify(spec, log, preparation=without).result["notes"])
+    assert assess(spec, log, preparation=without).verdict == "met"
+    assert assess(spec, saved(tmp_path / "good.csv", rows_of(400, None, 3))).verdict == "met"
+
+
+def test_of_several_files_the_note_says_in_which_it_is(tmp_path):
+    files = [
+        saved(tmp_path / "a.csv", rows_of(200, None, 4)),
+        saved(tmp_path / "b.csv", rows_of(300, 150, 5)),
+    ]
+    (told,) = shifts_in(identify(parse_spec(SPEC), files).result["notes"])
+    name, first, last = option_in(told)
+    assert "of b.csv (1" in told
+    assert name == "b.csv"
+    assert first <= 153 <= last
+    again = identify(parse_spec(SPEC), files, preparation=Preparation(without=((name, first, last),)))
+    assert not shifts_in(again.result["notes"])
+
+
+def found_with(samples, places, split="halves"):
+    """What an exploration of so many samples would return that finds steps at these places."""
+    shifts = tuple(
+        LevelShift(
+            0,
+            at,
+            0.0,
+            at - 1,
+            at + 2,
+            True,
+            ScoreTest("level_shift", "shift", 50.0, 1, 1e-9, None),
+            50.0,
+            99,
+            True,
+        )
+        for at in places
+    )
+    return SimpleNamespace(estimate=SimpleNamespace(shifted=shifts), samples=np.arange(samples), split=split)
+
+
+@pytest.mark.parametrize(
+    ("answers", "lengths"),
+    [
+        ([found_with(100, [])], (100,)),
+        ([found_with(100, [40]), found_with(97, [])], (39, 58)),
+        ([found_with(100, [40, 42]), found_with(95, [])], (39, 56)),
+        ([found_with(100, [8, 60]), found_with(86, [])], (49, 38)),
+        ([found_with(100, [40]), found_with(97, [], split="none"), found_with(100, [])], (100,)),
+        ([found_with(100, [40]), SpecError([]), found_with(100, [])], (100,)),
+        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [])], (39, 30, 25)),
+        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [20]), found_with(100, [])], (100,)),
+    ],
+)
+def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths):
+    """Shifts that overlap, leave too little beside them, are all that tells the plant, or have no end."""
+    log = read_log(saved(tmp_path / "log.csv", rows_of(100, None, 1)), Preparation())
+    given = iter(answers)
+
+    def explored(*args, **settings):
+        answer = next(given)
+        if isinstance(answer, SpecError):
+            raise answer
+        return answer
+
+    monkeypatch.setattr(level_shifts, "explore_records", explored)
+    rest, found = level_shifts.explored_beside_shifts(log, loop=False)
+    assert rest.lengths == lengths
+    assert found is answers[-1]
+    told = " ".join(rest.steps)
+    assert bool(shifts_in([told])) == (rest.lengths != (100,))
+    assert ("too few for a segment" in told) == (len(answers[0].estimate.shifted) == 2 and lengths[0] == 49)

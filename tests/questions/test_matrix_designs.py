@@ -1,0 +1,220 @@
+"""Specs with several channels and in continuous time: designs against plain programs."""
+
+import warnings
+from pathlib import Path
+
+import cvxpy as cp
+import numpy as np
+import pytest
+import scipy.integrate
+
+from inputdesign_cli import load_spec, solve
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.questions.least_cost.build import build_convex
+from tests.support.matrix_specs import CONTINUOUS, changed
+from tests.support.plants import arx
+
+SPECS = Path(__file__).parents[2] / "specs"
+
+
+@pytest.fixture(scope="module")
+def design():
+    return solve(load_spec(SPECS / "two_by_two.yaml", ["accuracy.criterion=E", "spectrum.order=6"]))
+
+
+def test_result_is_recomputed_and_proved(design):
+    objective = design.result["objective"]
+    M = np.array(design.result["information"]["matrix"])
+    assert objective["value"] == pytest.approx(np.linalg.eigvalsh(M)[0], rel=1e-8)
+    assert objective["value"] <= objective["upper_bound"] <= objective["any_spectrum_bound"]
+    assert objective["relative_gap"] <= 1e-5
+    assert len(design.result["power"]["input"]) == len(design.result["power"]["output"]) == 2
+
+
+def test_spectrum_file_has_the_information_of_the_result(design):
+    """M recomputed from the columns of spectrum.csv by the trapezoidal rule."""
+    columns = design.tables["spectrum"].columns
+    w = columns["frequency_rad_per_s"]
+    phi = np.array(
+        [
+            [columns["phi_11"], columns["phi_12_re"] + 1j * columns["phi_12_im"]],
+            [columns["phi_12_re"] - 1j * columns["phi_12_im"], columns["phi_22"]],
+        ]
+    ).transpose(2, 0, 1)
+    assert np.linalg.eigvalsh(phi).min() >= -1e-9 * phi.real.max()
+    spec = load_spec(SPECS / "two_by_two.yaml")
+    model = build_convex(spec).experiment.model
+    F = model.plant_gradient(w)
+    integrand = np.einsum("nlpa,nab,nmpb->nlm", F, phi, F.conj(), optimize=True).real / np.pi
+    M = scipy.integrate.trapezoid(integrand, w, axis=0)
+    expected = np.array(design.result["information"]["matrix"])
+    np.testing.assert_allclose(M, expected, atol=2e-3 * np.abs(expected).max())
+    total = np.trace(phi, axis1=1, axis2=2).real / np.pi
+    power = scipy.integrate.trapezoid(total, w)
+    assert power == pytest.approx(sum(design.result["power"]["input"]), rel=0.05)
+
+
+def test_record_has_two_channels_and_keeps_the_smallest_eigenvalue(design):
+    assert list(design.tables["signal"].columns) == ["time_s", "u1", "u2"]
+    signal = design.result["signal"]
+    assert signal["efficiency"] >= 0.97
+    assert sum(signal["input_power"]) <= 1.02 * 1000
+    assert sum(signal["output_power"]) <= 1.02 * 1000
+    random = solve(
+        load_spec(
+            SPECS / "two_by_two.yaml",
+            ["accuracy.criterion=E", "spectrum.order=6", "signal.phases=random", "signal.candidates=1"],
+        )
+    )
+    assert random.result["signal"]["efficiency"] < signal["efficiency"]
+
+
+def test_plots_are_there(design):
+    assert {"spectrum", "signal", "optimality", "ellipses"} <= set(design.curves)
+    assert design.curves["spectrum"].spectrum.shape[1:] == (2, 2)
+
+
+@pytest.mark.slow
+def test_bases_agree_and_print_their_own_coefficients():
+    results = [
+        solve(changed(CONTINUOUS, f"spectrum.basis={basis}")).result for basis in ("chebyshev", "monomial")
+    ]
+    values = [result["objective"]["value"] for result in results]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+    S = [np.array(result["spectrum"]["coefficients"]) for result in results]
+    assert S[0].shape == (10, 10)
+    assert np.abs(S[0] - S[1]).max() > 1e-3 * np.abs(S[0]).max()
+
+
+def test_few_columns_have_a_lower_value_under_the_same_bound():
+    full = solve(changed(CONTINUOUS)).result["objective"]
+    few = solve(changed(CONTINUOUS, "spectrum.factor_columns=1")).result
+    assert few["objective"]["value"] < full["value"]
+    assert few["objective"]["upper_bound"] == pytest.approx(full["upper_bound"], rel=1e-9)
+    assert few["status"] == "lower_bound"
+    assert few["spectrum"]["factor_columns"] == 1
+
+
+@pytest.mark.slow
+def test_relative_scale_does_not_depend_on_units():
+    """Input in other units: relative criteria of the same experiment are the same."""
+    scaled = CONTINUOUS.replace(
+        "[[3.125], [3.188]], [[5.313], [1.563]]", "[[.3125], [.3188]], [[.5313], [.1563]]"
+    )
+    scaled = scaled.replace("input_power: 1000", "input_power: 100000")
+    values = [
+        solve(changed(text, "accuracy.scale=relative")).result["objective"]["value"]
+        for text in (CONTINUOUS, scaled)
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-6)
+
+
+def test_limits_of_each_channel_bind():
+    result = solve(changed(CONTINUOUS, "limits={input_power: [100, 20]}", "accuracy.criterion=D")).result
+    np.testing.assert_allclose(result["power"]["input"], [100.0, 20.0], rtol=1e-6)
+    assert [entry["channel"] for entry in result["limits"]] == [1, 2]
+
+
+def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
+    """A plain program on a grid with the binding frequencies: block Toeplitz positivity by a Gram matrix."""
+    order = 4
+    spec = load_spec(SPECS / "two_by_two_arx.yaml", [f"spectrum.order={order}"])
+    result = solve(spec).result
+    assert result["objective"]["relative_gap"] <= 1e-5
+    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    task = build_convex(spec)
+    experiment = task.experiment.whitened(result["baseline"]["white"]["cost"])
+    basis, k = task.question.basis, experiment.size
+    maps = basis.integrals(experiment.information_density, experiment.singularities)
+    power = basis.integrals(lambda w: experiment.power_density("input", w), experiment.singularities)
+    scale = result["baseline"]["white"]["cost"]
+    r, n = 2, 2 * (order + 1)
+    gram = cp.Variable((n, n), PSD=True)
+    blocks = [
+        sum(gram[r * (s + t) : r * (s + t + 1), r * s : r * (s + 1)] for s in range(order + 1 - t))
+        for t in range(order + 1)
+    ]
+    x = cp.hstack(
+        [
+            blocks[0][0, 0],
+            blocks[0][0, 1],
+            blocks[0][1, 1],
+            *(b[i, j] for b in blocks[1:] for i in range(r) for j in range(r)),
+        ]
+    )
+    M = experiment.baseline_information + cp.reshape(
+        scale * maps.reshape(len(maps), -1).T @ x, (k, k), order="C"
+    )
+    constraints = []
+    grid = np.concatenate(
+        [np.linspace(1e-9, np.pi, 5), np.array(result["model_error"]["active_frequencies"])]
+    )
+    for make in task.question.requirements:
+        requirement = make(experiment)
+        for w in grid:
+            R = requirement.cut(float(w)).matrix
+            constraints.append(0.5 * (M + M.T) - R >> 0)
+    problem = cp.Problem(cp.Minimize(power @ x), constraints)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that it may be inaccurate; four digits are compared
+        problem.solve(solver=cp.CLARABEL)
+    assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        pytest.param(["spectrum={type: multisine, lines: 30}"], marks=pytest.mark.slow),
+        ["spectrum={type: free}"],
+        pytest.param(["spectrum={type: white}"], marks=pytest.mark.slow),
+        ["spectrum={type: polynomial, order: 3, band: [0.2, 2.5], coefficients: complex}"],
+        pytest.param(["plant.A=[1, -0.6]"], marks=pytest.mark.slow),
+        ["objective=shortest_experiment", "limits.input_power=100"],
+        ["accuracy={standard_deviation: {'b1[2,1]': 0.05}}"],
+        pytest.param(["cost.input_power=[1, 2]"], marks=pytest.mark.slow),
+        ["accuracy={weighted_variance: {max: 0.01, weight: {numerator: [1, 0.5]}}}"],
+    ],
+)
+def test_least_cost_in_every_family_is_proved(overrides):
+    common = ["spectrum.order=4"] if not overrides[0].startswith("spectrum") else []
+    result = solve(load_spec(SPECS / "two_by_two_arx.yaml", [*common, *overrides])).result
+    assert result["objective"]["relative_gap"] <= 1e-5
+    assert result["objective"]["any_spectrum_bound"] <= result["objective"]["value"] * (1 + 1e-6)
+
+
+def test_weighted_variance_in_continuous_time_holds_for_every_entry():
+    weight = "{continuous: {numerator: [1], denominator: [1, 1]}}"
+    asked = f"accuracy={{weighted_variance: {{max: 0.01, weight: {weight}}}}}"
+    spec = changed(CONTINUOUS, asked, "limits=null")
+    result = solve(spec).result
+    assert result["objective"]["relative_gap"] <= 1e-6
+    P = np.array(result["information"]["covariance"])
+    w = np.linspace(0.0, 2.0, 500)
+    gradient = build_convex(spec).experiment.model.plant_gradient(w)
+    variance = np.einsum("nkij,kl,nlij->nij", gradient.conj(), P, gradient).real / (1 + w**2)[:, None, None]
+    assert variance.max() == pytest.approx(0.01, rel=1e-4)
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_one_channel_in_continuous_time(sampled):
+    plant = "{continuous: {numerator: [2.0], denominator: [1, 0.6, 1]}" + (
+        ", sample: zoh}" if sampled else "}"
+    )
+    text = f"""
+plant: {plant}
+noise: {{variance: 0.1}}
+experiment: {{samples: 400}}
+accuracy: {{criterion: D}}
+limits: {{input_power: 1}}
+spectrum: {{type: polynomial, order: 8, band: [0, 2.0]}}
+"""
+    outcome = solve(changed(text))
+    assert outcome.result["information"]["parameters"] == ["b0", "a0", "a1"]
+    assert outcome.result["objective"]["relative_gap"] <= 1e-6
+    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
+    assert outcome.result["signal"]["efficiency"] > 0.9
+
+
+def test_the_spec_of_the_example_is_that_of_the_tests():
+    task = build_convex(load_spec(SPECS / "two_by_two_arx.yaml"))
+    assert task.experiment.model.names == Experiment(arx(), 1).model.names

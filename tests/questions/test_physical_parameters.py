@@ -1,0 +1,274 @@
+"""Known and named parameters and dead times: one plant in several words is one design."""
+
+import json
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import identify as estimated, parse_spec, simulate, solve
+from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.identification import identify
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.questions import assess
+from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.specification import Spec
+from tests.support.words import largest_errors
+
+REST = """
+sample_time: 0.5
+noise: {variance: 0.1}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.1, band: [0.05, 1.5]}}
+spectrum: {type: fir, order: 8}
+solver: {tolerance: 1.0e-10}
+"""
+# One plant: by its gain, time constant and dead time, by expressions, and by its coefficients.
+WORDS = {
+    "process": "{continuous: {gain: 2.0, time_constant: 3.0, dead_time: 1.685}, sample: zoh}",
+    "named": "{parameters: {K: 2.0, T: 3.0, L: 1.685}, sample: zoh, "
+    "continuous: {numerator: [K], denominator: [T, 1], delay: L}}",
+    "logarithms": "{parameters: {lnK: 0.6931471805599453, r: 0.3333333333333333, L: 16.85}, sample: zoh, "
+    "continuous: {numerator: [exp(lnK)*r], denominator: [1, r], delay: L/10}}",
+    "coefficients": "{continuous: {numerator: [2.0], denominator: [3.0, 1], delay: 1.685}, sample: zoh}",
+}
+SECOND = {
+    "process": "{continuous: {gain: 2, damping: 0.4, natural_frequency: 0.8, dead_time: 1}, sample: zoh}",
+    "coefficients": "{continuous: {numerator: [1.28], denominator: [1, 0.64, 0.64], delay: 1}, sample: zoh}",
+}
+IN_Q = {
+    "named": "{parameters: {g: 0.3, p: 0.8}, B: [0, 0, g], F: [1, -p]}",
+    "logarithms": "{parameters: {g: 0.3, T: 4.481420117724551}, B: [0, 0, g], F: [1, -exp(-1/T)]}",
+    "coefficients": "{B: [0, 0, 0.3], F: [1, -0.8]}",
+}
+
+
+def spec_of(plant, rest=REST) -> Spec:
+    return parse_spec(f"plant: {plant}\n{rest}")
+
+
+def designed(plant):
+    found = solve(spec_of(plant))
+    bound = found.tables["bound"]
+    return found.result, np.array(bound.columns["r_u"] if hasattr(bound, "columns") else bound["r_u"])
+
+
+@pytest.mark.parametrize("words", [WORDS, SECOND, IN_Q], ids=["first order", "second order", "in q"])
+def test_reparametrisation_changes_neither_cost_nor_error(words):
+    first, *others = (designed(plant) for plant in words.values())
+    for result, r_u in others:
+        assert result["cost"] == pytest.approx(first[0]["cost"], rel=1e-9)
+        np.testing.assert_allclose(r_u, first[1], rtol=1e-6)
+
+
+def test_the_error_of_one_spectrum_is_the_same_in_all_words():
+    """Without a solver in between."""
+    found = [largest_errors(Experiment(build_model(spec_of(plant)), 300)) for plant in WORDS.values()]
+    np.testing.assert_allclose(found, np.broadcast_to(found[0], np.shape(found)), rtol=1e-9)
+
+
+def test_information_of_a_dead_time_is_that_of_the_closed_form():
+    """G = e^(-tau s) alone: M = N / sigma^2 (1/2 pi) int w^2 Phi, power P flat over [-W, W]: N P W^2 / 3."""
+    text = (
+        "plant: {continuous: {numerator: [1], denominator: [1], delay: 0.7}, known: [b0]}\n"
+        "noise: {variance: 0.1}\nexperiment: {samples: 300}\nlimits: {band: [0, 2]}\nsample_time: 0.5\n"
+        "accuracy: {standard_deviation: {delay: 0.01}}\nspectrum: {type: white}"
+    )
+    power = solve(parse_spec(text)).result["cost"]
+    assert power == pytest.approx(0.1 / (300 * 2.0**2 / 3.0 * 0.01**2), rel=1e-9)
+
+
+def record_of(model, samples=600, seed=0):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], (samples // 4, model.inputs)), 4, axis=0)
+    e = rng.normal(size=(samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    return u, sum(model.simulate(u, e, 1.0))
+
+
+@pytest.mark.parametrize("nominal", ["[2.0, 3.0, 1.685]", "[1.0, 8.0, 9.0]"])
+def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
+    """Within four standard deviations, whatever the nominal values."""
+    words = dict(zip(("gain", "time_constant", "dead_time"), json.loads(nominal), strict=True))
+    truth = build_model(spec_of(WORDS["process"]))
+    start = build_model(spec_of(json.dumps({"continuous": words, "sample": "zoh"})))
+    u, y = record_of(truth)
+    found = identify(start, u, y, start=start.theta)
+    assert found.names == ("gain", "time_constant", "dead_time")
+    deviation = np.abs(found.theta - truth.theta) / np.sqrt(np.diag(found.covariance))
+    assert np.all(deviation < 4.0)
+    assert found.failed == ()
+
+
+def test_what_is_known_keeps_its_value():
+    plant = "{B: [0, 1.0, 0.5], F: [1, -0.7], known: [b2]}"
+    rest = "noise: {C: [1, 0.4], variance: 0.1, known: [c1]}\nexperiment: {samples: 300}\n"
+    model = build_model(parse_spec(f"plant: {plant}\n{rest}", design=False))
+    u, y = record_of(model)
+    found = identify(model, u, y, start=model.theta)
+    assert found.names == ("b1", "f1")
+    fitted = model.at(found.theta).coefficients
+    assert (fitted.B[0][0][2], fitted.C[0][1]) == (0.5, 0.4)
+    assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [
+        *WORDS.values(),
+        *IN_Q.values(),
+        "{B: [0, 1, 0.5], F: [1, -0.5], known: [f1]}",
+        "{continuous: {gain: [[1, 0], [2, 3]], time_constant: [[1, 1], [2, 3]], "
+        'dead_time: [[1, 0], [0, 3]]}, sample: zoh, known: ["gain[2,1]"]}',
+        "{continuous: {numerator: [[[1]], [[2]]], denominator: [2, 1], delay: 0.7}, sample: zoh}",
+    ],
+)
+def test_the_words_of_a_model_are_read_back(plant):
+    """What `identify` writes is the model that it found."""
+    rest = "noise: {variance: 0.1}\nsample_time: 0.5\n"
+    model = build_model(parse_spec(f"plant: {plant}\n{rest}", design=False))
+    moved = model.at(1.01 * model.theta)
+    text = "\n".join(f"{key}: {json.dumps(block)}" for key, block in blocks_of(moved).items())
+    again = build_model(parse_spec(f"{text}\nsample_time: 0.5", design=False))
+    assert again.names == model.names
+    np.testing.assert_allclose(again.theta, moved.theta, rtol=1e-12)
+    w = np.array([0.1, 1.0])
+    np.testing.assert_allclose(again.plant_at(w), moved.plant_at(w), rtol=1e-12)
+
+
+def test_a_study_estimates_the_named_parameters():
+    spec = spec_of(WORDS["process"], REST + "simulation: {runs: 20, seed: 1}\n")
+    found = simulate(spec).result["simulation"]["inputs"]["design"]
+    assert set(found["mean_estimate"]) == {"gain", "time_constant", "dead_time"}
+    low, high = found["covariance_eigenvalues"][0], found["covariance_eigenvalues"][-1]
+    assert 0.2 < low < high < 4.0
+
+
+BAD = [
+    ("unknown-name", "{parameters: {K: 1, T: 2}, continuous: {numerator: [Kp], denominator: [T, 1]}}"),
+    ("unused-parameter", "{parameters: {K: 1, T: 2}, continuous: {numerator: [K], denominator: [3, 1]}}"),
+    (
+        "unused-parameter",
+        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*(1 + z**2)], denominator: [3, 1]}}",
+    ),
+    ("undefined-expression", "{parameters: {K: 0}, continuous: {numerator: [1/K], denominator: [3, 1]}}"),
+    ("bad-expression", "{parameters: {K: 1}, continuous: {numerator: ['K^2'], denominator: [3, 1]}}"),
+    ("bad-name", "{parameters: {exp: 1}, continuous: {numerator: [exp], denominator: [3, 1]}}"),
+    ("out-of-range", "{parameters: {L: -1}, continuous: {numerator: [1], denominator: [3, 1], delay: L}}"),
+    ("delay-beyond-record", "{continuous: {gain: 1, time_constant: 1, dead_time: 151}}"),
+    ("wrong-shape", "{continuous: {gain: 1, time_constant: [[1, 2]]}}"),
+    ("conflicting-keys", "{continuous: {gain: 1, time_constant: 1, damping: 0.1, natural_frequency: 1}}"),
+    ("missing-key", "{continuous: {gain: 1, damping: 0.1}}"),
+    ("unknown-parameter", "{continuous: {gain: 1, time_constant: 1}, known: [K]}"),
+    ("nothing-to-estimate", "{continuous: {gain: 1, time_constant: 1}, known: [gain, time_constant]}"),
+]
+
+
+@pytest.mark.parametrize(("code", "plant"), BAD)
+def test_bad_plants_are_refused_once_with_their_key(code, plant):
+    with pytest.raises(SpecError) as caught:
+        build_task(spec_of(plant[:-1] + ", sample: zoh}"))
+    assert {one.code for one in caught.value.diagnostics} == {code}
+    assert all(one.key.startswith("plant") for one in caught.value.diagnostics)
+
+
+def test_accuracy_of_what_is_known_is_refused():
+    rest = REST.replace("model_error: {relative: 0.1, band: [0.05, 1.5]}", "standard_deviation: {gain: 0.1}")
+    with pytest.raises(SpecError, match="gain is known"):
+        build_task(spec_of("{continuous: {gain: 1, time_constant: 1}, sample: zoh, known: [gain]}", rest))
+
+
+COLOURED = (
+    "{noise: {C: [1, 0.5], D: [1, -0.3], variance: 0.04, known: %s}, experiment: {samples: 300}, plant: "
+    "{parameters: {%s: 2.1, T: 18}, continuous: {gain: %s, time_constant: T}, sample: zoh, known: %s}}"
+)
+
+
+@pytest.mark.parametrize("name", ["c1", "d1"])
+def test_a_parameter_is_not_called_as_a_coefficient_of_the_noise(name):
+    with pytest.raises(SpecError) as caught:
+        parse_spec((COLOURED % ("[]", name, name, "[]")).replace(", known: []", ""), design=False)
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == ("bad-name", f"plant.parameters.{name}")
+
+
+@pytest.mark.parametrize("name", ["c2", "d0", "noise_0", "noise_1", "b0", "delay", "a1", "e0", "p0", "gain"])
+@pytest.mark.parametrize(
+    ("of_plant", "of_noise"), [((), ()), ((), ("c1",)), (("T",), ("d1",)), (("name",), ())]
+)
+def test_what_is_known_of_one_fixes_nothing_of_the_other(name, of_plant, of_noise):
+    """Whatever the parameter is called, the information is that of a plant with K in its place."""
+
+    def model_of(called):
+        listed = json.dumps([called if one == "name" else one for one in of_plant])
+        # An empty list is no list of names.
+        text = COLOURED % (json.dumps(of_noise), called, called, listed)
+        return build_model(parse_spec(text.replace(", known: []", ""), design=False))
+
+    w, found, other = np.array([0.1, 1.0]), model_of(name), model_of("K")
+    assert found.names == tuple(name if one == "K" else one for one in other.names)
+    np.testing.assert_array_equal(found.input_gradient(w), other.input_gradient(w))
+    np.testing.assert_array_equal(found.noise_gradient(w), other.noise_gradient(w))
+
+
+@pytest.mark.parametrize(("end", "stopped"), [(22.0, True), (10.0, False)])
+def test_an_estimate_that_the_end_of_an_expression_stops_is_told_and_decides_nothing(end, stopped, tmp_path):
+    """The plant has T = 20; an expression that ends at 22 left an estimate there that met what was asked."""
+    rng = np.random.default_rng(3)
+    u, pole = np.repeat(rng.choice([-1.0, 1.0], 80), 5), np.exp(-5.0 / 20.0)
+    y = scipy.signal.lfilter([0.0, 0.0, 2.0 * (1.0 - pole)], [1.0, -pole], u) + 0.2 * rng.standard_normal(400)
+    np.savetxt(tmp_path / "log.csv", np.c_[u, y], delimiter=",", header="u,y", comments="")
+    spec = parse_spec(f"""
+sample_time: 5
+plant:
+  parameters: {{K: 2, T: 25}}
+  B: [0, 0, K*(1 - exp(-5/T))]
+  F: [1, "-exp(-5/T) + 0*log(T - {end})"]
+noise: {{variance: 0.04}}
+experiment: {{samples: 400}}
+accuracy: {{model_error: {{relative: 0.5}}}}
+""")
+    judged = assess(spec, [tmp_path / "log.csv"])
+    reasons = judged.results.result["assessment"].get("undecided", [])
+    assert any("stopped at T = 22" in reason for reason in reasons) == stopped
+    assert judged.verdict == ("undecided" if stopped else "met")
+
+
+def _held(gain, seed):
+    """Samples of gain/(6 s + 1), held for 3 to 12 samples of one second, with noise."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), rng.integers(3, 12, 60))[:300]
+    pole = np.exp(-1.0 / 6.0)
+    y = scipy.signal.lfilter([0.0, gain * (1.0 - pole)], [1.0, -pole], u)
+    return np.c_[u, y + 0.1 * rng.standard_normal(300)]
+
+
+_LAG = """
+sample_time: 1
+plant: {parameters: {T: 6, p: %g}, continuous: {numerator: ["%s"], denominator: [T, 1]}, sample: zoh}
+noise: {variance: 0.02}
+experiment: {samples: 300}
+"""
+
+
+def test_a_gain_whose_sign_an_expression_forbids_blames_no_columns(tmp_path):
+    """sqrt(p) of a plant with gain -1 ends at zero, where no input explains anything."""
+    np.savetxt(tmp_path / "log.csv", _held(-1.0, 4), delimiter=",", header="u,y", comments="")
+    found = estimated(parse_spec(_LAG % (1.0, "sqrt(p)"), design=False), tmp_path / "log.csv")
+    notes = " ".join(found.result["notes"])
+    assert "the search stopped at p = " in notes
+    assert "is not defined" in notes
+    assert "columns" not in notes
+
+
+def test_a_gain_behind_a_pole_of_its_expression_is_told_with_where_the_search_ended(tmp_path):
+    """1/(p - 1) from p = 3 does not get to p = 0.5: p runs off to where it changes nothing."""
+    np.savetxt(tmp_path / "log.csv", _held(-2.0, 4), delimiter=",", header="u,y", comments="")
+    with pytest.raises(DataError) as caught:
+        estimated(parse_spec(_LAG % (3.0, "1/(p - 1)"), design=False), tmp_path / "log.csv")
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "not-exciting"
+    assert diagnostic.message.endswith("apart: p")
+    assert float(diagnostic.hint.partition("p = ")[2].partition(")")[0]) > 1e6
+    assert "start elsewhere" in diagnostic.hint

@@ -1,0 +1,302 @@
+"""From the spec to the result: designs, signals, simulations, figures, and what is said of bad input."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import load_spec, parse_spec, simulate, solve, validate
+from inputdesign_cli.cli import main
+from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.monte_carlo.regression import run_experiments
+from inputdesign_cli.outcome.run_directory import write_run
+from inputdesign_cli.signal import delayed_regressors, free_regressors
+
+SPECS = Path(__file__).parents[2] / "specs"
+FREE, FIR = SPECS / "regression.yaml", SPECS / "regression_fir.yaml"
+E = "accuracy.mean_squared_error"
+FOUR = [
+    "plant.regression={estimated: 2, neglected: 2}",
+    f"{E}.estimated=[0.94, 0.166]",
+    f"{E}.neglected=[2.245, 1.096]",
+    f"{E}.neglected_norm=0.5",
+    "simulation=null",
+    "experiment.samples=200",
+]
+
+
+def result(path, *overrides, verb=solve):
+    return verb(load_spec(path, list(overrides))).result
+
+
+# Results -----------------------------------------------------------------------------------------
+
+
+def test_numbers_for_sweeps_are_plain():
+    moments = result(FREE)["moments"]
+    assert moments["entries"].keys() == {"R_1_1", "R_1_2", "R_2_2"}
+    assert all(isinstance(float(x), float) for x in moments["entries"].values())
+    assert moments["trace"] == pytest.approx((1 + np.sqrt(5)) / 2, rel=1e-14)
+
+
+def test_what_is_reported_adds_up():
+    found = result(FIR, *FOUR)
+    error, objective = found["mean_squared_error"], found["objective"]
+    assert error["value"] == pytest.approx(error["bias_squared"] + error["variance"])
+    assert objective["any_structure_bound"] < objective["lower_bound"] <= objective["value"]
+    assert found["status"] == "optimal"
+    assert found["cost"] == pytest.approx(np.trace(found["moments"]["R"]))
+
+
+def test_least_error_and_least_energy_are_inverse():
+    least = result(FIR, *FOUR)
+    found = result(FIR, *FOUR, f"{E}.target=null", f"limits.energy={least['cost']:.17g}")
+    assert found["objective"]["kind"] == "mean_squared_error"
+    assert found["objective"]["value"] == pytest.approx(1.0, rel=1e-8)
+    assert found["baseline"]["white"]["ratio"] > 1.0
+
+
+def test_the_alternation_states_its_gap():
+    found = result(FIR, *FOUR, "solver.method=alternating", "limits.energy=8", f"{E}.target=null")
+    assert found["status"] == "gap_open"
+    assert found["objective"]["relative_gap"] > 0.01
+    assert found["objective"]["lower_bound"] == pytest.approx(1.072300, abs=2e-6)
+
+
+def test_white_cannot_always_meet_the_target():
+    assert result(FIR, *FOUR)["baseline"] == {}
+
+
+# Signals -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("samples", "periods"), [(100, None), (101, None), (100, 25), (4, None), (3, None)])
+def test_free_regressors_have_their_moments_exactly(samples, periods):
+    rng = np.random.default_rng(samples)
+    F = rng.standard_normal((4, 3))
+    R = F @ F.T
+    period = samples // periods if periods else samples
+    Phi = free_regressors(R, samples, period)
+    np.testing.assert_allclose(Phi.T @ Phi, R, atol=1e-12 * np.trace(R))
+    np.testing.assert_array_equal(Phi[:period], Phi[-period:])
+
+
+def test_the_signal_of_the_paper_has_these_moments():
+    """Example 2 prints a realisation of period 2, rounded to 1e-5, whose u2 begins with a misprint."""
+    R = result(FREE)["moments"]["R"]
+    Phi = np.tile([[0.00057, 0.00057], [0.01529, 0.00944]], (5000, 1))
+    np.testing.assert_allclose(Phi.T @ Phi, R, atol=2e-3)
+
+
+def test_example_3_is_a_constant_signal():
+    outcome = solve(load_spec(FIR))
+    np.testing.assert_allclose(np.abs(outcome.tables["signal"].columns["u1"]), 0.01, rtol=1e-9)
+
+
+def test_a_period_of_20_costs_what_the_errata_says():
+    found = result(FIR, *FOUR, f"{E}.target=null", "limits.energy=8", "signal.periods=10")
+    assert found["signal"]["mean_squared_error"] == pytest.approx(1.072477, abs=1.5e-6)
+    assert not found["signal"]["on_grid"]
+    assert found["signal"]["energy"] == pytest.approx(8.0)
+
+
+def test_the_samples_meet_the_target_from_their_periodic_past():
+    outcome = solve(load_spec(FIR, FOUR))
+    u = outcome.tables["signal"].columns["u1"]
+    Phi = delayed_regressors(u, 4, "steady")
+    entry = outcome.result["signal"]
+    assert entry["energy"] == pytest.approx(np.trace(Phi.T @ Phi))
+    assert entry["mean_squared_error"] == pytest.approx(1.0, rel=1e-9)
+    assert entry["energy"] < 1.001 * outcome.result["cost"]
+
+
+def test_from_rest_the_first_samples_are_missing():
+    entry = result(FIR, *FOUR, "signal.start=zero")["signal"]
+    assert entry["energy"] == entry["from_rest"]["energy"]
+    assert entry["energy"] < result(FIR, *FOUR)["signal"]["energy"]
+    np.testing.assert_array_equal(
+        delayed_regressors(np.arange(1.0, 4.0), 2, "zero"), [[1, 0], [2, 1], [3, 2]]
+    )
+    np.testing.assert_array_equal(
+        delayed_regressors(np.arange(1.0, 4.0), 2, "steady"), [[1, 3], [2, 1], [3, 2]]
+    )
+
+
+def test_without_samples_there_is_a_design_and_no_signal():
+    found = result(FIR, *FOUR, "experiment.samples=3")
+    assert "signal" not in found
+
+
+# Simulation --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("path", "mean"), [(FREE, 1.381966), (FIR, 1.0)])
+def test_examples_2_and_3(path, mean):
+    """10000 runs of 200 samples: the theory depends on Phi^T Phi only. Four standard errors."""
+    study = result(path, "experiment.samples=200", "simulation.compare=[white]", verb=simulate)["simulation"]
+    design, white = study["inputs"]["design"], study["inputs"]["white"]
+    assert abs(design["mse"] - 1.0) < 4 * design["mse_standard_error"]
+    assert abs(design["mean_estimate"][0] - mean) < 4 * design["mean_estimate_standard_error"][0]
+    assert design["theory"]["mse"] == pytest.approx(1.0, rel=1e-6)
+    assert design["mse_standard_error"] == pytest.approx(np.sqrt(2) / 100, rel=0.1)
+    assert abs(white["mse"] - white["theory"]["mse"]) < 4 * white["mse_standard_error"]
+    assert white["energy"] == pytest.approx(design["energy"])
+
+
+def test_a_study_repeats_with_its_seed():
+    few = ("experiment.samples=50", "simulation.runs=20", "simulation.compare=[white, binary]")
+    one = result(FIR, *few, verb=simulate)["simulation"]
+    assert result(FIR, *few, verb=simulate)["simulation"] == one
+    assert result(FIR, *few, "simulation.seed=2", verb=simulate)["simulation"] != one
+
+
+def test_estimates_are_least_squares():
+    from inputdesign_cli.design.regression import Regression
+
+    rng = np.random.default_rng(0)
+    Phi, theta = rng.standard_normal((30, 4)), np.array([1.0, 2.0, 3.0, 4.0])
+    regression = Regression(np.array([1.0, 0.0]), np.array([0.0, 1.0]), 1.0, 0.25)
+    found = run_experiments(regression, Phi, theta, runs=3, seed=1)
+    noise = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(0,))).standard_normal((3, 30))
+    for row, v in zip(found.theta, noise, strict=True):
+        expected = np.linalg.lstsq(Phi[:, :2], Phi @ theta + 0.5 * v, rcond=None)[0]
+        np.testing.assert_allclose(row, expected, rtol=1e-10)
+    np.testing.assert_allclose(found.error, found.theta[:, 0] - 1.0 - 4.0)
+
+
+# The run directory -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", [FREE, FIR], ids=lambda p: p.stem)
+def test_a_run_has_its_files(path, tmp_path):
+    outcome = solve(load_spec(path, ["experiment.samples=60"]))
+    files = {file.name for file in write_run(outcome, tmp_path / "run", draw_all(outcome))}
+    wanted = {
+        "spec.yaml",
+        "signal.csv",
+        "signal.png",
+        "error.png",
+        "moments.png",
+        "figures.json",
+        "result.json",
+    }
+    assert files == wanted | ({"spectrum.csv"} if path == FIR else set())
+
+
+# Bad input ---------------------------------------------------------------------------------------
+
+BAD = [
+    ([f"{E}.estimated=[1, 2]"], "wrong-shape", "2 weights, but 1"),
+    ([f"{E}.neglected=[1, 2]"], "wrong-shape", "2 weights, but 1"),
+    ([f"{E}.target=-1"], "out-of-range", "greater than 0"),
+    ([f"{E}.target=0"], "out-of-range", "greater than 0"),
+    ([f"{E}.neglected_norm=-0.1"], "out-of-range", "at least 0"),
+    (["noise.variance=-1"], "out-of-range", "greater than 0"),
+    (["noise.variance=0"], "out-of-range", "greater than 0"),
+    ([f"{E}.target=null", "limits.energy=0"], "out-of-range", "greater than 0"),
+    ([f"{E}.target=null", "limits.energy=-3"], "out-of-range", "greater than 0"),
+    ([f"{E}.target=null"], "needs-limits", "nothing limits"),
+    (["limits.energy=3"], "not-supported", "beside a target"),
+    ([f"{E}.estimated=[0]"], "zero-weights", "all weights"),
+    (["simulation.plant.parameters=[1]"], "wrong-shape", "1 number"),
+    (["noise.C=[1, 0.5]"], "unsuitable-key", "noise.C"),
+    (["experiment.prior={information: [[1]]}"], "not-supported", "prior"),
+    (["objective=shortest_experiment"], None, ""),
+    (["limits.amplitude=1"], "not-supported", "limits.amplitude"),
+    (["solver.method=lmi"], "not-supported", "grid program"),
+    (["signal.type=multisine"], "not-supported", "signal.type"),
+    (["cost={input_power: 2}"], "not-supported", "weigh powers"),
+]
+
+
+@pytest.mark.parametrize(("overrides", "code", "part"), BAD, ids=lambda x: str(x)[:40])
+def test_bad_specs(overrides, code, part):
+    with pytest.raises(SpecError) as error:
+        validate(load_spec(FIR, overrides))
+    diagnostic = error.value.diagnostics[0]
+    assert diagnostic.hint
+    assert diagnostic.location is not None
+    if code is not None:
+        assert diagnostic.code == code
+        assert part in diagnostic.message
+
+
+def test_periods_must_divide_the_record():
+    with pytest.raises(SpecError, match="7 equal periods") as error:
+        solve(load_spec(FIR, ["signal.periods=7"]))
+    assert error.value.diagnostics[0].code == "bad-period"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "part"),
+    [
+        (["simulation=null"], "there are none"),
+        (["simulation.compare=[prbs]"], "prbs"),
+        (["experiment.samples=1"], "too few"),
+    ],
+)
+def test_what_cannot_be_simulated(overrides, part):
+    with pytest.raises(SpecError, match=part):
+        simulate(load_spec(FIR, overrides))
+
+
+def test_an_infeasible_target_says_what_would_be_feasible(capsys, monkeypatch, tmp_path):
+    """Example 4 at alpha = 2: |b| is 1 at least, so a target of 4 or an alpha of 1 is the border."""
+    arguments = ["solve", str(FIR), "-o", str(tmp_path / "run"), "--set", f"{E}.neglected=[2]"]
+    monkeypatch.setattr("sys.argv", ["idesign", *arguments, "--set", f"{E}.neglected_norm=2"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 3
+    text = capsys.readouterr().err
+    for part in ("target-out-of-reach", "a target above 4 can be met", "neglected_norm below 1", "proved"):
+        assert part in text
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(InfeasibleError):
+        solve(load_spec(FIR, [f"{E}.neglected=[2]", f"{E}.neglected_norm=1"]))
+    feasible = result(FIR, f"{E}.neglected=[2]", f"{E}.neglected_norm=2", f"{E}.target=4.04")
+    assert feasible["status"] == "optimal"
+
+
+def test_the_summary_says_what_was_found(capsys, monkeypatch, tmp_path):
+    arguments = [
+        "simulate",
+        str(FIR),
+        "-o",
+        str(tmp_path / "run"),
+        "--no-figures",
+        "--set",
+        "simulation.runs=10",
+    ]
+    monkeypatch.setattr("sys.argv", ["idesign", *arguments, "--set", "experiment.samples=20"])
+    with pytest.raises(SystemExit):
+        main()
+    text = capsys.readouterr().out
+    for part in (
+        "energy      2\n",
+        "no toeplitz moments get below",
+        "squared bias 0 + variance 1",
+        "design: mean squared error",
+    ):
+        assert part in text
+
+
+def test_json_of_a_study(capsys, monkeypatch, tmp_path):
+    arguments = ["simulate", str(FREE), "--json", "-o", str(tmp_path), "--set", "simulation.runs=10"]
+    monkeypatch.setattr("sys.argv", ["idesign", *arguments, "--set", "experiment.samples=20", "--no-figures"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert (ended.value.code or 0) == 0
+    assert json.loads(capsys.readouterr().out)["simulation"]["runs"] == 10
+
+
+def test_a_given_excitation_is_not_designed():
+    text = """
+plant: {regression: {estimated: 1, neglected: 1}}
+noise: {variance: 1}
+accuracy: {mean_squared_error: {target: 1.0, estimated: [1], neglected_norm: 1.0}}
+spectrum: {given: {type: white, power: 1}}
+"""
+    with pytest.raises(SpecError):
+        solve(parse_spec(text))

@@ -1,0 +1,276 @@
+"""Designs of a frequency response: closed forms, refusals, the audit, and simulated experiments."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
+from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.questions.frequency_response.audit import audit_response
+from inputdesign_cli.questions.task import build_task
+
+SPECS = Path(__file__).parents[2] / "specs"
+SINGLE = """
+plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
+noise: {D: [1, -0.9], variance: 0.01}
+experiment: {samples: 2000}
+accuracy: {frequency_response: {relative: 0.05, band: [0.1, 2], lines: 12}}
+signal: {periods: 5}
+"""
+SEVERAL = """
+plant: {B: [[[0, 0.4], [0, 0, 0.3]], [[0, 0.1], [0, 0.5]]], F: [[[1, -0.8], [1, -0.5]],
+  [[1, -0.6], [1, -0.9]]]}
+noise: {D: [1, -0.5], variance: [[0.01, 0.002], [0.002, 0.02]]}
+experiment: {samples: 4000}
+accuracy: {frequency_response: {absolute: 0.05, band: [0.1, 2], lines: 6}}
+"""
+
+
+def spec(text=SINGLE, **changes):
+    made = parse_spec(text)
+    return (
+        made.with_(**{key.replace("__", "."): value for key, value in changes.items()}) if changes else made
+    )
+
+
+def lines_of(result):
+    w = np.array(result["spectrum"]["frequencies"])
+    z = np.exp(-1j * w)
+    G = (0.4 * z + 0.1 * z**2) / (1 - 1.5 * z + 0.8 * z**2)
+    return w, np.abs(G), 0.01 / np.abs(1 - 0.9 * z) ** 2
+
+
+def test_the_powers_are_those_of_the_closed_form():
+    result = solve(spec()).result
+    w, size, noise = lines_of(result)
+    assert np.rint(w * 400 / (2 * np.pi)) == pytest.approx(w * 400 / (2 * np.pi), abs=1e-9)
+    powers = 2 * noise / (1600 * (0.05 * size) ** 2)
+    assert np.array(result["spectrum"]["powers"]) == pytest.approx(powers, rel=1e-12)
+    assert result["cost"] == pytest.approx(powers.sum(), rel=1e-12)
+    assert result["power"]["output"] == pytest.approx([np.sum(powers * size**2)], rel=1e-12)
+    assert result["status"] == "optimal"
+    assert result["objective"]["lower_bound"] == result["objective"]["value"]
+    flat = w.size * powers.max()
+    assert result["baseline"]["white"]["ratio"] == pytest.approx(flat / powers.sum(), rel=1e-12)
+
+
+def test_limits_are_exhausted_by_the_best_accuracy_and_the_shortest_experiment():
+    cheapest = solve(spec())
+    need = cheapest.result["cost"]
+    best = solve(spec(objective="best_accuracy", limits__input_power=4 * need)).result
+    assert best["objective"]["kind"] == "accuracy_factor"
+    assert best["objective"]["value"] == pytest.approx(0.5, rel=1e-12)
+    assert best["power"]["input"] == pytest.approx([4 * need], rel=1e-12)
+    short = solve(
+        spec(
+            objective="shortest_experiment",
+            limits__input_power=2 * need,
+            signal=None,
+            accuracy__frequency_response__period=400,
+        )
+    ).result
+    assert short["objective"]["value"] == pytest.approx(800.0, rel=1e-9)
+    assert short["samples"] == 3 * 400  # two periods count, one is left to the transient
+    assert short["frequency_response"]["worst_ratio"] == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_lower_limit_on_the_output_is_met_where_it_is_cheapest():
+    plain = solve(spec()).result
+    floor = 2.0 * plain["power"]["output"][0]
+    result = solve(spec(limits__output_power={"min": floor})).result
+    _, size, _ = lines_of(result)
+    more = np.array(result["spectrum"]["powers"]) - np.array(plain["spectrum"]["powers"])
+    # A plain argument: what is missing at the output comes from the line of the largest gain alone.
+    top = int(np.argmax(size))
+    assert more[top] == pytest.approx(plain["power"]["output"][0] / size[top] ** 2, rel=1e-6)
+    assert np.abs(np.delete(more, top)).max() < 1e-9
+    assert result["objective"]["relative_gap"] < 1e-9
+
+
+def test_the_record_repeats_and_has_the_lines_of_the_design():
+    results = solve(spec(signal__phases="optimised"))
+    u = results.signal[:, 0]
+    assert u.size == 2000
+    assert u[400:] == pytest.approx(u[:-400], abs=1e-12)
+    transforms = np.abs(np.fft.rfft(u[:400]) / 400) ** 2 * 2
+    numbers = np.rint(np.array(results.result["spectrum"]["frequencies"]) * 400 / (2 * np.pi)).astype(int)
+    scale = 1 + results.result["signal"]["extra_power"]
+    assert transforms[numbers] == pytest.approx(
+        scale * np.array(results.result["spectrum"]["powers"]), rel=1e-9
+    )
+    assert np.delete(transforms, numbers).max() < 1e-20
+    assert results.result["signal"]["crest_factor"][0] < 2.2
+    # Noise of a finite record leaks, and the record makes up for it.
+    assert results.result["signal"]["worst_ratio"] == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("text", [SINGLE, SEVERAL], ids=["one input", "two inputs"])
+def test_simulated_deviations_are_those_designed_at_every_line(text):
+    results = simulate(spec(text, simulation={"runs": 2500, "seed": 3}))
+    entry = results.result["simulation"]["inputs"]["design"]
+    assert entry["deviation_ratio"]["least"] > 0.95
+    assert entry["deviation_ratio"]["largest"] < 1.05
+    low, high = entry["chance"]
+    assert low < entry["deviation_ratio"]["least"]
+    assert entry["deviation_ratio"]["largest"] < high
+    assert entry["bias"] < 0.12
+    table = results.tables["deviations"].columns
+    designed = [name for name in table if name.startswith("deviation") and "_record" not in name]
+    pairs = [
+        (name, name.replace("deviation", "deviation_simulated")) for name in designed if "sim" not in name
+    ]
+    for name, simulated in pairs:
+        assert table[simulated] == pytest.approx(table[name], rel=0.05)
+
+
+def test_equal_lines_keep_lower_limits_too():
+    plain = solve(spec()).result
+    floor = 3.0 * plain["baseline"]["white"]["cost"]
+    result = solve(spec(limits__input_power={"min": floor})).result
+    assert result["cost"] == pytest.approx(floor, rel=1e-9)
+    assert result["baseline"]["white"]["cost"] == pytest.approx(floor, rel=1e-9)
+
+
+def test_a_record_that_limits_keep_from_the_accuracy_says_so():
+    need = solve(spec()).result["cost"]
+    result = solve(spec(limits__input_power=need * (1 + 1e-9))).result
+    assert result["signal"]["worst_ratio"] > 1.0001
+    assert any("leaks" in note for note in result["notes"])
+
+
+def test_one_run_has_no_deviation():
+    with pytest.raises(SpecError, match="single run"):
+        simulate(spec(simulation={"runs": 1}))
+
+
+def test_each_input_has_lines_of_its_own_powers():
+    result = solve(spec(SEVERAL)).result
+    powers = np.array(result["spectrum"]["powers"])
+    w = np.array(result["spectrum"]["frequencies"])
+    noise = np.array([0.01, 0.02]) / np.abs(1 - 0.5 * np.exp(-1j * w))[:, None] ** 2
+    counted = result["frequency_response"]["counted"]
+    assert counted == 3200
+    each = 2 * noise.max(axis=1) / (counted * 0.05**2)
+    assert powers == pytest.approx(np.einsum("l,ab->lab", each, np.eye(2)), rel=1e-9)
+
+
+def test_a_given_multisine_is_analysed_at_its_lines():
+    designed = solve(spec()).result
+    w, powers = designed["spectrum"]["frequencies"], np.array(designed["spectrum"]["powers"])
+    given = {"type": "multisine", "frequencies": w, "amplitudes": np.sqrt(2 * powers / 4).tolist()}
+    result = analyse(spec(spectrum={"given": given})).result
+    assert result["status"] == "missed"
+    assert result["frequency_response"]["worst_ratio"] == pytest.approx(2.0, rel=1e-9)
+
+
+def test_a_noise_spectrum_from_a_file_takes_the_place_of_the_model(tmp_path, write):
+    w = np.linspace(0.05, 3.0, 400)
+    noise = 0.01 / np.abs(1 - 0.9 * np.exp(-1j * w)) ** 2
+    path = write({"frequency_rad_per_s": w, "noise_spectrum": noise})
+    plain = solve(spec()).result
+    result = solve(spec(accuracy__frequency_response__noise=str(path))).result
+    assert result["cost"] == pytest.approx(plain["cost"], rel=1e-3)
+    double = write({"frequency_rad_per_s": w, "noise_spectrum": 2 * noise}, "double.csv")
+    twice = solve(spec(accuracy__frequency_response__noise=str(double))).result
+    assert twice["cost"] == pytest.approx(2 * result["cost"], rel=1e-12)
+
+
+def test_lines_that_tell_nonlinearity_stay_silent():
+    results = solve(spec(accuracy__frequency_response__detection=3, experiment__samples=5000))
+    response, u = results.result["frequency_response"], results.signal[:1000, 0]
+    power = np.abs(np.fft.rfft(u)) ** 2
+    number = {
+        kind: np.rint(np.array(w) * 1000 / (2 * np.pi)).astype(int)
+        for kind, w in response["detection"].items()
+    }
+    assert response["lines"] == 12
+    assert np.all(number["odd"] % 2 == 1)
+    assert np.all(number["even"] % 2 == 0)
+    silent = np.concatenate([number["odd"], number["even"]])
+    assert power[silent].max() < 1e-20 * power.max()
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "key"),
+    [
+        ({"experiment.controller": {"numerator": [0.1], "denominator": [1]}}, "not-supported", "controller"),
+        ({"noise.drift": True}, "not-supported", "drift"),
+        ({"spectrum": {"type": "fir"}}, "not-supported", "spectrum"),
+        ({"limits.energy": 1.0}, "not-supported", "energy"),
+        ({"signal.hold": 2}, "not-supported", "hold"),
+        ({"accuracy.model_error": {"relative": 0.1}}, "not-supported", "model_error"),
+        ({"accuracy.frequency_response.lines": 500}, "too-few-lines", "lines"),
+        ({"accuracy.frequency_response.transient": 5}, "bad-period", "samples"),
+        ({"accuracy.frequency_response.relative": None}, "missing-key", "frequency_response"),
+        ({"objective": "best_accuracy"}, "needs-limits", "frequency_response"),
+        ({"experiment.samples": 10**8}, "too-large", "samples"),
+        ({"uncertainty": {"intervals": {"b1": [0.3, 0.5]}}}, "not-supported", "uncertainty"),
+    ],
+)  # fmt: skip
+def test_what_is_not_done_is_refused_at_its_key(changes, code, key):
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(SINGLE).with_(**changes))
+    found = caught.value.diagnostics[0]
+    assert found.code == code
+    assert key in found.key
+    assert found.hint
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "code"),
+    [([0.1, 0.101], "too-few-lines"), ([0.001], "out-of-range"), ([3.14], "out-of-range")],
+)
+def test_lines_that_the_period_does_not_have_are_told(frequencies, code):
+    text = SINGLE.replace("band: [0.1, 2], lines: 12", f"frequencies: {frequencies}")
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(text))
+    assert caught.value.diagnostics[0].code == code
+
+
+def test_limits_that_are_too_tight_say_what_would_do():
+    need = solve(spec()).result["cost"]
+    with pytest.raises(InfeasibleError) as caught:
+        solve(spec(limits__input_power=need / 4))
+    assert "2 times those admitted" in str(caught.value)
+    assert solve(spec(limits__input_power=need / 4, accuracy__frequency_response__relative=0.1 * (1 + 1e-9)))
+    assert solve(spec(limits__input_power=need * (1 + 1e-9)))
+
+
+def audited():
+    task = build_task(spec())
+    plan, results = task._solved()
+    return replace(task, experiment=replace(task.experiment, samples=plan.counted)), plan, results
+
+
+def test_what_is_written_passes_the_audit():
+    audit_response(*audited())
+
+
+@pytest.mark.parametrize(
+    "path", ["cost", "spectrum.powers", "frequency_response.worst_ratio", "signal.worst_ratio"]
+)
+def test_a_number_that_is_wrong_does_not_pass(path):
+    terms, plan, results = audited()
+    result = {name: dict(part) if isinstance(part, dict) else part for name, part in results.result.items()}
+    *outer, name = path.split(".")
+    holder = result[outer[0]] if outer else result
+    holder[name] = np.asarray(holder[name]) * 1.00001
+    with pytest.raises(InaccurateError):
+        audit_response(terms, plan, replace(results, result=result))
+
+
+def test_a_record_that_is_wrong_does_not_pass():
+    terms, plan, results = audited()
+    time, u = results.tables["signal"].columns.items()
+    wrong = np.array(u[1])
+    wrong[500:] *= 1.0001
+    tables = {**results.tables, "signal": Table(dict([time, (u[0], wrong)]))}
+    with pytest.raises(InaccurateError):
+        audit_response(terms, plan, replace(results, tables=tables))
+
+
+def test_the_shipped_spec_is_solved():
+    assert solve(load_spec(SPECS / "frequency_response.yaml")).result["status"] == "optimal"

@@ -1,0 +1,161 @@
+"""What else than noise decides on a measured response: each cause is told apart, with what mends it."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import assess, identify, parse_spec, solve
+from inputdesign_cli.questions.frequency_response.build import build_measurement
+from inputdesign_cli.tasks.build.preparation import Preparation
+
+TEXT = """
+plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
+noise: {D: [1, -0.9], variance: 0.01}
+experiment: {samples: 3000}
+accuracy: {frequency_response: {relative: 0.05, band: [0.05, 2], lines: 16, detection: 4}}
+signal: {periods: 6, phases: optimised}
+"""
+PERIOD = 500
+
+
+@pytest.fixture(scope="module")
+def question():
+    spec = parse_spec(TEXT)
+    return spec, 1.6 * solve(spec).signal[:, 0]
+
+
+def answer(u, seed, curve=lambda x: x, size=0.1):
+    """The plant behind a curve, and noise, by a filter of its own."""
+    e = size * np.random.default_rng(seed).standard_normal(len(u) + 200)
+    v = scipy.signal.lfilter([1.0], [1.0, -0.9], e)[200:]
+    return scipy.signal.lfilter([0, 0.4, 0.1], [1, -1.5, 0.8], curve(u)) + v
+
+
+def judged(write, spec, u, y, **more):
+    time = np.arange(float(len(u)))
+    return assess(spec, write({"time_s": time, "u1": u, "y1": y}), **more)
+
+
+def causes(found):
+    return found.results.result["assessment"].get("causes", [])
+
+
+def clipping(share):
+    return lambda x: np.clip(x, -share * np.std(x), share * np.std(x))
+
+
+def dead(share):
+    return lambda x: np.sign(x) * np.maximum(np.abs(x) - share * np.std(x), 0.0)
+
+
+def bent(spec, u, curve):
+    """The largest change of the response by a curve without noise, over what is admitted."""
+    task = build_measurement(spec).task
+    curved, linear = (
+        task.periods.means(answer(u, 0, one, 0.0)[:, None], task.grid.excited)[:, 0, 0]
+        for one in (curve, lambda x: x)
+    )
+    return float(np.max(np.abs(curved / linear - 1.0)) / 0.05)
+
+
+@pytest.mark.parametrize(
+    "curve", [clipping(1.2), clipping(0.5), dead(0.3), dead(1.0), lambda x: x + 0.1 * x**3]
+)
+@pytest.mark.parametrize("strength", [0.05, 1.0, 2.0])
+def test_no_number_of_periods_mends_a_nonlinearity(write, question, curve, strength):
+    """Whatever the noise: the response of more periods errs by the same, and so none are offered."""
+    spec, u = question
+    assert bent(spec, u, curve) > 1.5
+    found = judged(write, spec, u, answer(u, 1, curve, 0.1 * strength))
+    told = found.results.result["assessment"]
+    assert "periods" not in told
+    assert found.verdict != "met"
+    assert "would do" not in str(found.results.result)
+    assert any("smaller amplitude" in note for note in found.results.result["notes"])
+
+
+def test_noise_that_misses_whatever_the_nonlinearity_does_is_a_miss(write, question):
+    spec, u = question
+    found = judged(write, spec, u, answer(u, 1, lambda x: x + 0.5 * x**3 / np.var(x), 1.0))
+    assert found.verdict == "missed"
+    assert "no remedy" in found.results.result["assessment"]["no_top_up"]
+
+
+@pytest.mark.parametrize("height", [5.0, -20.0, 200.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_drift_is_no_nonlinearity_and_detrending_mends_it(write, question, height, seed):
+    spec, u = question
+    y = answer(u, seed)
+    drifting = y + np.linspace(0.0, height, len(y))
+    plain, found = judged(write, spec, u, y), judged(write, spec, u, drifting)
+    assert plain.verdict == "met"
+    assert causes(found) == ["drift"]
+    note = found.results.result["notes"][-1]
+    assert "add --detrend linear" in note
+    assert "nonlinearity" not in str(found.results.result["notes"])
+    size = float(note.split("drifts by ")[1].split(" ")[0])
+    assert size == pytest.approx(abs(height), rel=0.1)
+    mended = judged(write, spec, u, drifting, preparation=Preparation(detrend="linear"))
+    assert mended.verdict == "met"
+
+
+def test_a_curved_drift_is_not_mended_by_a_line(write, question):
+    spec, u = question
+    y = answer(u, 3) + 30.0 * np.linspace(-1.0, 1.0, len(u)) ** 3
+    found = judged(write, spec, u, y)
+    assert causes(found) == ["drift"]
+    assert "no line takes that away" in found.results.result["notes"][-1]
+
+
+def test_a_drift_and_a_nonlinearity_are_both_named(write, question):
+    spec, u = question
+    found = judged(write, spec, u, answer(u, 3, clipping(0.8)) + np.linspace(0.0, 20.0, len(u)))
+    assert causes(found) == ["drift", "nonlinearity"]
+
+
+@pytest.mark.parametrize("samples", [[1234], [700, 2222], [1800, 1801, 1802]])
+def test_spikes_are_named_and_nothing_is_made_of_them(write, question, samples):
+    spec, u = question
+    y = answer(u, 1)
+    y[samples] += 60.0
+    found = judged(write, spec, u, y)
+    assert causes(found) == ["spikes"]
+    told = found.results.result
+    assert all(f"{at} s" in told["assessment"]["undecided"][0] for at in samples)
+    assert "periods" not in told["assessment"]
+    assert "nonlinearity" not in told["frequency_response"]
+    assert "cube" not in str(told["notes"])
+    y[samples] = np.nan
+    assert judged(write, spec, u, y).verdict in ("met", "undecided")
+
+
+def test_a_spike_that_does_not_count_is_none(write, question):
+    spec, u = question
+    y = answer(u, 1)
+    y[100] += 60.0  # in the transient
+    assert judged(write, spec, u, y).verdict == "met"
+
+
+@pytest.mark.parametrize("past", [0.9, 0.99, 0.998])
+def test_slow_noise_that_the_spec_knows_is_neither_drift_nor_spikes(write, past):
+    """Down to a memory of a period, far below the lowest line."""
+    spec = parse_spec(TEXT.replace("-0.9", f"-{past}"))
+    u, found = 1.6 * solve(spec).signal[:, 0], []
+    for seed in range(20):
+        e = 0.1 * np.random.default_rng(seed).standard_normal(len(u) + 3000)
+        y = answer(u, 0, size=0.0) + scipy.signal.lfilter([1.0], [1.0, -past], e)[3000:]
+        found += causes(judged(write, spec, u, y))
+    assert not {"drift", "spikes"} & set(found)
+
+
+def test_of_two_files_each_drifts_by_itself(write, question):
+    spec, u = question
+    time = np.arange(float(len(u)))
+    files = [
+        write({"time_s": time, "u1": u, "y1": answer(u, seed) + np.linspace(0.0, height, len(u))}, name)
+        for seed, height, name in ((1, 20.0, "1.csv"), (2, -20.0, "2.csv"))
+    ]
+    # One ramp undoes the other in the response, and the scatter has them both.
+    told = identify(spec, files, frequency_response=True).result
+    silent = told["frequency_response"]["nonlinearity"]
+    assert all(entry["probability"][0] > 1e-3 for entry in silent.values())

@@ -1,0 +1,324 @@
+"""`uncertainty`: designs for every plant that the true one might be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli.compute.time_limit import stoppable
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.question import Alternative
+from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.information import FiniteRecord
+from inputdesign_cli.questions.common.robust import Batch, tried_on
+from inputdesign_cli.questions.least_cost.build import build_convex
+from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
+from inputdesign_cli.report.facts import facts
+from inputdesign_cli.report.question import read_question
+from inputdesign_cli.report.sources import assumptions, citations
+from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
+
+
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        (FIRST, ()),
+        (FIRST, ("limits={output_power: 1}", "objective=best_accuracy")),
+        (FIRST, ("limits={output_power: 1}", "objective=shortest_experiment")),
+        (FIRST, ("accuracy={criterion: D, standard_deviation: {f1: 0.02}}", "limits={input_power: 1}")),
+        (LOOP, ()),
+        (LOOP, ("accuracy={model_error: {sensitivity: {max_db: 9}}}", "uncertainty.cost=mean")),
+        (TWO, ("limits={output_power: [200, 200]}",)),
+        (TWO, ("accuracy={criterion: A, scale: relative}", "limits={input_power: [1, 2]}")),
+    ],
+)
+def test_copies_of_the_plant_change_nothing(text, asked):
+    """Whatever is asked, in a loop and with several channels."""
+    (name, value) = ("f1", -0.8) if text is LOOP else ("f1", -0.7) if text is FIRST else ("b1[1,1]", 1.0)
+    scenarios = f"uncertainty={{scenarios: [{{'{name}': {value}}}, {{'{name}': {value}}}]}}"
+    robust = [one for one in asked if one.startswith("uncertainty")]
+    once = solved(text, *(one for one in asked if one not in robust))
+    again = solved(text, scenarios, *asked)
+    assert again["objective"]["value"] == pytest.approx(once["objective"]["value"], rel=1e-6)
+    assert again["cost"] == pytest.approx(once["cost"], rel=1e-5)
+    assert again["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-3)  # a whole number of samples
+
+
+def test_a_plant_that_asks_for_more_sets_the_cost():
+    alone = solved(FIRST.replace("-0.7", "-0.5"))
+    both = solved(FIRST, "uncertainty={scenarios: [{f1: -0.5}]}")
+    nominal = solved(FIRST)
+    assert both["cost"] >= max(alone["cost"], nominal["cost"]) * (1 - 1e-7)
+    assert both["robust"]["active"][0]["parameters"]["f1"] == -0.5
+    assert both["robust"]["active"][0]["scenario"] == 1
+    assert "fresh" not in both["robust"]
+
+
+def test_limits_hold_at_every_plant():
+    """The power of the output is that of the plant that answers most."""
+    asked = ("limits={output_power: 5}", "objective=best_accuracy")
+    robust = solve(parse_spec(FIRST, overrides=[*asked, "uncertainty={scenarios: [{f1: -0.9}]}"]))
+    design = build_convex(
+        parse_spec(FIRST, overrides=[*asked, "uncertainty={scenarios: [{f1: -0.9}]}"])
+    ).designed()[0]
+    powers = [design.problem.power("output", None, s).at(design.design.result.x) for s in (0, 1)]
+    assert powers[1] == pytest.approx(5.0, rel=1e-6)
+    assert powers[0] < 4.0
+    (limit,) = robust.result["limits"]
+    assert limit["binding"]
+    assert limit["value"] == pytest.approx(5.0, rel=1e-6)
+
+
+def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
+    scenarios = "uncertainty={scenarios: [{f1: -0.75}, {f1: -0.85}], cost: %s}"
+    of_each = {"nominal": lambda paid: paid[0], "mean": np.mean, "worst": max}
+    for cost, of in of_each.items():
+        found = build_convex(parse_spec(LOOP, overrides=[scenarios % cost])).designed()[0]
+        at, x = found.problem, found.design.result.x
+        paid = [sum(at.power(kind, None, s).at(x) for kind in ("input", "output")) for s in range(3)]
+        assert found.design.result.objective == pytest.approx(of(paid), rel=1e-9)
+    assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
+
+
+def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
+    found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
+    robust = found["robust"]
+    assert robust["worst_share"] == pytest.approx(1.0, abs=1e-6)
+    assert robust["fresh"]["draws"] == 120
+    low, high = robust["fresh"]["limits"]
+    assert low <= robust["fresh"]["share"] <= high
+    assert robust["fresh"]["share"] <= robust["risk"]["after"] <= robust["risk"]["before"]
+    assert found["cost"] > 1.05 * solved(FIRST)["cost"]
+
+
+def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
+    """Cost worst: beside the accuracy the cost is promised, at the plants drawn and to most of the others."""
+    prior = "covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 30, fresh: 60"
+    found = solve(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}, cost: worst}}"])).result
+    mean = solved(LOOP, f"uncertainty={{{prior}, cost: mean}}")
+    robust = found["robust"]
+    assert robust["cost"] == "worst"
+    assert found["cost"] == pytest.approx(found["objective"]["value"], rel=1e-9)
+    assert found["cost"] > 1.05 * mean["cost"]
+    assert robust["dearest"]["cost"] == pytest.approx(found["cost"], rel=1e-6)
+    assert robust["dearest"]["scenario"] in [one["scenario"] for one in robust["active"]]
+    assert robust["fresh"]["share"] <= robust["risk"]["after"]
+    assert "dearest" not in mean["robust"]
+    assert "less" not in mean["robust"]["fresh"]
+
+
+def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
+    prior = "uncertainty={covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 60, cost: worst}"
+    task = build_convex(parse_spec(LOOP, overrides=[prior]))
+    done, _ = task.designed()
+    tried = [
+        one.kept
+        for batch in task.plants.afresh()
+        for one in tried_on(done.design, done.experiment.samples, batch)
+    ]
+    less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
+    dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
+    found = task.solve().result
+    told = found["robust"]["fresh"]
+    assert (told["less"], told["dearer"], told["missed"]) == (len(less), len(dearer), len(less | dearer))
+    assert less > dearer > set()
+    (words,) = (text for name, text, _ in facts(found, "s") if name == "fresh plants")
+    both = len(less & dearer)
+    assert f"{len(less)} get less than that, {len(dearer)} cost more ({both} of them both)" in words
+    assert f"{len(less | dearer)} in all" in words
+
+
+def test_leaving_out_the_dearest_plants_makes_it_cheaper():
+    prior = f"covariance: {COVARIANCE}, scenarios: 30, fresh: 10"
+    whole = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}}}"]))
+    fewer = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, discard: 0.1}}"]))
+    assert fewer.result["robust"]["discarded"] == 3
+    assert fewer.result["cost"] < 0.99 * whole.result["cost"]
+    assert "risk" not in fewer.result["robust"]
+    assert len(fewer.tables["scenarios"].columns["scenario"]) == 27
+    before, after = (found.tables["scenarios"].columns["scenario"] for found in (whole, fewer))
+    gone = set(before) - set(after)
+    assert whole.result["robust"]["active"][0]["scenario"] in gone
+
+
+def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
+    """The sensitivity of the scenario's own loop misses what is asked: without a floor nothing would do."""
+    text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 9}")
+    plant = "uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]%s}"
+    assert solved(text, plant % "")["robust"]["worst_share"] == pytest.approx(1.0, abs=1e-6)
+    assert complaint(text, plant % ", floor: 0").code == "admissible-not-positive"
+    fixed = solved(text, plant % ", r_adm: fixed")
+    assert fixed["cost"] < solved(text, plant % "")["cost"]
+
+
+def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
+    """The design on the initial estimate, on the true plant: by its own r_adm, and that of the estimate."""
+    path = "specs/flexible_transmission.yaml"
+    true = [
+        "plant={A: [1, -1.99185, 2.20265, -1.84083, 0.89413], B: [0, 0, 0, 0.10276, 0.18123]}",
+        "noise.variance=0.5",
+    ]
+    nominal = build_convex(load_spec(path))
+    oracle = build_convex(load_spec(path, true)).question
+    assert solve_design(oracle, tolerance=1e-7).result.objective == pytest.approx(7.7804, abs=1e-3)
+    design = solve_design(nominal.question, tolerance=1e-7)
+    # What it costs on the true plant: by numpy sums alone, with a plain program for the design, 12.444049.
+    spectrum, true_plant = design.result, oracle.experiment
+    cost = sum(
+        spectrum.basis.integrals(lambda w, k=k: true_plant.power_density(k, w), true_plant.singularities)
+        @ spectrum.x
+        for k in ("input", "output")
+    )
+    assert cost == pytest.approx(12.444049, rel=1e-5)
+    own = Alternative(oracle.experiment, oracle.requirements)
+    estimated = replace(own, requirements=nominal.question.requirements)
+    by_own, by_estimate = (
+        one.kept for one in tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
+    )
+    assert by_own.share == pytest.approx(1.02, abs=0.02)
+    assert by_estimate.share == pytest.approx(1.86, abs=0.02)
+    assert by_estimate.frequency == pytest.approx(0.390, abs=2e-3)
+
+
+@pytest.mark.parametrize("asked", [(), ("limits={input_power: 1}", "objective=best_accuracy")])
+def test_the_record_serves_every_plant_by_its_own_samples(asked):
+    prior = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 20, fresh: 5}}"
+    spec = parse_spec(FIRST, overrides=[prior, *asked])
+    found = solve(spec)
+    samples = found.tables["signal"].columns["u1"][:, None]
+    ratios = []
+    for plant in build_convex(spec).question.plants:
+        scenario = plant.at(plant.experiment.whitened(1.0))
+        told = FiniteRecord(scenario.experiment, len(samples)).information(samples)
+        ratios.append(scenario.requirements[0].worst(told).ratio)
+    assert max(ratios) == pytest.approx(found.result["signal"]["worst_ratio"], rel=1e-9)
+    assert max(ratios) > ratios[0]
+    if not asked:
+        assert max(ratios) <= 1.0 + 1e-9
+
+
+def test_the_fan_shows_every_plant_and_names_those_that_bind():
+    found = solve(
+        parse_spec(TWO, overrides=["uncertainty={scenarios: [{'b1[1,1]': 0.8}, {'b1[1,1]': 1.1}]}"])
+    )
+    curves, columns = found.curves["fan"], found.tables["fan"].columns
+    assert curves.ratios.shape == (2, curves.frequency.size)
+    np.testing.assert_allclose(columns["largest"], np.maximum(curves.ratios.max(axis=0), curves.nominal))
+    assert columns["largest"].max() == pytest.approx(1.0, abs=1e-3)
+    names = {f"plant {item['scenario']}" for item in found.result["robust"]["active"] if item["scenario"]}
+    assert set(curves.active) == names
+    assert draw_all(found)["fan.png"].startswith(b"\x89PNG")
+
+
+def test_what_is_said_is_said_under_the_prior():
+    found = solve(
+        parse_spec(FIRST, overrides=[f"uncertainty={{covariance: {COVARIANCE}, fresh: 20, scenarios: 9}}"])
+    )
+    lines = {name: (text, note) for name, text, note in facts(found.result, "s")}
+    assert lines["plants"][0] == "what is asked holds at the plant of the spec and 9 drawn"
+    assert "not of the true plant" in lines["fresh plants"][1]
+    question = read_question(found.resolved_spec)
+    assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
+    assert "true plant" in assumptions(question, found.result)[0]
+    assert sum("Campi" in source for source in citations(question, found.result)) == 2
+
+
+def test_limits_on_powers_bind_the_record_at_every_plant():
+    """The output answers most at the slower plant; records of several seeds, of the power of the design."""
+    asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
+    found = []
+    for seed in range(4):
+        u = solve(parse_spec(FIRST, overrides=[*asked, f"signal.seed={seed}"])).tables["signal"].columns["u1"]
+        found.append([np.mean(lfilter([0, 3.6], [1, pole], u) ** 2) for pole in (-0.7, -0.9)])
+    assert max(found)[0] < 4.0
+    assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
+    assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
+    """Of the output, and in a loop of the input: plain filters of plant and controller simulate both."""
+    controller = "experiment={samples: 500, controller: {numerator: [0.1], denominator: [1]}}"
+    plants, gain = [(3.6, -0.7), (3.6, -0.9), (5.0, -0.8)], 0.1 if loop else 0.0
+    scenarios = "uncertainty={scenarios: [{f1: -0.9}, {b1: 5.0, f1: -0.8}]}"
+    limits = "limits={amplitude: {input: 0.5, output: 9}}"
+    asked = ("objective=best_accuracy", limits, scenarios, *([controller] if loop else []))
+    result = solve(parse_spec(FIRST, overrides=asked))
+    record = result.tables["signal"].columns["r1" if loop else "u1"]
+    peaks = []
+    for b, f in plants:  # y = b q^-1 u / (1 + f q^-1), u = r - gain y
+        y = lfilter([0, b], [1, f + gain * b], record)
+        peaks.append((np.abs(y).max() / 9.0, np.abs(record - gain * y).max() / 0.5))
+    assert np.max(peaks) <= 1.0 + 1e-9
+    assert np.max(peaks[1:]) > 0.99  # the limit holds the record back at another plant than that of the spec
+    assert result.result["signal"]["of_limits"].keys() == {"amplitude.input", "amplitude.output"}
+
+
+def test_fresh_plants_are_tried_as_long_as_there_is_time():
+    """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
+    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
+    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    batches = list(done.plants.afresh())
+    shares = [
+        one.kept.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch)
+    ]
+    whole = robust_result(done, done.plants)
+    assert whole.entry["fresh"]["draws"] == len(shares) == 120
+    assert whole.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares) > 0
+    assert whole.entry["fresh"]["largest"] == pytest.approx(max(shares), rel=1e-12)
+    assert whole.notes == ()
+    with stoppable() as stop:
+
+        def ends_after_the_first():
+            yield batches[0]
+            stop()
+            yield batches[1]
+
+        cut = robust_result(done, replace(done.plants, afresh=ends_after_the_first))
+    first = len(batches[0].plants)
+    assert cut.entry["fresh"]["draws"] == first
+    assert cut.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares[:first])
+    assert f"after {first} of 120" in cut.notes[0]
+
+
+def test_what_data_will_tell_of_the_worst_plant_is_foreseen():
+    """One gain b: r_u is the same everywhere, r_adm a share of |b|, and the estimate is normal."""
+    deviation, worst = 0.1, 0.8
+    text = """
+plant: {B: [0, 1]}
+noise: {variance: 4}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.2}}
+limits: {input_power: 1}
+objective: best_accuracy
+spectrum: {type: white}
+uncertainty: {intervals: {b1: [0.8, 1.2]}, scenarios: 3, worst_case: 0.95, fresh: 5}
+signal: {candidates: 1, seed: 1}
+"""
+    found = solved(text)["robust"]
+    assert found["searched"]["parameters"]["b1"] == pytest.approx(worst)
+    assert found["estimates"]["draws"] == 100
+    # The 5 % quantile of 100 estimates scatters itself by (q (1 - q)/n)^0.5 over the density, here 0.1031.
+    own = 3.0 * np.sqrt(0.05 * 0.95 / 100) / 0.1031
+    least, most = (worst - (1.645 + side * own) * deviation for side in (1, -1))
+    assert worst / most < found["estimates"]["largest"] < worst / least
+    assert "estimates" not in solved(text, "uncertainty.fresh=0")["robust"]
+
+
+def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
+    """Also where the experiment tells one of them nothing: a plant without its input."""
+    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 20}}"
+    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    (batch,) = done.plants.afresh()
+    alone = [tried_on(done.design, 500, batch.only([place]))[0].kept for place in range(20)]
+    together = [one.kept for one in tried_on(done.design, 500, batch)]
+    assert [one.share for one in together] == pytest.approx([one.share for one in alone], rel=1e-9)
+    model = batch.plants[3].experiment.model
+    gone = model.at(np.where(np.array(model.names) == "b1", 1e-200, model.theta))
+    plants = list(batch.plants)
+    plants[3] = replace(plants[3], experiment=replace(plants[3].experiment, model=gone))
+    shares = [one.kept.share for one in tried_on(done.design, 500, replace(batch, plants=tuple(plants)))]
+    assert shares[3] == np.inf
+    assert np.delete(shares, 3) == pytest.approx([one.share for one in np.delete(alone, 3)], rel=1e-9)

@@ -1,0 +1,244 @@
+"""The shortest record within limits on single samples: solving at shorter lengths finds none that meets."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.signal import lfilter
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.questions.common.record import Made
+from inputdesign_cli.questions.least_cost.shortest_record import ShortestRecord, Way
+from inputdesign_cli.signal import Record
+
+# A lag whose spectrum alone would take five samples, and two inputs whose designs of stated length differ.
+LAG = """
+plant: {B: [0, 1.0], F: [1, -0.9]}
+noise: {variance: 0.1}
+accuracy: {model_error: {relative: 0.05}}
+spectrum: {type: fir, order: 4}
+limits: {amplitude: 1}
+signal: {candidates: 2, seed: 0}
+solver: {any_spectrum: false}
+"""
+MOVES = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+accuracy: {model_error: {relative: 0.05, alpha: 2.45}}
+spectrum: {type: fir, order: 8}
+limits: {amplitude: 0.7, rate: 0.9}
+signal: {candidates: 2}
+solver: {any_spectrum: false}
+"""
+TWO = """
+plant:
+  A: [1, -0.7]
+  B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]]
+noise: {variance: [[0.5, 0.1], [0.1, 0.4]]}
+accuracy: {model_error: {relative: 0.4}}
+spectrum: {type: fir, order: 3}
+limits: {amplitude: [1.0, 0.6]}
+signal: {candidates: 1}
+solver: {any_spectrum: false}
+"""
+SHORTEST = "objective: shortest_experiment\n"
+
+
+def meets(text: str, samples: int, objective: str) -> bool:
+    """Whether `solve` at a stated length finds a record that meets the accuracy."""
+    stated = f"{text}experiment: {{samples: {samples}}}\nobjective: {objective}\n"
+    try:
+        signal = solve(parse_spec(stated)).result["signal"]
+    except IdesignError:
+        return False
+    return signal["worst_ratio"] <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("texts", "objectives"),
+    [
+        pytest.param(
+            [LAG.replace("seed: 0", f"seed: {seed}") for seed in range(3)],
+            ["least_cost", "best_accuracy"],
+            marks=pytest.mark.slow,
+        ),
+        ([MOVES], ["best_accuracy"]),
+        ([TWO], ["least_cost"]),
+    ],
+    ids=["lag", "moves", "two inputs"],
+)
+def test_hardly_a_shorter_stated_length_meets_the_accuracy(texts, objectives):
+    """With 40 samples whose phases are tried twice, one in four may meet it by chance."""
+    tries = []
+    for text in texts:
+        found = solve(parse_spec(text + SHORTEST)).result
+        samples = found["signal"]["samples"]
+        assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
+        assert samples >= found["samples"]
+        shorter = {int(samples * share) for share in (0.9, 0.96)} - {samples}
+        tries += [meets(text, length, objective) for objective in objectives for length in shorter]
+    assert sum(tries) <= 0.25 * len(tries)
+
+
+@dataclass
+class Ways:
+    """Ways whose records meet from a length on, with information in proportion to it beside what was known
+    `before`; what was tried.
+    """
+
+    enough: Sequence[int]
+    until: int = 1000
+    before: float = np.inf
+    tried: list[tuple[int, int]] = field(default_factory=list)
+
+    def record(self, number: int, samples: int) -> Record:
+        enough = self.enough[number]
+        known = self.before**-2.0
+        ratio = (known + samples / enough * (1.0 - known)) ** -0.5
+        return Record(np.zeros((samples, 1)), "binary", ratio, met=samples >= enough)
+
+    def way(self, number: int) -> Way:
+        def made(samples: int) -> Made:
+            if len(self.tried) >= self.until:
+                raise OutOfTimeError([])
+            self.tried.append((number, samples))
+            return Made(self.record(number, samples), Mock(), Mock())
+
+        return made
+
+    def found(self, start: int, block: int = 1, longest: int = 10**6) -> int | None:
+        """The length that the search finds from `start` on, where the first way misses."""
+        ways = [self.way(number) for number in range(len(self.enough))]
+        made = ShortestRecord(ways, block, longest, self.before).search([self.record(0, start)])
+        return None if made is None or made.record is None else len(made.record.samples)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    enough=st.lists(st.integers(20, 20_000), min_size=1, max_size=4),
+    start=st.integers(2, 19),
+    block=st.sampled_from([1, 4, 10]),
+    before=st.sampled_from([np.inf, 3.0, 1.1, 1.001]),
+)
+def test_the_length_is_that_of_the_best_way_to_one_per_cent(enough, start, block, before):
+    ways = Ways(enough, before=before)
+    start = block * max(start // block, 1)
+    if start >= min(enough):
+        return
+    found = ways.found(start, block)
+    assert found is not None
+    assert min(enough) <= found <= min(enough) * 1.011 + block
+    assert found % block == 0
+    lengths = {samples for _, samples in ways.tried}
+    assert len(lengths) <= 24
+    assert len(ways.tried) <= len(lengths) * len(enough)
+
+
+def test_a_search_ends_at_the_longest_record_and_with_its_time():
+    assert Ways([5000]).found(100, longest=4000) is None
+    assert Ways([4000]).found(100, longest=4000) == 4000
+    assert Ways([950]).found(100, longest=900) is None
+    with pytest.raises(OutOfTimeError):
+        Ways([5000], until=1).found(100)
+    cut = Ways([5000], until=4)
+    found = cut.found(4)
+    assert found is not None
+    assert found >= 5000
+
+
+class Slow(Ways):
+    """Of a plant that hardly answers within the first samples: short records promise far too little."""
+
+    def record(self, number: int, samples: int) -> Record:
+        found = super().record(number, samples)
+        return replace(found, worst_ratio=found.worst_ratio * (1000.0 if samples < 30 else 1.0))
+
+
+@pytest.mark.parametrize("start", [3, 8, 20])
+def test_records_too_short_to_tell_do_not_end_the_search(start):
+    found = Slow([48]).found(start, longest=20_000)
+    assert found is not None
+    assert 48 <= found <= 49
+
+
+def shortest_of_two_levels(b: float, pole: float, variance: float, relative: float, alpha: float) -> int:
+    """Of b q^-1 / (1 - pole q^-1), levels of one, from rest: all sequences of each length are looked at."""
+    w = np.linspace(0.0, np.pi, 400)
+    z = np.exp(-1j * w)
+    F = 1.0 - pole * z
+    gradients = np.stack([z / F, -b * z**2 / F**2]) / np.abs(b * z / F)
+    for samples in range(3, 16):
+        u = np.array([(1.0, *rest, 0.0) for rest in itertools.product((1.0, -1.0), repeat=samples - 2)])
+        of_b = lfilter([0.0, 1.0], [1.0, -pole], u)
+        of_f = lfilter([0.0, -b], [1.0, -pole], of_b)
+        psi = np.stack([of_b, of_f], axis=-1)
+        covariances = np.linalg.inv(psi.swapaxes(1, 2) @ psi / variance)
+        worst = np.zeros(len(u))
+        for gradient in gradients.T:
+            rows = np.stack([gradient.real, gradient.imag])
+            worst = np.maximum(worst, np.linalg.eigvalsh(rows @ covariances @ rows.T)[:, -1])
+        if alpha * np.sqrt(worst.min()) <= relative:
+            return samples
+    raise AssertionError
+
+
+@pytest.mark.parametrize("relative", [0.15, 0.2, 0.25])
+def test_two_levels_are_as_short_as_any_that_there_are(relative):
+    """Within a sample of the shortest of all sequences."""
+    text = f"""
+plant: {{B: [0, 1.0], F: [1, -0.7]}}
+noise: {{variance: 0.1}}
+accuracy: {{model_error: {{relative: {relative}, alpha: 2}}}}
+spectrum: {{type: multisine, lines: 50}}
+limits: {{amplitude: 1}}
+signal: {{type: binary, seed: 1}}
+solver: {{any_spectrum: false}}
+objective: shortest_experiment
+"""
+    found = solve(parse_spec(text)).result["signal"]
+    assert found["worst_ratio"] <= 1.0 + 1e-9
+    least = shortest_of_two_levels(1.0, 0.7, 0.1, relative, 2.0)
+    assert least <= found["samples"] <= least + 1
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
+def test_what_is_known_already_needs_a_short_record_only(share):
+    """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""
+    text = LAG + SHORTEST
+    known = np.array(solve(parse_spec(text)).result["information"]["matrix"])
+    prior = f"experiment: {{prior: {{information: {(share * known).tolist()}}}}}\n"
+    found = solve(parse_spec(text + prior)).result
+    assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
+    whole = solve(parse_spec(text)).result["signal"]["samples"]
+    assert found["samples"] <= found["signal"]["samples"] < whole
+
+
+@pytest.mark.parametrize("more", [1e-6, 0.05, 3.0])
+@pytest.mark.parametrize("text", [LAG, TWO], ids=["lag", "two inputs"])
+def test_what_is_known_may_do_without_an_experiment(text, more):
+    known = np.array(solve(parse_spec(text + SHORTEST)).result["information"]["matrix"])
+    prior = f"experiment: {{prior: {{information: {((1.0 + more) * known).tolist()}}}}}\n"
+    found = solve(parse_spec(text + SHORTEST + prior)).result
+    assert (found["status"], found["objective"]["value"]) == ("nothing_needed", 0.0)
+    assert "signal" not in found
+
+
+def test_records_shorter_than_a_dead_time_do_not_end_the_search():
+    """The spectrum alone would take fewer than the dead time of twelve; wider limits never take longer."""
+    late = LAG.replace("B: [0, 1.0]", "B: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1.0]").replace(
+        "candidates: 2", "type: binary"
+    )
+    lengths = [
+        solve(parse_spec(late.replace("amplitude: 1", f"amplitude: {a}") + SHORTEST)).result["signal"][
+            "samples"
+        ]
+        for a in (1.0, 2.0, 3.0, 5.0, 8.0)
+    ]
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[-1] > 12

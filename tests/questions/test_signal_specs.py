@@ -1,0 +1,248 @@
+"""The words of `signal:` and of limits on single samples, from the spec to the files."""
+
+import io
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.io.wavfile
+
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.outcome.run_directory import write_run
+from inputdesign_cli.report.facts import facts
+
+BASE = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+accuracy:
+  model_error: {relative: 0.01, alpha: 2.45}
+spectrum: {type: fir, order: 5}
+"""
+CASES = [
+    ("signal: {type: multisine, phases: schroeder}", {}),
+    ("signal: {type: multisine, phases: optimised, candidates: 1}", {"crest_factor": 1.5}),
+    ("signal: {type: multisine, lines: odd, periods: 2}", {}),
+    ("signal: {lines: [3, 5, 9, 20, 40, 70, 110, 200]}", {}),
+    ("signal: {type: binary}", {"crest_factor": 1 + 1e-9}),
+    ("signal: {type: ternary, hold: 2}", {}),
+    ("signal: {bits: 7}", {"crest_factor": 1 + 1e-9}),
+    ("signal: {type: white, ramp: 20}", {}),
+    ("signal: {quantisation: {bits: 8, range: 4}, offset: 1}", {}),
+    ("limits: {amplitude: 1.2}", {"peak": 1.2}),
+    ("limits: {rate: 0.5}", {"input_move": 0.5 + 1e-12}),
+    ("limits: {rate: 0.5, amplitude: 1}\nsignal: {type: slewed}", {"input_move": 0.5 + 1e-12, "peak": 1}),
+    (
+        "limits: {amplitude: {input: 1.4, output: 13}}\nsignal: {candidates: 3}",
+        {"input_peak": 1.4, "output_peak": 13},
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "most"), CASES, ids=[text for text, _ in CASES])
+def test_the_record_meets_the_accuracy(text, most):
+    outcome = solve(parse_spec(BASE + text + "\n"))
+    signal = outcome.result["signal"]
+    assert 0.98 <= signal["worst_ratio"] <= 1 + 1e-9
+    column = outcome.tables["signal"].columns["u1"] - signal.get("operating_point", [0.0])[0]
+    assert signal["power"][0] == pytest.approx(np.mean(column**2), rel=1e-9)
+    assert signal["extra_power"] == pytest.approx(signal["power"][0] / outcome.result["cost"] - 1)
+    for key, value in most.items():
+        assert signal[key][0] <= value
+
+
+def test_the_power_of_the_design_on_request():
+    outcome = solve(parse_spec(BASE + "signal: {scale: design}\n"))
+    assert outcome.result["signal"]["power"][0] == pytest.approx(outcome.result["cost"], rel=1e-12)
+
+
+def test_a_record_that_is_too_short_names_one_that_is_not():
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2, type: filtered_noise}\n"))
+    (diagnostic,) = error.value.diagnostics
+    assert diagnostic.code == "limits-too-tight"
+    assert diagnostic.location is not None
+    length = int(diagnostic.hint.split()[0])
+    assert length > 500
+    spec = parse_spec(
+        BASE.replace("500", str(length)) + "limits: {amplitude: 0.65}\nsignal: {candidates: 8}\n"
+    )
+    signal = solve(spec).result["signal"]
+    assert signal["worst_ratio"] <= 1 + 1e-9
+    assert signal["peak"][0] <= 0.65
+
+
+def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
+    found = solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2}\n")).result
+    assert found["signal"]["type"] != "filtered_noise"
+    assert found["signal"]["worst_ratio"] <= 1 + 1e-9
+    assert found["signal"]["peak"][0] <= 0.65
+    assert any("no record of noise" in note for note in found["notes"])
+
+
+SLOW = """
+plant: {B: [0, 0.1], F: [1, -0.9]}
+noise: {variance: 0.05}
+experiment: {samples: 220}
+accuracy: {model_error: {relative: 0.1, band: [0.005, 0.4]}}
+spectrum: {type: fir, order: 30}
+limits: {amplitude: 1, rate: 0.1}
+solver: {any_spectrum: false}
+"""
+
+
+def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not_fit():
+    outcome = solve(parse_spec(SLOW))
+    signal = outcome.result["signal"]
+    assert signal["type"] == "slewed"
+    assert signal["worst_ratio"] <= 1 + 1e-9
+    moves = np.abs(np.diff(outcome.tables["signal"].columns["u1"], prepend=0.0))
+    assert np.isclose(moves, 0.1).mean() > 0.5
+    assert moves.max() <= 0.1
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(SLOW + "signal: {type: filtered_noise}\n"))
+    assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
+
+
+def test_a_converter_of_too_small_a_range_is_named():
+    text = "signal: {candidates: 1, quantisation: {bits: 8, range: 0.45}}\n"
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(BASE + text))
+    (diagnostic,) = error.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == ("limits-too-tight", "signal.quantisation")
+    assert 500 < int(diagnostic.hint.split()[0]) < 2000
+
+
+def test_limits_that_no_length_makes_up_for():
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(BASE + "limits: {rate: 0.003}\nsignal: {candidates: 1}\n"))
+    assert error.value.diagnostics[0].code == "infeasible"  # by the power of the moves
+    assert "samples a spectrum can" in error.value.diagnostics[0].hint
+
+
+def test_the_shortest_experiment_delivers_the_longer_record():
+    text = BASE.replace("experiment: {samples: 500}\n", "objective: shortest_experiment\n")
+    outcome = solve(
+        parse_spec(text + "limits: {input_power: 0.3, amplitude: 0.55}\nsignal: {candidates: 2}\n")
+    )
+    signal = outcome.result["signal"]
+    assert signal["samples"] > outcome.result["samples"]
+    assert signal["worst_ratio"] <= 1 + 1e-9
+    assert any("single samples" in note for note in outcome.result["notes"])
+
+
+def test_files_and_plots(tmp_path):
+    """CSV, MAT and WAV hold the same values; the limits and the record are drawn."""
+    text = BASE + "sample_time: 0.5\nlimits: {amplitude: 1.2}\n"
+    text += "signal: {offset: 2, quantisation: {bits: 12, range: 5}, also: [mat, wav], candidates: 2}\n"
+    outcome = solve(parse_spec(text))
+    applied = outcome.tables["signal"].columns["u1"]
+    steps = applied / (10 / 2**12)
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+    content = scipy.io.loadmat(io.BytesIO(outcome.files["signal.mat"]))
+    np.testing.assert_array_equal(content["u1"][:, 0], applied)
+    assert content["time_s"][1, 0] == 0.5
+    rate, wave = scipy.io.wavfile.read(io.BytesIO(outcome.files["signal.wav"]))
+    assert rate == 2
+    np.testing.assert_allclose(wave * outcome.result["signal"]["wav_full_scale"], applied, rtol=1e-6)
+    low, high = outcome.curves["signal"].limits["u1"]
+    assert low <= applied.min() < applied.max() <= high
+    (bound,) = outcome.curves["bound"].panels
+    assert np.all(bound.r_u_record <= bound.r_adm * (1 + 1e-9))
+    assert solve(parse_spec(text)).files == outcome.files
+    names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
+    assert {"signal.mat", "signal.wav", "signal.csv", "signal.png"} <= names
+
+
+def test_a_missed_accuracy_is_noted():
+    outcome = solve(parse_spec(BASE + "signal: {type: binary, amplitudes: 0.4}\n"))
+    assert outcome.result["signal"]["peak"] == [pytest.approx(0.4)]
+    assert outcome.result["signal"]["worst_ratio"] > 1
+    assert any("misses the accuracy" in note for note in outcome.result["notes"])
+
+
+BAD = [
+    ("signal: {periods: 3}", "conflicting-keys", "signal.periods"),
+    ("signal: {hold: 7}", "conflicting-keys", "signal.hold"),
+    ("signal: {periods: 500}", "conflicting-keys", "signal.periods"),
+    ("signal: {ramp: 10, bits: 5}", "unsuitable-key", "signal.ramp"),
+    ("signal: {ramp: 251}", "out-of-range", "signal.ramp"),
+    ("signal: {lines: [1, 251]}", "out-of-range", "signal.lines"),
+    ("limits: {amplitude: 1}\nsignal: {amplitudes: 2}", "conflicting-keys", "signal.amplitudes"),
+    ("limits: {rate: 0.1}\nsignal: {quantisation: {bits: 4, range: 5}}", "coarse-converter", "limits.rate"),
+    ("signal: {offset: 9, quantisation: {bits: 4, range: 5}}", "coarse-converter", "signal.offset"),
+    ("sample_time: 0.3\nsignal: {also: [wav]}", "no-sample-rate", "signal.also"),
+    ("signal: {order: 3}", "not-supported", "signal.order"),
+    ("signal: {type: slewed}", "unsuitable-key", "signal.type"),
+    ("limits: {rate: 1}\nsignal: {type: slewed, ramp: 9}", "unsuitable-key", "signal.ramp"),
+]
+BAD_WORDS = [
+    ("signal: {lines: even}", "unknown-word"),
+    ("signal: {lines: [3, 2]}", "not-increasing"),
+    ("signal: {lines: 0}", "out-of-range"),
+    ("signal: {type: prbs, bits: 1}", "out-of-range"),
+    ("signal: {quantisation: {bits: 8}}", "missing-key"),
+    ("signal: {also: [ogg]}", "unknown-word"),
+    ("signal: {scale: full}", "unknown-word"),
+    ("limits: {amplitude: {}}", "missing-key"),
+    ("limits: {amplitude: {output: [1, 2]}}", "wrong-shape"),
+    ("limits: {amplitude: -1}", "out-of-range"),
+]
+
+
+@pytest.mark.parametrize(("text", "code", "key"), BAD, ids=[text for text, _, _ in BAD])
+def test_bad_settings_name_the_key_and_the_line(text, code, key):
+    with pytest.raises(SpecError) as error:
+        validate(parse_spec(BASE + text + "\n"))
+    (diagnostic,) = error.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == (code, key)
+    assert diagnostic.hint
+    assert diagnostic.location is not None
+
+
+@pytest.mark.parametrize(("text", "code"), BAD_WORDS, ids=[text for text, _ in BAD_WORDS])
+def test_bad_words(text, code):
+    with pytest.raises(SpecError) as error:
+        parse_spec(BASE + text + "\n")
+    assert code in [diagnostic.code for diagnostic in error.value.diagnostics]
+
+
+def test_the_example():
+    spec = load_spec("specs/limited_signal.yaml")
+    validate(spec)
+    assert spec.limits.amplitude is not None
+    assert spec.limits.amplitude.input == 0.75
+
+
+@pytest.mark.parametrize("offset", [0.3, 0.37, -0.1])
+def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(offset):
+    """Steps of 0.25: the record swings about the nearest value, within the limit from the offset."""
+    found = solve(
+        parse_spec(
+            BASE.replace("500", "900") + "limits: {amplitude: 0.75}\n"
+            f"signal: {{type: binary, candidates: 2, offset: {offset},"
+            " quantisation: {bits: 4, range: 2}}\n"
+        )
+    )
+    u = np.array(found.tables["signal"].columns["u1"])
+    np.testing.assert_allclose(u / 0.25, np.rint(u / 0.25), atol=1e-9)
+    assert np.abs(u - offset).max() <= 0.75 + 1e-12
+
+
+def test_the_share_of_each_limit_that_single_samples_take():
+    """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
+    limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"
+    outcome = solve(parse_spec(BASE + "objective: shortest_experiment\n" + limits))
+    u, shares = outcome.tables["signal"].columns["u1"], outcome.result["signal"]["of_limits"]
+    moves = np.abs(np.diff(np.concatenate([[0.0], u])))
+    assert shares == pytest.approx({"amplitude.input": np.abs(u).max() / 1.6, "rate": moves.max() / 1.6})
+    assert shares["rate"] == pytest.approx(2.0 * shares["amplitude.input"])
+    assert 0.98 < shares["rate"] <= 1.0 + 1e-9
+    (note,) = [note for note in outcome.result["notes"] if "shortest record" in note]
+    rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
+    assert note.endswith(f"the record takes {rate} of limits.rate")
+    (said,) = [value for name, value, _ in facts(outcome.result, "s") if name == "limits"]
+    assert said.endswith(f"single samples take {rate} of rate, {values} of input amplitude")
+    assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))

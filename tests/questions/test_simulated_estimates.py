@@ -1,0 +1,95 @@
+"""Estimates of simulated experiments, by which an exact confidence is calibrated."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.accuracy.calibration import Calibration, Coverage
+from inputdesign_cli.questions import simulated_estimates
+from inputdesign_cli.questions.common.confidence import missed
+from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates
+
+SPEC = """
+plant: {{B: [0, 3.6], F: [1, -0.7]}}
+noise: {{variance: 1.0}}
+experiment: {{samples: {samples}}}
+accuracy: {{model_error: {{relative: 0.2, confidence: {{exact: 0.95, runs: 100}}}}}}
+spectrum: {{type: fir, order: 2}}
+signal: {{candidates: 1}}
+"""
+
+
+@pytest.mark.parametrize(("samples", "each"), [(12, 1), (200, 20)])
+def test_short_records_differ_so_much_that_each_has_one_run(monkeypatch, samples, each):
+    """Twenty runs of each of five records of 8 samples told of these five: it cost 1.7 times too much."""
+    seen, genuine = set(), simulated_estimates.Reapplied
+
+    def noted(excitation, times):
+        seen.add(times)
+        return genuine(excitation, times)
+
+    monkeypatch.setattr(simulated_estimates, "Reapplied", noted)
+    solve(parse_spec(SPEC.format(samples=samples)))
+    assert seen == {each}
+
+
+def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
+    seen = []
+
+    def noted(self, stream):
+        seen.append(stream)
+        return np.zeros((1, 1))
+
+    monkeypatch.setattr(SimulatedEstimates, "_estimates", noted)
+    monkeypatch.setattr(simulated_estimates, "largest_error", lambda errors, estimates: np.zeros(1))
+    told = SimulatedEstimates(None, None, 100, 1.0, sets=4)
+    told.corrected(SimpleNamespace(corrected=lambda *_: Calibration(0.9, 100)), [], np.eye(1))
+    correcting = set(seen)
+    assert len(seen) == len(correcting) == 4
+    told.checked(Coverage(100, 90, 90), [], 1.0)
+    assert seen[4] not in correcting
+    assert len(seen) == 5
+
+
+@pytest.mark.parametrize(("kept", "told"), [(0.93, True), (0.948, False), (0.97, False)])
+def test_less_than_what_is_asked_is_told(kept, told):
+    runs = 4000
+    limits = scipy.stats.binomtest(round(kept * runs), runs).proportion_ci(0.95)
+    entry = {"runs": runs, "kept": kept, "kept_limits": [limits.low, limits.high]}
+    result = {"model_error": {"confidence": {"asked": 0.95, **entry}}, "signal": {"confidence": entry}}
+    notes = missed(result)
+    assert len(notes) == 2 * told
+    assert all("fewer than the 95 %" in note for note in notes)
+
+
+@pytest.mark.slow
+def test_a_design_of_a_short_experiment_keeps_what_is_asked():
+    """The first 4000 runs told that nothing was to be corrected, by chance: it kept 93 %."""
+    found = solve(
+        parse_spec(
+            SPEC.format(samples=150),
+            overrides=[
+                "accuracy={model_error: {relative: 0.05, confidence: {exact: 0.95}}}",
+                "spectrum.order=10",
+            ],
+        )
+    ).result
+    c, rng, kept = np.array(found["spectrum"]["coefficients"]), np.random.default_rng(5), 0
+    root = np.linalg.cholesky(scipy.linalg.toeplitz(np.r_[c, np.zeros(150 - len(c))]) + 1e-12 * np.eye(150))
+    delay = np.exp(-1j * np.linspace(0.0, np.pi, 200))
+    true = 3.6 * delay / (1.0 - 0.7 * delay)
+    for _ in range(4000):
+        u = root @ rng.standard_normal(150)
+        u *= np.sqrt(c[0] / np.mean(u**2))  # records of a design have its power
+        b, f = 3.6, -0.7
+        y = scipy.signal.lfilter([0.0, b], [1.0, f], u) + rng.standard_normal(150)
+        for _ in range(6):  # Gauss and Newton for the simulation error
+            per_gain = scipy.signal.lfilter([0.0, 1.0], [1.0, f], u)
+            per_pole = scipy.signal.lfilter([0.0, -b], [1.0, f], per_gain)
+            step = np.linalg.lstsq(np.stack([per_gain, per_pole], axis=1), y - b * per_gain, rcond=None)[0]
+            b, f = np.array([b, f]) + step
+        kept += np.all(abs(b * delay / (1.0 + f * delay) - true) <= 0.05 * abs(true))
+    assert kept / 4000 == pytest.approx(0.95, abs=0.015)

@@ -1,0 +1,182 @@
+"""From a spec to a result: what it holds, and what a user is told when it cannot be done."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.outcome.golden import compare
+from inputdesign_cli.outcome.golden_file import load_golden
+from inputdesign_cli.sweeps.verbs import execute
+
+ROOT = Path(__file__).parent.parent.parent
+SMALL = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
+spectrum: {type: fir, order: 3}
+signal: {seed: 1}
+"""
+
+
+def spec_of(text, **changes):
+    return parse_spec(text, overrides=[f"{key.replace('__', '.')}={value}" for key, value in changes.items()])
+
+
+# The others take longer; `make golden` runs them all.
+QUICK = ("first_order", "flexible_transmission", "given_excitations", "peer_examples")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_golden_files(name):
+    """Each quantity beside the paper's figure and the independent solution."""
+    golden = load_golden(ROOT / "golden" / f"{name}.yaml")
+    rows = compare(golden, {run.name: execute(golden, run) for run in golden.runs})
+    assert rows
+    assert [row for row in rows if not row.passed] == []
+
+
+def test_result_is_consistent():
+    outcome = solve(spec_of(SMALL))
+    result = outcome.result
+    c = np.asarray(result["spectrum"]["coefficients"])
+    assert result["status"] == "optimal"
+    assert result["objective"]["value"] == pytest.approx(c[0])  # input power alone costs
+    assert result["objective"]["relative_gap"] <= 1e-7
+    bounds = [result["objective"][key] for key in ("any_spectrum_bound", "lower_bound", "value")]
+    assert bounds == sorted(bounds)
+    M, P = np.asarray(result["information"]["matrix"]), np.asarray(result["information"]["covariance"])
+    np.testing.assert_allclose(M @ P, np.eye(3), atol=1e-8)
+    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-7)
+    signal = outcome.tables["signal"].columns
+    assert list(signal) == ["time_s", "u1"]
+    power = np.mean(signal["u1"] ** 2)
+    assert power == pytest.approx(c[0] * (1 + result["signal"]["extra_power"]))
+    assert result["signal"]["worst_ratio"] == pytest.approx(1.0, abs=1e-8)  # at the least power for that
+    bound = outcome.tables["bound"].columns
+    assert np.all(bound["r_u"] <= bound["r_adm"] * (1 + 1e-7))
+    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
+
+
+def test_sample_time_scales_frequencies_and_nothing_else():
+    """The same discrete plant sampled ten times as fast: frequencies times ten, costs unchanged."""
+    slow, fast = solve(spec_of(SMALL)), solve(spec_of(SMALL, sample_time=0.1))
+    assert fast.result["cost"] == pytest.approx(slow.result["cost"], rel=1e-9)
+    ratio = (
+        fast.tables["bound"].columns["frequency_rad_per_s"]
+        / slow.tables["bound"].columns["frequency_rad_per_s"]
+    )
+    np.testing.assert_allclose(ratio, 10.0)
+    assert fast.tables["signal"].columns["time_s"][1] == pytest.approx(0.1)
+
+
+def test_confidence_sets_alpha():
+    """Two parameters in G: the 95 % quantile of chi-squared with two degrees of freedom is 5.991."""
+    spec = parse_spec(SMALL.replace("alpha: 2.45", "confidence: 0.95"))
+    assert solve(spec).result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)), rel=1e-12)
+
+
+def test_equal_seeds_give_equal_signals():
+    one, two, other = (
+        solve(spec_of(SMALL, signal__seed=seed)).tables["signal"].columns["u1"] for seed in (4, 4, 5)
+    )
+    np.testing.assert_array_equal(one, two)
+    assert not np.array_equal(one, other)
+
+
+def test_grid_method_reports_itself_honestly():
+    outcome = solve(spec_of(SMALL, solver="{method: lmi, grid: 60}"))
+    assert outcome.result["status"] == "optimal_on_grid"
+    assert outcome.result["cost"] == pytest.approx(solve(spec_of(SMALL)).result["cost"], rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["fir, order: 3", "free"])
+def test_the_bound_over_every_spectrum_can_be_left_out(kind):
+    whole, fast = (
+        solve(spec_of(SMALL, spectrum=f"{{type: {kind}}}", solver__any_spectrum=asked)).result
+        for asked in ("true", "false")
+    )
+    assert fast["objective"]["value"] == whole["objective"]["value"]
+    free = kind == "free"  # itself every spectrum
+    assert ("any_spectrum_bound" in fast["objective"]) is free
+    assert any("--fast" in note for note in fast.get("notes", [])) is not free
+
+
+def test_prior_that_suffices():
+    prior = "{information: [[1.0e+9, 0, 0], [0, 1.0e+9, 0], [0, 0, 1.0e+9]]}"
+    outcome = solve(spec_of(SMALL, experiment__prior=prior))
+    assert outcome.result["cost"] == 0.0
+    assert "signal" not in outcome.tables
+
+
+CLOSED = SMALL.replace("{samples: 500}", "{samples: 500, controller: {numerator: [CNUM], denominator: [1]}}")
+BAD = [
+    (CLOSED.replace("CNUM", "-2"), "unstable-loop", "experiment.controller"),
+    (SMALL.replace("B: [0, 3.6]", "B: [0, 1, 1]"), "admissible-not-positive", "accuracy.model_error"),
+    (
+        SMALL.replace("B: [0, 3.6], F: [1, -0.7]", "B: [0, 1, -0.7], F: [1, -0.7]"),
+        "not-identifiable",
+        "plant",
+    ),
+    (SMALL + "limits: {energy: 1}\n", "not-supported", "limits.energy"),
+    (SMALL.replace("{seed: 1}", "{order: 4}"), "not-supported", "signal.order"),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "key"), BAD, ids=[f"{code}-{i}" for i, (_, code, _) in enumerate(BAD)]
+)
+def test_bad_specs_name_the_key_and_the_line(text, code, key):
+    with pytest.raises(SpecError) as error:
+        validate(parse_spec(text, file="plant.yaml"))
+    diagnostic = error.value.diagnostics[0]
+    assert (diagnostic.code, diagnostic.key) == (code, key)
+    assert diagnostic.location is not None
+    assert diagnostic.hint
+
+
+TABLES = [
+    ("frequency_rad_per_s,r_adm\n0.1,1\n1,1\n", "bad-table", "covers 0.1 to 1"),
+    ("frequency,r_adm\n0,1\n3.2,-1\n", "bad-table", "row 3"),
+    ("frequency,r_adm\n3.2,1\n0,1\n", "bad-table", "increase"),
+    ("frequency,bound\n0,1\n3.2,1\n", "data-missing-column", "r_adm"),
+    ("frequency,r_adm\n0,1\n3.2,x\n", "data-not-a-number", "'x'"),
+    ("frequency,r_adm\n", "data-unreadable", "no rows"),
+]
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "words"), TABLES, ids=[code + str(i) for i, (_, code, _) in enumerate(TABLES)]
+)
+def test_bad_tables(tmp_path, content, code, words):
+    table = tmp_path / "r.csv"
+    table.write_text(content, encoding="utf-8")
+    spec = parse_spec(SMALL.replace("relative: 0.01", f"table: {table}"))
+    with pytest.raises(DataError) as error:
+        validate(spec)
+    assert error.value.diagnostics[0].code == code
+    assert words in error.value.diagnostics[0].message
+
+
+def test_missing_table(tmp_path):
+    with pytest.raises(DataError) as error:
+        validate(parse_spec(SMALL.replace("relative: 0.01", f"table: {tmp_path / 'none.csv'}")))
+    assert "does not exist" in error.value.diagnostics[0].message
+
+
+def test_table_equal_to_a_relative_bound_gives_its_design(tmp_path):
+    """r_adm = 0.01 |G| tabulated finely enough is the relative bound."""
+    w = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 4000)])
+    r = 0.01 * np.abs(3.6 / (1 - 0.7 * np.exp(-1j * w)))
+    lines = "\n".join(f"{a:.17g},{b:.17g}" for a, b in zip(w, r, strict=True))
+    (tmp_path / "r.csv").write_text("frequency_rad_per_s,r_adm\n" + lines + "\n", encoding="utf-8")
+    tabulated = solve(parse_spec(SMALL.replace("relative: 0.01", f"table: {tmp_path / 'r.csv'}")))
+    assert tabulated.result["cost"] == pytest.approx(solve(parse_spec(SMALL)).result["cost"], rel=1e-5)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "specs").glob("*.yaml")), ids=lambda p: p.stem)
+def test_shipped_specs_validate(path):
+    validate(load_spec(path))

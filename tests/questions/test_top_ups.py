@@ -1,0 +1,210 @@
+"""What follows an estimate: another experiment, or none, about the operating point of the record."""
+
+import html
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
+from inputdesign_cli.cli import app
+from inputdesign_cli.questions.assessment.levels import level_notes
+from tests.support.heater import HEATER, STRUCTURE, said
+
+
+def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
+    path = heater_record("a.csv", 300, 1, power=0.02)
+    limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
+    found = assess(parse_spec(HEATER, overrides=limits), path)
+    result = found.results.result
+    left, times = result["assessment"]["left"], result["assessment"]["experiments"]
+    assert left > 1.5
+    assert f"still {left:.4g} times" in said(found.results)
+    growth = result["signal"]["begun_anywhere"]
+    promised = f"right and the record begins at rest, its levels known (--operating-point; else {growth:.3g}"
+    assert f"if the structure of the model is {promised} times as much): apply it" in said(found.results)
+    # So many of them, one after the other, are enough, and one fewer is not.
+    one = np.asarray(result["information"]["matrix"])
+    data = np.asarray(identify(parse_spec(HEATER), path).result["information"]["matrix"])
+    theta = list(result["identification"]["theta"].values())
+    w = np.linspace(1e-6, 0.02 * 5, 400)
+    z = np.exp(-1j * w)[:, None]
+    B, F = theta[0] * z**6 + theta[1] * z**7, 1 + theta[4] * z
+    gradient = np.concatenate([z**6 / F, z**7 / F, 0 * z, 0 * z, -B * z / F**2], axis=1)
+    T = np.stack([gradient.real, gradient.imag], axis=1)
+
+    def ratio(n):
+        P = np.linalg.inv(data + n * (one - data))
+        r_u = result["model_error"]["alpha"] * np.sqrt(np.linalg.eigvalsh(T @ P @ T.swapaxes(1, 2))[:, -1])
+        return np.max(r_u / (0.05 * np.abs(B / F)[:, 0]))
+
+    assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "verdict", "why"),
+    [
+        (["limits.input_power=0.0001"], "missed", "cannot be met within the limits"),
+        (["experiment.controller={numerator: [9], denominator: [1]}"], "undecided", "unstable"),
+    ],
+)
+def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, heater_record):
+    path = heater_record("a.csv", 300, 1, power=0.02)
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.05", *overrides])
+    found = assess(spec, path)
+    assert found.verdict == verdict
+    assert why in json.dumps(found.results.result["assessment"])
+    plain = identify(parse_spec(STRUCTURE, design=False), path)
+    assert found.results.result["identification"]["theta"] == pytest.approx(
+        plain.result["identification"]["theta"]
+    )
+    assert {"fit", "residuals"} <= set(found.results.tables)
+    assert "model.yaml" in found.results.files
+    assert ("no experiment is designed" in said(found.results)) == (verdict == "missed")
+
+
+def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path):
+    spec, path = tmp_path / "structure.yaml", heater_record("a.csv", 300, 1)
+    spec.write_text(STRUCTURE)
+    out = tmp_path / "run"
+    run = CliRunner().invoke(
+        app, ["identify", str(path), "--spec", str(spec), "-o", str(out), "--no-figures"]
+    )
+    assert run.exit_code == 0, run.output
+    run = CliRunner().invoke(app, ["report", str(out)])
+    assert run.exit_code == 0, run.output
+    assert identify(load_spec(spec, design=False), path).result["status"] == "identified"
+    with pytest.raises(Exception, match="nothing is asked"):
+        solve(load_spec(spec))
+
+
+def test_the_operating_point_of_the_command_line(heater_record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
+    spec.write_text(STRUCTURE)
+    call = ["identify", str(path), "--spec", str(spec), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
+    known = CliRunner().invoke(app, [*call, "--operating-point", "u1=40,y=52.3"])
+    assert not json.loads(known.stdout)["identification"]["free_start"]
+    unknown = CliRunner().invoke(app, call)
+    assert json.loads(unknown.stdout)["identification"]["free_start"]
+    assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
+
+
+def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(
+    heater_record, tmp_path
+):
+    spec, path = tmp_path / "spec.yaml", heater_record("first run.csv", 300, 2, level=(40.0, 52.3))
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    spec.write_text(STRUCTURE + asked)
+    out = tmp_path / "run"
+    call = [
+        "assess",
+        str(spec),
+        str(path),
+        "-o",
+        str(out),
+        "--no-figures",
+        "--operating-point",
+        "u1=40,y1=52.3",
+    ]
+    run = CliRunner().invoke(app, call)
+    assert run.exit_code == 1, run.output
+    result = json.loads((out / "result.json").read_text())
+    assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
+    assert result["signal"]["operating_point"] == [40.0]
+    assert any("varies about the operating point, u1 = 40" in note for note in result["notes"])
+    u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
+    assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
+    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
+    page = html.unescape((out / "report.html").read_text())
+    assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page
+
+
+def test_the_level_of_the_data_is_told_where_the_spec_does_not_know_it(heater_record):
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    path, spec = heater_record("a.csv", 300, 2, level=(40.0, 52.3)), parse_spec(STRUCTURE + asked)
+    recorded = np.loadtxt(path, delimiter=",", skiprows=1, usecols=range(2))
+    header = path.read_text().splitlines()[0].split(",")
+    mean = f"{recorded[:, [name.startswith('u') for name in header[:2]].index(True)].mean():.4g}"
+    for options in ({}, {"remove_means": True}):
+        found = assess(spec, path, **options).results
+        assert abs(np.mean(found.tables["signal"].columns["u1"])) < 1.0
+        assert f"the data lie about u1 = {mean} (their mean)" in said(found)
+        assert f"write signal.offset: {mean} and assess again" in said(found)
+    told = assess(parse_spec(STRUCTURE + asked, overrides=[f"signal.offset={mean}"]), path).results
+    assert told.result["signal"]["operating_point"] == [float(mean)]
+    assert "the data lie about" not in said(told)
+    assert "the data lie about" not in said(assess(spec, heater_record("b.csv", 300, 2)).results)
+
+
+@pytest.mark.parametrize(
+    ("levels", "point", "means", "expected"),
+    [
+        ({}, None, [7.0, 0.1], "about u1 = 7 .* write signal.offset: \\[7, 0\\]"),
+        ({"u1": 7.0}, [7.0, 0.0], [7.0, -30.0], "u1 = 7, u2 = 0.*about u2 = -30 .*: \\[7, -30\\]"),
+        ({}, [7.0, 1.0], [7.0, -30.0], "^$"),
+        ({}, None, [0.3, -0.3], "^$"),
+        ({}, None, None, "^$"),
+    ],
+)
+def test_each_input_has_its_level(levels, point, means, expected):
+    found = level_notes(levels, point, None if means is None else np.array(means), np.ones(2))
+    assert re.search(expected, "; ".join(found))
+
+
+def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):
+    """With the second record alone it judges what the first spec judges with both."""
+    monkeypatch.chdir(tmp_path)
+    asked = "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0004}}\n"
+    Path("spec.yaml").write_text(STRUCTURE + asked + "signal: {candidates: 1}\n")
+    first, second = (heater_record(name, 300, seed) for name, seed in (("1.csv", 2), ("2.csv", 3)))
+
+    def ran(*arguments):
+        options = [*map(str, arguments), "--no-figures", "--json"]
+        return json.loads(CliRunner().invoke(app, ["assess", *options]).stdout)
+
+    ran("spec.yaml", first, "-o", "a")
+    joint, known = ran("spec.yaml", first, second, "-o", "b"), ran("a/spec.yaml", second, "-o", "c")
+    alone = ran("spec.yaml", second, "-o", "d")
+    ratio, by_prior, single = (
+        run["assessment"]["requirements"][0]["worst_ratio"] for run in (joint, known, alone)
+    )
+    assert by_prior == pytest.approx(ratio, rel=0.05)
+    assert ratio < 0.9 * single
+    assert any("experiment.prior counts" in note for note in known["notes"])
+    copied = tmp_path / "copied.csv"
+    copied.write_bytes(first.read_bytes())
+    for given in (first, copied):
+        (error,) = ran("a/spec.yaml", given, second, "-o", "e")["errors"]
+        assert error["code"] == "data-repeated"
+
+
+def test_an_estimate_outside_of_the_intervals_is_topped_up(tmp_path):
+    """What was thought before is no reason to stop: the intervals then reach the estimate."""
+    text = """
+plant: {B: [0, 1]}
+noise: {variance: 4}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: white}
+uncertainty: {intervals: {b1: [0.8, 1.2]}, scenarios: 3, fresh: 0}
+signal: {candidates: 1, seed: 1}
+"""
+    rng = np.random.default_rng(3)
+    u, e = rng.standard_normal((2, 400))
+    rows = np.c_[np.arange(400), u, 0.6 * np.r_[0, u[:-1]] + 2 * e]
+    path = tmp_path / "log.csv"
+    np.savetxt(path, rows, delimiter=",", header="time,u,y", comments="")
+    found = assess(parse_spec(text), path)
+    result = found.results.result
+    assert found.verdict == "missed"
+    assert result["identification"]["theta"]["b1"] < 0.8
+    assert "no_top_up" not in result["assessment"]
+    assert result["robust"]["scenarios"] == 3
+    assert found.results.signal.size

@@ -1,0 +1,117 @@
+"""Records that live on their start from rest say so: errors with unknown starts, by plain regression."""
+
+import re
+
+import numpy as np
+import pytest
+import scipy
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.identification import information_begun_anywhere
+from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.report.evidence import verdict
+
+N = 500
+DOUBLE = """
+sample_time: 0.1
+plant: {parameters: {J: 2}, continuous: {numerator: ["1/J"], denominator: [1, 0, 0]}, sample: zoh}
+noise: {variance: 0.0001}
+experiment: {samples: 500}
+accuracy: {standard_deviation: {J: 0.01}}
+spectrum: {type: multisine, lines: 50}
+"""
+SINGLE = """
+plant: {B: [0, 0.1], F: [1, -1], known: [f1]}
+noise: {variance: 0.04}
+experiment: {samples: 500}
+accuracy: {standard_deviation: {b1: 0.001}}
+spectrum: {type: multisine, lines: 50}
+"""
+SETTLED = SINGLE.replace("F: [1, -1]", "F: [1, -0.8]")
+
+
+def told(text):
+    done = solve(parse_spec(text))
+    notes = [note for note in done.result.get("notes", []) if "start from rest" in note]
+    return done, notes
+
+
+def left(psi, starts):
+    """The size of a gradient (N,) beside what unknown starts (N, m) explain."""
+    return np.linalg.norm(psi - starts @ np.linalg.lstsq(starts, psi, rcond=None)[0])
+
+
+def growth(notes):
+    (note,) = notes
+    return float(re.search(r"([\d.e+]+) times as large", note).group(1))
+
+
+def test_a_position_and_a_velocity_that_nobody_knows():
+    """y = u / (J s^2) behind a hold, by recursion; the start adds a line, a level of u a parabola."""
+    done, notes = told(DOUBLE)
+    u, h, J = done.tables["signal"].columns["u1"], 0.1, 2.0
+    y = scipy.signal.lfilter(h**2 / 2 * np.array([0.0, 1.0, 1.0]), [1.0, -2.0, 1.0], u) / J
+    psi = -y / J
+    assert 0.01 / np.linalg.norm(psi) == pytest.approx(0.01, rel=1e-6)
+    line = np.column_stack([np.ones(N), np.arange(N) / N])
+    curve = np.column_stack([line, line[:, 1] ** 2])
+    assert np.linalg.norm(psi) / left(psi, line) > 20.0
+    assert growth(notes) == pytest.approx(np.linalg.norm(psi) / left(psi, curve), rel=5e-3)
+
+
+def test_a_level_that_an_integrator_keeps():
+    done, notes = told(SINGLE)
+    psi = scipy.signal.lfilter([0.0, 1.0], [1.0, -1.0], done.tables["signal"].columns["u1"])
+    line = np.column_stack([np.ones(N), np.arange(N) / N])
+    expected = pytest.approx(np.linalg.norm(psi) / left(psi, line), rel=5e-3)
+    assert growth(notes) == expected
+    assert done.result["signal"]["begun_anywhere"] == expected
+
+
+def test_a_plant_that_forgets_its_start_has_no_note():
+    done, notes = told(SETTLED)
+    assert notes == []
+    assert "begun_anywhere" not in done.result["signal"]
+
+
+@pytest.mark.parametrize(
+    ("signal", "words"),
+    [
+        ({}, "if the structure of the model is right; assess"),
+        (
+            {"begun_anywhere": 4.44},
+            "right and the record begins at rest, its levels known (--operating-point; ",
+        ),
+        ({"begun_anywhere": 4.44}, "else 4.44 times as much); assess"),
+        ({"begun_anywhere": None}, "else nothing is promised); assess"),
+    ],
+)
+def test_a_top_up_says_what_its_promise_rests_on(signal, words):
+    entry = {"name": "model_error", "worst_ratio": 3.0, "frequency": None}
+    assessment = {"requirements": [entry], "met": False, "left": 0.99}
+    assert words in " ".join(verdict({"assessment": assessment, "signal": signal}))
+
+
+@pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])
+@pytest.mark.parametrize("F", [[1.0, -0.8], [1.0, -1.0], [1.0, -1.5, 0.7]], ids=["lag", "tank", "spring"])
+def test_what_is_told_from_anywhere(F, D):
+    """Gradients by differences, weighed by the covariance of the noise; starts are all states of 1/F."""
+    text = f"plant: {{B: [0, 0.5], F: {F}}}\nnoise: {{D: {D}, variance: 0.3, known: [d1]}}\n"
+    model = build_model(parse_spec(text.replace(", known: [d1]", "") if len(D) == 1 else text, design=False))
+    u = np.random.default_rng(4).standard_normal(80)
+
+    def output(theta):
+        return scipy.signal.lfilter([0, theta[0]], [1.0, *theta[1:]], u)
+
+    theta, step = np.array([0.5, *F[1:]]), 1e-6
+    psi = np.array([(output(theta + d) - output(theta - d)) / (2 * step) for d in step * np.eye(theta.size)])
+    pole = -D[-1] if len(D) > 1 else 0.0
+    V = 0.3 / (1.0 - pole**2) * scipy.linalg.toeplitz(pole ** np.arange(80))
+    white = np.linalg.inv(np.linalg.cholesky(V))
+    # A level, the states of 1/F; where that integrates, a level of u.
+    X = [np.ones(80), *(scipy.signal.lfilter([1.0], F, row) for row in np.eye(len(F) - 1, 80))]
+    X = np.array([*X, *([scipy.signal.lfilter([1.0], F, np.ones(80))] if sum(F) == 0.0 else [])]).T
+    rest = white @ (psi.T - X @ np.linalg.lstsq(white @ X, white @ psi.T, rcond=None)[0])
+    y = scipy.signal.lfilter([0, 0.5], F, u)
+    found = information_begun_anywhere(model, u[:, None], y[:, None], 1.0)
+    assert found[: theta.size, : theta.size] == pytest.approx(rest.T @ rest, rel=1e-5)

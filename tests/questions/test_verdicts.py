@@ -1,0 +1,204 @@
+"""Met, missed or undecided: what `assess` says of records, right models and wrong ones."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+from typer.testing import CliRunner
+
+from inputdesign_cli import assess, parse_spec
+from inputdesign_cli.cli import app
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.assessment.nominal import from_nominal
+from inputdesign_cli.questions.building.system import build_model
+from tests.support.heater import HEATER, LAG, SLOW, covariance_of, heater, said
+
+UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+
+
+def test_a_right_model_is_met(heater_record):
+    found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1))
+    assert (found.verdict, found.results.result["status"]) == ("met", "met")
+    assert found.results.result["identification"]["failed"] == []
+
+
+@pytest.mark.parametrize("drift", [0.0, 1.0])
+def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
+    found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True, drift=drift))
+    result = found.results.result
+    assert (found.verdict, result["status"]) == ("undecided", "undecided")
+    assert "recent_inputs" in result["identification"]["failed"]
+    # b6, b7 stand for the delay; what the lag adds comes after them.
+    assert result["identification"]["tests"]["recent_inputs"]["lag"] in (7, 8, 9)
+    assert "raise the orders of B and F" in " ".join(result["notes"])
+    assert "signal" not in found.results.tables
+    assert result["assessment"]["verdict"] == "undecided"
+    assert result["assessment"]["causes"] == ["contradicted"]
+    assert "undecided, neither met nor missed: the data contradict the model; the notes" in said(
+        found.results
+    )
+
+
+def test_records_of_two_plants_are_named(heater_record, tmp_path):
+    spec = parse_spec(HEATER)
+    first, second = heater_record("a.csv", 400, 1), heater_record("b.csv", 400, 2)
+    assert assess(spec, [first, second]).verdict == "met"
+    rows = np.genfromtxt(second, delimiter=",", names=True)
+    other = tmp_path / "other.csv"
+    table = np.column_stack([rows["time_s"], rows["u"], -rows["y"]])
+    np.savetxt(other, table, delimiter=",", header="time_s,u,y", comments="")
+    found = assess(spec, [first, other])
+    assert found.verdict == "undecided"
+    (said,) = [r for r in found.results.result["assessment"]["undecided"] if "one system" in r]
+    assert {"a.csv", "other.csv"} < set(said.split())
+    assert said in found.results.result["notes"]
+
+
+@pytest.mark.parametrize("rows", [720, 500])
+def test_a_record_counts_once(rows, heater_record, tmp_path):
+    """A file given twice, and a file that holds the beginning of another."""
+    first, again = heater_record("a.csv", 720, 1), tmp_path / "again.csv"
+    again.write_text("".join(first.read_text().splitlines(keepends=True)[: rows + 1]))
+    with pytest.raises(DataError, match="hold the same samples") as raised:
+        assess(parse_spec(HEATER), [first, again])
+    assert raised.value.diagnostics[0].code == "data-repeated"
+
+
+def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(heater_record):
+    path = heater_record("a.csv", 720, 1)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([f"{lines[0]},u2", *(f"{line},0.5" for line in lines[1:])]))
+    notes = assess(parse_spec(HEATER), path).results.result["notes"]
+    assert any("u2 is not used" in note for note in notes)
+
+
+def test_a_drift_is_told_from_noise(heater_record):
+    spec = parse_spec(HEATER, overrides=["noise={C: [1], D: [1, -0.5], variance: 0.001}"])
+    found = assess(spec, heater_record("a.csv", 720, 1, drift=2.0)).results.result
+    assert "trend" in found["identification"]["failed"]
+    first = found["assessment"]["undecided"][0]
+    assert "let the noise drift (noise: {drift: true}), remove the trend" in first
+
+
+def test_undecided_has_its_own_exit_code(heater_record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 720, 1, lag=True)
+    spec.write_text(HEATER)
+    run = CliRunner().invoke(
+        app, ["assess", str(spec), str(path), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
+    )
+    assert run.exit_code == 5
+    result = json.loads(run.stdout)
+    assert result["status"] == "undecided"
+    assert {"fit.csv", "residuals.csv", "bound.csv", "model.yaml"} < set(result["files"])
+
+
+def test_records_are_judged_together_by_the_number_that_is_printed(heater_record):
+    """Information of two records adds up, and the top-up counts the first as the joint verdict does."""
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"])
+    first = heater_record("a.csv", 300, 1, power=0.02, level=(40.0, 52.3), warm=1.0)
+    second = heater_record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
+    alone, both = assess(spec, first), assess(spec, [first, second])
+    assert (alone.verdict, both.verdict) == ("missed", "met")
+    result = both.results.result
+    assert result["identification"]["records"] == [300, 700]
+    assert result["samples"] == 1000
+    (listed,) = result["assessment"]["requirements"]
+    assert listed["worst_ratio"] == pytest.approx(result["model_error"]["worst_ratio"])
+    apart = np.linalg.inv(assess(spec, second).results.result["information"]["covariance"])
+    ratio = np.diag(result["information"]["matrix"]) / np.diag(apart)
+    assert np.all(ratio > 0.9)
+    assert np.array_equal(np.unique(both.results.tables["fit"].columns["record"]), [1, 2])
+
+
+def test_beside_an_undecided_model_stands_what_the_data_say_without_one(heater_record):
+    found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True))
+    table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
+    G = table["G_re"] + 1j * table["G_im"]
+    q = np.exp(-5j * table["frequency_rad_per_s"])
+    gain = 2.35 * (1 - SLOW) * (1 - LAG)
+    truth = gain * (0.4 * q**6 + 0.6 * q**7) / ((1 - SLOW * q) * (1 - LAG * q))
+    assert np.mean(np.abs(G - truth) < table["radius"]) > 0.85
+    assert told["frequency_response"]["model_outside"] > 0.2
+    assert "frequency_response" in found.results.curves
+    assert (
+        "frequency_response" not in assess(parse_spec(HEATER), heater_record("b.csv", 720, 1)).results.tables
+    )
+
+
+def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp_path):
+    loop = [
+        "experiment.controller={numerator: [0.01], denominator: [1]}",
+        "accuracy.model_error.relative=1.0",
+        "plant={B: [0, 0, 0.03, 0.02], F: [1, -0.97]}",
+    ]
+    columns = heater(720, 1)
+    for name, by in (("r", "r"), ("note", "u")):
+        named = columns | {name: columns["u"] + 0.01 * columns["y"]}
+        path = tmp_path / f"{name}.csv"
+        rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*named.values(), strict=True))
+        path.write_text(",".join(named) + "\n" + rows + "\n")
+        result = assess(parse_spec(HEATER, overrides=loop), path).results.result
+        assert result["assessment"]["frequency_response"]["excitation"] == by
+        assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")
+
+
+@pytest.mark.parametrize(
+    ("factor", "contradicts"), [(1.0, False), (1.1, False), (1.6, False), (-1.0, True), (3.0, True)]
+)
+def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, heater_record):
+    path = heater_record("a.csv", 720, 1)
+    B = [0, 0, 0, 0, 0, 0, *(factor * 2.35 * (1 - SLOW) * share for share in (0.4, 0.6))]
+    found = assess(parse_spec(HEATER, overrides=[f"plant={{B: {B}, F: [1, {-SLOW}]}}"]), path)
+    result = found.results.result
+    nominal, notes = result["assessment"]["nominal"], " ".join(result.get("notes", []))
+    assert found.verdict == "met"
+    assert ("contradicts the plant of the spec" in notes) == contradicts
+    assert nominal["opposite_sign"] == (factor < 0)
+    assert nominal["degrees_of_freedom"] == 3
+    names = ["b6", "b7", "f1"]
+    P = covariance_of(result, names)
+    away = np.array([*B[6:], -SLOW]) - [result["identification"]["theta"][name] for name in names]
+    assert nominal["statistic"] == pytest.approx(away @ np.linalg.solve(P, away), rel=1e-6)
+    far = nominal["statistic"] > chi2.isf(2 * norm.sf(5.0), 3)
+    assert (f"lies {np.sqrt(nominal['statistic']):.3g} standard dev" in notes) == (far and not contradicts)
+    if contradicts:
+        share = abs(factor - 1.0) / max(abs(factor), 1.0)
+        assert nominal["worst_difference"] == pytest.approx(share, rel=0.15)
+        assert "b7 is" in notes or "b6 is" in notes
+
+
+@pytest.mark.parametrize(
+    ("deviations", "contradicts"), [(0.5, False), (3.0, False), (4.5, True), (9.0, True)]
+)
+def test_a_far_estimate_contradicts_the_spec_by_its_statistic_alone(deviations, contradicts):
+    """Two parameters, one of them off: chi-squared is beyond its square with exp(-deviations^2 / 2)."""
+    nominal = build_model(parse_spec("plant: {B: [0, 1], F: [1, -0.7]}\n", design=False))
+    theta = nominal.theta + np.array([2.0, 0.0])
+    deviation = 2.0 / deviations
+    estimate = SimpleNamespace(theta=theta, covariance=deviation**2 * np.eye(2), names=["b1", "f1"])
+    error = SimpleNamespace(
+        grid=np.array([0.1]), entry=None, error_bound=lambda information, w: np.zeros(w.shape)
+    )
+    told, notes = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2))
+    assert told["probability"] == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
+    assert ("contradicts the plant" in notes[0]) == contradicts
+    assert ("does not contradict" in notes[0]) != contradicts
+
+
+@pytest.mark.parametrize(("admitted", "contradicts"), [(0.5, True), (30.0, False)])
+def test_a_difference_that_nothing_is_asked_of_contradicts_nothing(admitted, contradicts):
+    """b1 goes from 1 to 3, so that G differs by at most 2/0.3 = 6.7."""
+    nominal = build_model(parse_spec("plant: {B: [0, 1], F: [1, -0.7]}\n", design=False))
+    theta = nominal.theta + np.array([2.0, 0.0])
+    estimate = SimpleNamespace(theta=theta, covariance=0.01 * np.eye(2), names=["b1", "f1"])
+    error = SimpleNamespace(
+        grid=np.array([0.1]),
+        entry=None,
+        error_bound=lambda information, w: np.zeros(w.shape),
+        admissible=SimpleNamespace(at=lambda w: np.full(w.shape, admitted)),
+    )
+    _, notes = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2), asked=True)
+    assert ("contradicts the plant" in notes[0]) == contradicts

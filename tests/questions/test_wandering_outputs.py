@@ -1,0 +1,80 @@
+"""A log whose output wanders as a random walk does, beside the steps of its input."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.questions import explore, solve
+from inputdesign_cli.questions.exploration.build import _inside
+from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.tasks.build.preparation import Preparation
+from tests.identification.explore.test_integrated import GAIN, LAG, LATE, lagged, steps, walk
+
+
+@pytest.mark.slow
+def test_the_plant_is_told_and_the_next_experiment_heeds_the_walk(tmp_path):
+    rng = np.random.default_rng(1)
+    u = steps()
+    y = 60.0 + lagged(u) + walk(rng, u.size, 0.06) + 0.04 * rng.standard_normal(u.size)
+    log = tmp_path / "log.csv"
+    np.savetxt(
+        log, np.column_stack([np.arange(u.size), 45.0 + u, y]), delimiter=",", header="time,u,y", comments=""
+    )
+    done = explore([log], Preparation())
+    assert done.reasons == ()
+    (output,) = done.results.result["exploration"]["outputs"]
+    assert output["noise_integrates"] is True
+    assert any("wanders as a random walk" in note for note in done.results.result["notes"])
+    spec = parse_spec(done.results.resolved_spec, overrides=["signal=null", "spectrum.order=5"])
+    design = solve(spec)
+    assert design.result["status"] == "optimal"
+    assert spec.noise.drifts == (True,)
+    found = done.results.result["identification"]
+    deviation = found["standard_deviation"]
+    for name, truth in (("K", GAIN), ("T", LAG), ("L", LATE)):
+        assert abs(found["theta"][name] - truth) < 4.0 * deviation[name], name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("period", "size", "held"), [(160, 0.8, 20), (240, 0.3, 20), (120, 0.8, 8), (96, 0.5, 8), (160, 0.5, 8)]
+)
+def test_a_daily_cycle_earns_no_trust_where_it_moves_the_gain(tmp_path, period, size, held):
+    """Beside a PRBS. Noise with poles on the circle explains it; modes of the plant, or a walk, do not."""
+    rng = np.random.default_rng(period)
+    u = np.repeat(rng.choice([-1.0, 1.0], 480 // held), held)
+    y = (
+        lagged(u)
+        + size * np.sin(2.0 * np.pi * np.arange(480) / period + 1.0)
+        + 0.05 * rng.standard_normal(480)
+    )
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([np.arange(480), u, y]), delimiter=",", header="time,u,y", comments="")
+    done = explore([log], Preparation())
+    theta = done.results.result["identification"]["theta"]
+    sums = {letter: sum(x for name, x in theta.items() if name[0] == letter) for letter in "baf"}
+    gain = theta.get("K", sums["b"] / (1.0 + sums["a"] + sums["f"]))
+    told = [reason for reason in done.reasons if "cycle" in reason or "wanders, and not" in reason]
+    assert told or abs(gain - GAIN) < 0.1 * GAIN
+    if not done.reasons:
+        spec = parse_spec(done.results.resolved_spec, overrides=["signal=null", "spectrum.order=5"])
+        assert solve(spec).result["status"] == "optimal"
+
+
+@pytest.mark.parametrize("radius", [1.0, 1.0 - 1e-9, 0.9995, 0.99, 0.5])
+def test_the_noise_of_the_next_experiment_fades_as_fast_as_the_record_tells(radius):
+    """Estimates may have poles of the noise on the circle: there, information has no end."""
+    D = np.real(np.poly([radius * np.exp(0.04j), radius * np.exp(-0.04j), 0.3])).tolist()
+    noise = {"C": [1.0, -0.2], "D": D, "variance": 2.0, "drift": False}
+    inside, drawn = _inside(noise, 200)
+    roots = np.abs(np.roots(inside["D"]))
+    assert roots.max() <= 1.0 - 1.0 / 200 + 1e-12
+    if radius < 0.995:
+        assert (inside, drawn) == (noise, [])
+    else:
+        assert drawn == ["D"]
+        assert {**inside, "D": D} == noise
+        # Frequencies stay; a root is moved by a two-hundredth at most.
+        np.testing.assert_allclose(np.angle(np.roots(inside["D"])[:2]), np.angle(np.roots(D)[:2]), atol=1e-9)
+        assert np.abs(np.sort(roots) - np.sort(np.abs(np.roots(D)))).max() <= 1.0 / 200 + 1e-12
+    several, _ = _inside({"C": [[1.0, -0.2], [1.0]], "D": [D, [1.0, -0.5]]}, 200)
+    assert several == {"C": [[1.0, -0.2], [1.0]], "D": [inside["D"], [1.0, -0.5]]}
