@@ -17,8 +17,8 @@ from inputdesign_cli.outcome.golden import Row, compare
 from inputdesign_cli.outcome.golden_file import Golden, load_golden
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.specification import load_spec
-from inputdesign_cli.sweep.running import sweep
-from inputdesign_cli.sweep.verbs import run_verb
+from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.sweeps.verbs import run_verb
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "papers.md"
@@ -143,7 +143,7 @@ def draw_sweep(golden: Golden, name: str, setting: str, file: Path) -> None:
     run = next(run for run in golden.runs if run.name == name)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "sweep"
-        sweep(golden.spec_of(run), [*run.overrides, setting], directory=out)
+        run_sweep(golden.spec_of(run), [*run.overrides, setting], directory=out)
         file.write_bytes((out / "curves.png").read_bytes())
 
 

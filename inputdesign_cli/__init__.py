@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from inputdesign_cli.figures.plots import figure
     from inputdesign_cli.questions import analyse, assess, identify, simulate, solve, to_control, validate
     from inputdesign_cli.specification import Spec, from_control, load_spec, parse_spec
-    from inputdesign_cli.sweep.running import sweep
+    from inputdesign_cli.sweeps.notebook import sweep
 
 
 __all__ = [
@@ -50,7 +50,7 @@ _HOME = {
     "assess": "inputdesign_cli.questions",
     "identify": "inputdesign_cli.questions",
     "validate": "inputdesign_cli.questions",
-    "sweep": "inputdesign_cli.sweep.running",
+    "sweep": "inputdesign_cli.sweeps.notebook",
 }
 
 

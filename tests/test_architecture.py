@@ -21,7 +21,7 @@ ORDER = [
     {"findings"},
     {"tasks"},
     {"questions"},
-    {"sweep", "figures", "wizard"},
+    {"sweeps", "figures", "wizard"},
     {"report"},
     {"live"},
     {"cli", "__main__"},
@@ -141,7 +141,7 @@ def test_no_two_files_need_each_other():
 
 # Who may know the spec: those that read or write it, those that turn it into objects or hand it to those, and
 # the page of a report that restates it in words.
-SPEC_ROOMS = {"specification", "sweep", "wizard", "cli"}
+SPEC_ROOMS = {"specification", "sweeps", "wizard", "cli"}
 SPEC_FILES = {"questions/__init__.py", "questions/task.py", "report/question.py"}
 
 

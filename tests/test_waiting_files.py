@@ -12,8 +12,8 @@ import pytest
 from inputdesign_cli.errors import DataError, IdesignError, OutputError
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
-from inputdesign_cli.sweep.layout import at_work
-from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweeps.layout import at_work
+from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.campaigns import SPEC, applied
 from tests.support.commands import caller
 from tests.test_architecture import FILES, ROOT
@@ -151,13 +151,13 @@ def test_a_pipe_in_a_sweep_is_not_waited_for(tmp_path, monkeypatch, name):
     spec = tmp_path / "s.yaml"
     spec.write_text(SPEC.split("campaign:")[0])
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=100,200"], directory=out)
+    run_sweep(spec, ["experiment.samples=100,200"], directory=out)
     key = min(path.name for path in (out / "points").iterdir())
     (out / "failures").mkdir(exist_ok=True)
     place = {"result.json": f"points/{key}/result.json", "failure": f"failures/{key}.json"}
     piped(out / place.get(name, name))
     with in_time():
         with suppress(IdesignError):
-            sweep(spec, ["experiment.samples=100,200"], directory=out)
+            run_sweep(spec, ["experiment.samples=100,200"], directory=out)
         with at_work(out):
             pass

@@ -8,7 +8,7 @@ from datetime import timedelta
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from inputdesign_cli.sweep.running import Progress
+    from inputdesign_cli.sweeps.running import Progress
 
 
 class ProgressLine:

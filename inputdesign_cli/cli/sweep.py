@@ -18,7 +18,7 @@ from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.sweep.running import Listing, SweepSummary
+    from inputdesign_cli.sweeps.running import Listing, SweepSummary
 
 VERBS = ("solve", "analyse", "simulate")
 
@@ -78,7 +78,7 @@ def sweep(
     the same command goes on where it was and computes nothing twice. A point that is infeasible or fails is
     a row with its reason.
     """
-    from inputdesign_cli.sweep import running as batch
+    from inputdesign_cli.sweeps import running as batch
 
     directory = output or Path("runs") / f"{name_of(spec)}-sweep"
     text = None
@@ -98,7 +98,7 @@ def sweep(
 
     line = ProgressLine(quiet=quiet)
     try:
-        done = batch.sweep(
+        done = batch.run_sweep(
             spec,
             settings or [],
             **common,

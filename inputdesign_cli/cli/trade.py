@@ -52,7 +52,7 @@ def tell_trade(
     with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
         from inputdesign_cli.figures.sweep_figures import draw_into
         from inputdesign_cli.figures.trade import draw_trade
-        from inputdesign_cli.sweep.trade import run_trade
+        from inputdesign_cli.sweeps.trade import run_trade
 
         found = run_trade(
             file, spec, words, directory, overrides=overrides, confine=confine, figure_format=figure_format

@@ -59,6 +59,14 @@ class SweepTable:
             return name, ", ".join(f"{key} = {self.columns[key][at]}" for key in self.axes)
         return None
 
+    def __getitem__(self, name: str) -> Array | list[bool] | list[str]:
+        """Return a column: numbers (n,), truth values, or texts."""
+        numbers, texts = self.numbers(name), self.columns[name]
+        if numbers is not None and any(texts):
+            return numbers
+        lower = [text.lower() for text in texts]
+        return [text == "true" for text in lower] if set(lower) <= {"true", "false"} else texts
+
     def numbers(self, name: str) -> Array | None:
         """A column as numbers (n,), NaN where it is empty; None if it is missing or holds text."""
         texts = self.columns.get(name)

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -68,10 +69,27 @@ def csv_text(table: Table) -> str:
 
 
 def csv_line(cells: Iterable[str]) -> str:
-    """One line of a table. A cell with a comma, a quote or the end of a line in it stands in quotes."""
+    """Write one line of a table; a cell with a comma, a quote or the end of a line in it stands in quotes.
+
+    Spreadsheets run a text that begins like a formula, so an apostrophe goes before it: `'=1+1`. Numbers stay
+    as they are.
+    """
     buffer, end = io.StringIO(), "\r\n"  # the writer puts in quotes what holds a character of its end
-    csv.writer(buffer, lineterminator=end).writerow(cells)
+    csv.writer(buffer, lineterminator=end).writerow(map(_escaped, cells))
     return f"{buffer.getvalue().removesuffix(end)}\n"
+
+
+# Apostrophes of the text itself count, so that taking one away gives back every text.
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|-inf", re.ASCII | re.IGNORECASE)
+
+
+def _escaped(cell: str) -> str:
+    return f"'{cell}" if _FORMULA.match(cell) and not _NUMBER.fullmatch(cell) else cell
+
+
+def _unescaped(cell: str) -> str:
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def shortest(value: float) -> str:
@@ -109,12 +127,13 @@ def csv_columns(content: bytes) -> dict[str, Array]:
 
 
 def csv_rows(content: bytes) -> list[list[str]]:
-    """The cells of each line of a table, its header first.
+    """Read the cells of each line of a table as `csv_line` was given them, its header first.
 
     Raises:
         ValueError: it is no table.
     """
     try:
-        return list(csv.reader(io.StringIO(content.decode(), newline="")))
+        lines = csv.reader(io.StringIO(content.decode(), newline=""))
+        return [[_unescaped(cell) for cell in line] for line in lines]
     except csv.Error as error:
         raise ValueError(str(error)) from error

@@ -31,15 +31,14 @@ class Task(Protocol):
 
 
 def _check_uncertainty(spec: Spec) -> None:
-    """Raise `SpecError` (`not-supported`) where no convex design is asked that could be made robust."""
+    """Raise `SpecError` (`not-supported`) where what is asked is not looked at for several plants."""
     accuracy = spec.accuracy
     elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
-    if spec.uncertainty is None or not (elsewhere or not spec.designs or spec.plant.kind == "regression"):
+    if spec.uncertainty is None or not (elsewhere or spec.plant.kind == "regression"):
         return
-    what = "a given excitation" if not spec.designs else "this kind of design"
     raise spec.complain(
         "not-supported",
-        f"{what} is not looked at for several plants at once",
+        "this kind of design is not looked at for several plants at once",
         hint="remove uncertainty, or ask for a design with model_error, information or a criterion",
         key="uncertainty",
     )
@@ -51,6 +50,7 @@ def build_analysis(spec: Spec) -> Task:
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
+    _check_uncertainty(spec)
     if spec.accuracy.frequency_response is not None and not spec.designs:
         from inputdesign_cli.questions.frequency_response.build import build_response_task
 

@@ -173,8 +173,9 @@ def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterato
     added = found.get("searched", {}).get("added", 0)
     sought = f" and {added} that a search found" if added else ""
     asked = "what is asked, or the floor below," if "floor" in found else "what is asked"
-    holds = f"{asked} holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
-    yield "plants", holds, again
+    these = f"the plant of the spec and {kept - added} {drawn}{sought}{left}"
+    missed = found.get("missed", 0)
+    yield "plants", f"{asked} {f'is missed at {missed} of' if missed else 'holds at'} {these}", again
     if "floor" in found:
         raised, lost = (len(found["floor"][name]) for name in ("raised", "lost"))
         never = f"; at {lost} of them no model keeps what is asked" if lost else ""
@@ -184,7 +185,9 @@ def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterato
             f"the spec only{never}",
             "see the notes",
         )
-    if bound:
+    if "missed" in found:
+        yield "least served", f"{bound[0]}: {found['worst_share']:.4g} of what is admitted", ""
+    elif bound:
         yield "binding", ", ".join(bound) + more, ""
     if "dearest" in found:
         told = found["dearest"]
@@ -236,9 +239,9 @@ def _missed(told: Mapping[str, Json], best: bool) -> str:
 
 
 def _worst_found(told: Mapping[str, Json], objective: Mapping[str, Json]) -> str:
-    """How bad the worst plant is: of the best accuracy `share` is one of the ratio that is reached."""
+    """Say how bad the worst plant is; for the best accuracy `share` is relative to the ratio reached."""
     share, kind = told["share"], objective.get("kind")
-    if kind in ("least_cost", "shortest_experiment"):
+    if kind in (None, "least_cost", "shortest_experiment"):
         return f"{share:.4g} of what is admitted is the worst that was found in {told['region']}"
     reached = f": {share * objective['value']:.4g} of what is admitted" if kind == "accuracy_factor" else ""
     if share <= 1.0 + _AS_MUCH:
@@ -319,7 +322,8 @@ def _signal(result: Result) -> Iterator[str]:
     if "worst_ratio" in signal:
         error = "worst_ratio" in result.get("model_error", {})
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
-        of = ", at the worst of these plants" if "robust" in result else ""
+        designed = "robust" in result and "missed" not in result["robust"]
+        of = ", at the worst of these plants" if designed else ""
         yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples{of}"
     if "confidence" in signal:
         told = signal["confidence"]

@@ -15,7 +15,7 @@ from inputdesign_cli.specification.yaml.reader import Tree
 
 
 def named_files(data: Plain, path: Path = ()) -> Iterator[tuple[Path, str]]:
-    """Every text at a key that names a file, with its path; a title is none, whatever it says."""
+    """Find every text at a key that may name a file, with its path; a title is none, whatever it says."""
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for step, value in items:
         if isinstance(value, str) and step in _keys():
@@ -41,9 +41,12 @@ def _file_keys(node: Plain) -> Iterator[str]:
         for item in node:
             yield from _file_keys(item)
     elif isinstance(node, dict):
-        for name, below in node.get("properties", {}).items():
-            options = (below, *below.get("anyOf", ()), *below.get("oneOf", ()))
-            if any(option.get("format") == FILE_FORMAT for option in options):
-                yield name
+        yield from (name for name, below in node.get("properties", {}).items() if _may_name_a_file(below))
         for below in node.values():
             yield from _file_keys(below)
+
+
+def _may_name_a_file(value: dict[str, Plain]) -> bool:
+    """Whether some alternative of a value, however deep in unions, is the name of a file."""
+    unions = (option for union in ("anyOf", "oneOf", "allOf") for option in value.get(union, ()))
+    return value.get("format") == FILE_FORMAT or any(map(_may_name_a_file, unions))

@@ -14,7 +14,7 @@ from inputdesign_cli.compute.cluster import Cluster
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.text_formats import json_text
-from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweeps.running import run_sweep
 from tests.support import jobs
 from tests.support.sweep_files import SPEC, timeless_files, timeless_rows
 
@@ -89,7 +89,7 @@ def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_p
     spec.write_text(SPEC)
     settings = ["experiment.samples=60:71:1", "spectrum.order=1,-1"]
     here = tmp_path / "here"
-    sweep(spec, settings, directory=here)
+    run_sweep(spec, settings, directory=here)
     victim = loopback.add_worker()
     killed = []
 
@@ -99,7 +99,7 @@ def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_p
             killed.append(victim)
 
     there = tmp_path / "there"
-    done = sweep(spec, settings, directory=there, executor=Cluster(loopback.address), watch=kill_one)
+    done = run_sweep(spec, settings, directory=there, executor=Cluster(loopback.address), watch=kill_one)
     assert killed
     assert done.statuses == {"invalid": 12, "optimal": 12}
     assert timeless_rows(there) == timeless_rows(here)
@@ -113,8 +113,8 @@ def test_data_files_travel_with_the_points(loopback, tmp_path):
     spec = tmp_path / "a" / "t.yaml"
     spec.write_text(SPEC.replace("relative: 0.1", "table: ../r.csv").replace("title", "# title"))
     settings = ["experiment.samples=60,70", "include=more.yaml"]
-    sweep(spec, settings, directory=tmp_path / "here")
-    sweep(spec, settings, directory=tmp_path / "there", executor=Cluster(loopback.address))
+    run_sweep(spec, settings, directory=tmp_path / "here")
+    run_sweep(spec, settings, directory=tmp_path / "there", executor=Cluster(loopback.address))
     assert timeless_files(tmp_path / "there") == timeless_files(tmp_path / "here")
     assert {row["status"] for row in timeless_rows(tmp_path / "there")} == {"optimal"}
 
@@ -153,11 +153,11 @@ def test_a_sweep_whose_scheduler_ends_is_finished_later(tmp_path):
     try:
         executor = Cluster(cluster.address, patience=2.0)
         with pytest.raises(DataError) as caught:
-            sweep(spec, setting, directory=tmp_path / "o", executor=executor, watch=end)
+            run_sweep(spec, setting, directory=tmp_path / "o", executor=executor, watch=end)
     finally:
         cluster.end()
     assert caught.value.diagnostics[0].code == "cluster-unreachable"
-    assert sweep(spec, setting, directory=tmp_path / "o").computed <= 5
+    assert run_sweep(spec, setting, directory=tmp_path / "o").computed <= 5
 
 
 def test_no_cluster_is_a_complaint():

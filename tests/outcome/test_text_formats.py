@@ -1,5 +1,7 @@
 """JSON and CSV lose nothing and hide nothing."""
 
+import csv
+import io
 import json
 import math
 import struct
@@ -9,7 +11,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from inputdesign_cli.outcome.results import Table
-from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain, read_csv
+from inputdesign_cli.outcome.text_formats import csv_line, csv_rows, csv_text, json_text, plain, read_csv
 
 
 def bits(x: float) -> bytes:
@@ -29,6 +31,35 @@ def test_csv_keeps_every_bit(values):
 def test_csv_writes_the_fewest_digits_that_give_back_every_bit():
     table = Table({"x_m": np.array([0.1, 1 / 3, 2.0, -1e22])})
     assert csv_text(table) == "x_m\n0.1\n0.3333333333333333\n2\n-1e+22\n"
+
+
+TEXTS = st.one_of(
+    st.text(), st.sampled_from("=+-@\t'\n=1+1").flatmap(lambda c: st.text().map(lambda t: c + t))
+)
+
+
+@given(st.lists(TEXTS, min_size=1, max_size=5))
+def test_no_cell_is_a_formula_and_every_text_is_read_back(cells):
+    line = csv_line(["", *cells]).encode()
+    (raw,) = csv.reader(io.StringIO(line.decode(), newline=""))
+    for cell in raw:
+        assert cell[:1] not in ("=", "@", "\t", "\r", "\n")
+        assert cell[:1] not in ("+", "-") or isinstance(float(cell), float)
+    assert csv_rows(line) == [["", *cells]]
+
+
+@given(st.floats(allow_nan=False) | st.integers())
+def test_numbers_stay_numbers(value):
+    for text in {repr(value), f"{value:+}"} - {"+inf"}:
+        assert csv_line(["x", text]) == f"x,{text}\n"
+
+
+@pytest.mark.parametrize(
+    "text", ["=1+1", "+", "-", "@SUM(A1)", "-[0.1]", "-1_0", "+1 2", "\uff1d1", "'=1", "\t=1"]
+)
+def test_texts_that_spreadsheets_run_have_an_apostrophe(text):
+    table = csv_text(Table({text: np.zeros(1)}))
+    assert next(csv.reader(io.StringIO(table, newline=""))) == [f"'{text}"]
 
 
 @pytest.mark.parametrize("kind", [">f8", "<f4", ">f4", "<f2", ">i4", "<u8"])

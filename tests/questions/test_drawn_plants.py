@@ -140,7 +140,6 @@ def test_what_contradicts_itself_is_said(stated, code):
 @pytest.mark.parametrize(
     "overrides",
     [
-        ["spectrum={given: {type: white, power: 1}}"],
         ["solver.method=lmi"],
         ["accuracy={criterion: D}", "limits={input_power: 1}",
          "spectrum={type: polynomial, order: 4, band: [0, 3], factor_columns: 1}"],

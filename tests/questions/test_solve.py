@@ -9,7 +9,7 @@ from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome.golden import compare
 from inputdesign_cli.outcome.golden_file import load_golden
-from inputdesign_cli.sweep.verbs import execute
+from inputdesign_cli.sweeps.verbs import execute
 
 ROOT = Path(__file__).parent.parent.parent
 SMALL = """

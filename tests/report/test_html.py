@@ -19,7 +19,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.render import report_text
-from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.pages import XHTML, parse, words
 
 
@@ -172,7 +172,7 @@ def test_figures_without_a_known_table_are_taken_as_they_are(runs, tmp_path):
 
 def test_the_page_of_a_sweep(runs, tmp_path):
     out = tmp_path / "out"
-    sweep(runs / "open.yaml", ["experiment.samples=50,100,-1", "spectrum.order=1,2"], directory=out)
+    run_sweep(runs / "open.yaml", ["experiment.samples=50,100,-1", "spectrum.order=1,2"], directory=out)
     page = parse(report_text(out))
     said = words(page)
     for part in ("6 points: 2 invalid, 4 optimal", "best at experiment.samples = 100",
@@ -189,7 +189,7 @@ def test_the_page_of_a_sweep_compares_in_one_unit(runs, tmp_path):
         "limits={input_power: 0.5},{input_power: 1}",
         "spectrum.order=1",
     ]
-    sweep(runs / "open.yaml", settings, directory=out)
+    run_sweep(runs / "open.yaml", settings, directory=out)
     page = parse(report_text(out))
     table = next(t for t in page.iter(f"{XHTML}table") if "samples of white" in "".join(t.itertext()))
     header, *rows = [[("".join(cell.itertext())).strip() for cell in row] for row in table.iter(f"{XHTML}tr")]
@@ -200,7 +200,7 @@ def test_the_page_of_a_sweep_compares_in_one_unit(runs, tmp_path):
 
 def test_a_sweep_without_any_result_has_a_page(runs, tmp_path):
     out = tmp_path / "out"
-    sweep(runs / "open.yaml", ["accuracy.model_error={table: a.csv},{table: b.csv}"], directory=out)
+    run_sweep(runs / "open.yaml", ["accuracy.model_error={table: a.csv},{table: b.csv}"], directory=out)
     said = words(parse(report_text(out)))
     assert "2 points: 2 invalid" in said
 

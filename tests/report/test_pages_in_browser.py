@@ -15,7 +15,7 @@ from inputdesign_cli.live.pages import Followed, message_page
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.questions import explore
 from inputdesign_cli.report.render import report_text
-from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.browser import clipped, needs_browser, started, violations
 from tests.support.campaigns import applied
 from tests.support.pages import SPEC
@@ -90,7 +90,7 @@ def places(runs, record, tmp_path_factory):
         write_run(found, made[name])
     for name, (settings, rows) in SWEEPS.items():
         made[name] = folder / name
-        sweep(runs / "open.yaml", settings, directory=made[name])
+        run_sweep(runs / "open.yaml", settings, directory=made[name])
         table = made[name] / "sweep.csv"
         lines = table.read_text().splitlines()[rows]
         pending = ",".join(["800", "pending", *[""] * (lines[0].count(",") - 1)])

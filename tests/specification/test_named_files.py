@@ -1,23 +1,39 @@
 """Which texts of a spec name files, and that a spec is kept to a folder if that is asked for."""
 
 import os
+import re
 
 import pytest
 
-from inputdesign_cli import load_spec
+from inputdesign_cli import Spec, load_spec
+from inputdesign_cli.cli.watch import _named_files as followed_files
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification.named_files import named_files
 from inputdesign_cli.specification.template import read_template
+from inputdesign_cli.specification.yaml.places import format_key
+from inputdesign_cli.sweeps.plan import build_plan
 
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\naccuracy: {standard_deviation: {b1: 0.1}}\n"
 TABLE = "frequency,r_adm\n0,1\n3.2,1\n"
 NAMING = {
-    "accuracy.model_error": "{table: %s}",
-    "limits.spectrum": "{table: %s}",
+    "accuracy.model_error.table": "%s",
+    "accuracy.frequency_response": "{table: %s, lines: 9}",
+    "accuracy.frequency_response.noise": "%s",
+    "limits.spectrum": "{max: {table: %s}}",
+    "limits.spectrum.min": "{table: %s}",
     "spectrum": "{given: {type: table, file: %s}}",
-    "spectrum.given": "{signal: %s}",
+    "spectrum.given.signal": "%s",
     "experiment.prior.information": "%s",
+    "uncertainty.covariance": "%s",
+    "uncertainty.information": "%s",
 }
+"""Every key that may name a file, with a text that does."""
+OTHER_TEXTS = re.compile(
+    r"title|channels\.\*\.(name|unit)|sweep\.set\.\*|report\.ellipses\.\[\]\.\[\]"  # for people, or keys
+    r"|.*\.(parameters|known)\.\[\]"  # names of parameters
+    r"|(simulation\.)?plant\..*"  # expressions
+)
+"""Every other key that may be any text."""
 
 
 @pytest.fixture
@@ -31,6 +47,54 @@ def project(tmp_path):
     (tmp_path / "in" / "link.csv").symlink_to("../r.csv")
     (tmp_path / "in" / "link.yaml").symlink_to("../more.yaml")
     return tmp_path / "in"
+
+
+def texts(schema, node, path=()):
+    """Every key at which any text may stand, and whether it may name a file."""
+    node = {**node, **schema["$defs"][node["$ref"].split("/")[-1]]} if "$ref" in node else node
+    if "string" in (kinds := node.get("type", ()), *kinds) and not {"enum", "const"} & node.keys():
+        yield ".".join(path), node.get("format") == "path"
+    for union in ("anyOf", "oneOf", "allOf"):
+        for option in node.get(union, ()):
+            yield from texts(schema, option, path)
+    inner = [("[]", item) for item in (node.get("items"), *node.get("prefixItems", ()))]
+    inner += [("*", node.get("additionalProperties")), *node.get("properties", {}).items()]
+    for step, below in inner:
+        if isinstance(below, dict):
+            yield from texts(schema, below, (*path, step))
+
+
+def test_every_key_that_may_hold_a_text_is_known_to_name_a_file_or_not(project):
+    schema = Spec.model_json_schema()
+    found = set(texts(schema, schema))
+    files = {key for key, of_file in found if of_file}
+    named = set()
+    for key, text in NAMING.items():
+        tree = read_template(project / "spec.yaml", [f"{key}={text % 'r.csv'}"]).data
+        named |= {format_key(path) for path, _ in named_files(tree)}
+    assert files == named
+    assert {key for key, of_file in found if not (of_file or OTHER_TEXTS.fullmatch(key))} == set()
+
+
+@pytest.mark.parametrize(("key", "text"), NAMING.items())
+def test_sweeps_and_watch_see_every_file(project, key, text):
+    setting = f"{key}={text % 'r.csv'}"
+    draft = read_template(project / "spec.yaml", ["sweep={set: {noise.variance: [1, 2]}}"])
+    before = draft.digest(draft.variant([setting]))
+    (project / "r.csv").write_text(TABLE + "4,1\n")
+    assert draft.digest(draft.variant([setting])) != before
+    plan = build_plan(project / "spec.yaml", [setting, "noise.variance=1,2"], zipped=False, verb="solve")
+    assert "r.csv" in plan.job(0, project, figures="", with_files=True).files
+    assert project / "r.csv" in followed_files(project / "spec.yaml", [setting])
+
+
+@pytest.mark.parametrize("name", ["secret.csv", "secret.yaml", "secret"])
+@pytest.mark.parametrize("key", NAMING)
+def test_nothing_is_shown_of_a_file_outside(project, key, name):
+    (project.parent / name).write_text("frequency,r_adm,u,hunter2\n0,hunter2,1,1\nhunter2,1,1,1\n")
+    with pytest.raises(SpecError) as caught:
+        load_spec(project / "spec.yaml", [f"{key}={NAMING[key] % f'../{name}'}"], confine=project)
+    assert "hunter2" not in repr(caught.value.diagnostics)
 
 
 @pytest.mark.parametrize(("key", "text"), NAMING.items())

@@ -52,8 +52,8 @@ def build_requirements(
     return [make for key in spec.accuracy.requirements for make in made(key)]
 
 
-def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | None:
-    """`accuracy.criterion`, of the parameters or of their relative errors.
+def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
+    """Return the maker of `accuracy.criterion`, of the parameters or of their relative errors.
 
     Raises:
         SpecError: `zero-parameter` when a relative error of a parameter that is zero is asked for.

@@ -40,11 +40,12 @@ _ON_CIRCLE = 1e-9
 _PROBES = np.array([0.31, 0.57, 0.83])
 
 
-def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | None:
+def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Plants | None:
     """The scenarios of `uncertainty`; None without one.
 
     Args:
         experiment: on the nominal plant, of the length that the question is about.
+        basis: of the design; None of an excitation that is given.
 
     Raises:
         SpecError: `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`,
@@ -79,17 +80,17 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         afresh=afresh if stated.fresh else None,
         fresh=stated.fresh,
         at=scenario.possible,
-        unknowns=None if basis.free else _unknowns(spec, basis),
+        unknowns=None if basis is not None and basis.free else _unknowns(spec, basis),
         region=None if stated.worst_case is None else scenario.region(stated.worst_case),
     )
 
 
-def _needed(spec: Spec, basis: Basis) -> int | None:
+def _needed(spec: Spec, basis: Basis | None) -> int | None:
     """How many scenarios the stated risk takes; None where no risk is stated."""
     stated = spec.uncertainty
     if stated is None or stated.risk is None:
         return None
-    if basis.free:
+    if basis is not None and basis.free:
         raise spec.complain(
             "not-supported",
             "how many plants a risk takes depends on the number of unknowns, and a free spectrum has none",
@@ -108,8 +109,14 @@ def _needed(spec: Spec, basis: Basis) -> int | None:
     return needed
 
 
-def _unknowns(spec: Spec, basis: Basis) -> int:
-    """Of the program: those of the spectrum, and the factor, length or largest cost that is sought."""
+def _unknowns(spec: Spec, basis: Basis | None) -> int:
+    """Count the unknowns of the program: of the spectrum, and the factor, length or cost that is sought.
+
+    Nothing is sought of a given excitation. How many plants prove a risk is then as with one unknown:
+    (1 - risk)^plants is the probability that none of them is missed by chance.
+    """
+    if basis is None:
+        return 1
     stated = spec.uncertainty
     return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
 

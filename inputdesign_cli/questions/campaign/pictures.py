@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves
 from inputdesign_cli.outcome.record import listed_files
-from inputdesign_cli.outcome.results import Json, Results, Table
+from inputdesign_cli.outcome.results import Json, Results, Table, typed
 from inputdesign_cli.outcome.run_directory import output_errors
 from inputdesign_cli.regular_file import read_regular
 
@@ -57,4 +57,4 @@ def with_earlier_pictures(results: Results, directory: Path) -> Results:
         f"`idesign next {directory}` draws them anew"
     )
     result = {**results.result, "notes": [*results.result.get("notes", []), note]}
-    return replace(results, result=result, files={**results.files, **pictures})
+    return replace(results, outcome=typed(result), files={**results.files, **pictures})

@@ -180,7 +180,7 @@ class Tried:
     asked: tuple[Requirement, ...]
 
 
-def tried_on(design: Design, samples: int, batch: Batch, *, above: float = 0.0) -> list[Tried]:
+def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Tried]:
     """What plants keep that the design was not made for.
 
     Args:

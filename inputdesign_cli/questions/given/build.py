@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from inputdesign_cli.arrays import Array
@@ -15,7 +17,7 @@ from inputdesign_cli.questions.building.model_error import (
     model_error_alpha,
     unstated_errors,
 )
-from inputdesign_cli.questions.building.requirements import build_requirements
+from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
 from inputdesign_cli.questions.building.signal_checks import check_signal
 from inputdesign_cli.questions.building.signal_settings import build_record_request
 from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
@@ -25,6 +27,8 @@ from inputdesign_cli.questions.building.system import (
     read_excitation_record,
     record_step,
 )
+from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
 from inputdesign_cli.specification import Spec
@@ -39,6 +43,7 @@ from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.header import build_header, build_units
 
 _REFUSED = ("spectrum", "energy")
+_OF_DESIGNS = ("objective", "campaign")
 # Keys of signals that mean something for a record that the tool makes.
 _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
 
@@ -64,6 +69,10 @@ def build_given(spec: Spec) -> GivenTask:
             hint="remove it",
             key=f"limits.{name}",
         )
+    for name in spec.stated(*_OF_DESIGNS):
+        raise spec.complain(
+            "not-supported", f"{name} is of designs, and this excitation is given", hint="remove it", key=name
+        )
     _check_signal_is_open(spec, spec.spectrum)
     check_signal(spec)
     experiment = build_experiment(spec)
@@ -85,7 +94,34 @@ def build_given(spec: Spec) -> GivenTask:
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
         foresight=build_foresight(spec, experiment, None),
+        criterion=build_criterion(spec, experiment),
+        plants=_build_plants(spec, experiment),
     )
+
+
+def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
+    """Return the plants of `uncertainty`, at which the requirements are looked at.
+
+    Raises:
+        SpecError: `not-supported` where there is no requirement, and for what is known of the plant of the
+            spec alone: a criterion, costs, limits that depend on the plant.
+    """
+    stated, limits = spec.uncertainty, spec.limits
+    if stated is None:
+        return None
+    amplitude = limits.amplitude
+    depends = spec.closed_loop and limits.bounds_power
+    if depends or limits.output_power is not None or (amplitude is not None and amplitude.output is not None):
+        key, what = "limits", "look at limits that depend on the plant at several plants"
+    elif stated.cost not in (None, "nominal"):
+        key, what = "uncertainty.cost", "weigh what a given excitation costs at several plants"
+    elif spec.accuracy.criterion is not None or not spec.accuracy.requirements:
+        key, what = "uncertainty", "look at several plants without a requirement, or with a criterion"
+    else:
+        plants = build_plants(spec, experiment, None)
+        return None if plants is None else replace(plants, paid="nominal")
+    hint = "remove it, or uncertainty; a design holds for all plants: remove spectrum.given"
+    raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
 
 
 def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:

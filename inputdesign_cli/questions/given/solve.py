@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
+from inputdesign_cli.accuracy import Criterion, ModelError, Requirement, model_errors, worst
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
@@ -38,11 +38,13 @@ from inputdesign_cli.questions.common.record import (
     worst_ratio,
 )
 from inputdesign_cli.questions.common.record_notes import record_notes
+from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.common.signal_outcome import other_files, signal_curves, signal_entry
 from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates, Simulator
 from inputdesign_cli.questions.common.simulation import Delivered, Simulation, simulate
 from inputdesign_cli.questions.common.spectrum import plain_complex, spectrum_curves
 from inputdesign_cli.questions.common.unknown_start import begun_anywhere
+from inputdesign_cli.questions.given.build_plants import AtPlants, given_robust, kept_of
 from inputdesign_cli.questions.least_cost.outcome import information_entry, requirements_entry
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
@@ -70,6 +72,11 @@ class GivenExcitation:
     x: Array | None = None
     sinusoids: tuple[Array, Array] | None = None
     samples: Array | None = None
+
+    @property
+    def scale(self) -> float:
+        """The power of the white excitation that coordinates are whitened by."""
+        return max(sum(self.power["excitation"]), 1e-300)
 
     @classmethod
     def spectral(
@@ -108,7 +115,8 @@ class GivenExcitation:
 class GivenTask:
     """The analysis of an excitation.
 
-    `unstated` are errors of the entries of G that have r_u where no requirement bounds it.
+    `unstated` are errors of the entries of G that have r_u where no requirement bounds it. The value of
+    `criterion` is computed, not bounded. `plants` are others that the true one might be.
     """
 
     header: Header
@@ -125,6 +133,8 @@ class GivenTask:
     ellipses: Pairs | None
     simulation: Simulation
     foresight: Foresight | None = None
+    criterion: Callable[[Experiment], Criterion] | None = None
+    plants: Plants | None = None
 
     def solve(self) -> Results:
         """r_u, information, predicted standard deviations and powers of the excitation.
@@ -145,7 +155,7 @@ class GivenTask:
     def _delivered(self) -> Delivered:
         started = time.perf_counter()
         raw, excitation, units = self.experiment, self.excitation, self.header.units
-        experiment = raw.whitened(max(sum(excitation.power["excitation"]), 1e-300))
+        experiment = raw.whitened(excitation.scale)
         if excitation.samples is not None:
             experiment = replace(experiment, samples=len(excitation.samples))
         information = excitation.information(experiment)
@@ -158,9 +168,9 @@ class GivenTask:
         level = cost / weighted_sum(self.cost, GivenExcitation.even(raw, 1.0).power)
         white = GivenExcitation.even(raw, level).information(experiment)
         result = self._result(experiment, requirements, information, confidence)
+        tables = self._at_plants(result, experiment, requirements, information)
         result |= {"cost": cost, "power": excitation.power, "spectrum": self._spectrum_entry()}
         result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
-        tables: dict[str, Table] = {}
         curves: dict[str, Curves] = {}
         stated = model_errors(requirements)
         unstated = [replace(error, experiment=experiment) for error in self.unstated]
@@ -247,9 +257,32 @@ class GivenTask:
                 f"what is asked is met to the {told_to:.1g} to which the table tells the spectrum, linear "
                 "between its rows"
             ]
+        if self.criterion is not None:
+            criterion = self.criterion(experiment)
+            value = criterion.value(criterion.level(information))
+            result["objective"] = {"kind": criterion.letter, "value": value}
         nowhere = np.zeros(0)
         units = self.header.units
         return result | requirements_entry(units, confidence, requirements, information, nowhere)
+
+    def _at_plants(
+        self,
+        result: dict[str, Json],
+        experiment: Experiment,
+        requirements: Sequence[Requirement],
+        information: Array,
+    ) -> dict[str, Table]:
+        """Add what the excitation buys at the other plants to the result, and return their table."""
+        if self.plants is None:
+            return {}
+        excited = AtPlants(self.excitation.information, self.excitation.scale, experiment.samples)
+        nominal, centre = kept_of(requirements, information), experiment.model.theta
+        found = given_robust(excited, self.plants, nominal, centre, self.header.units)
+        result["robust"] = found.entry
+        if found.entry["missed"]:
+            result["status"] = "missed"
+        result["notes"] = [*result.get("notes", []), *found.notes]
+        return dict(found.tables)
 
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array

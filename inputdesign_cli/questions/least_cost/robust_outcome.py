@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import cycle, islice
 
 import numpy as np
@@ -25,6 +26,7 @@ from inputdesign_cli.questions.common.robust import (
     Kept,
     Plants,
     Searched,
+    Tried,
     estimate_from,
     kept_by,
     tried_on,
@@ -62,51 +64,78 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
         peak: None where no limit on single samples depends on the plant.
     """
     kept = done.kept
-    units, batch = done.units, plants.batch
+    units = done.units
     at_each = kept_by(done.problem, done.design, done.experiment.samples)
     shares = np.array([one.share for one in at_each])
-    worst = int(np.argmax(shares))
     numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
     binding = _binding(done, shares)
     support = [place for place in binding if place > 0]
-    entry: dict[str, Json] = {
-        "source": plants.source,
-        "scenarios": len(batch.plants),
-        "rejected": batch.rejected,
-        "discarded": len(batch.plants) - len(kept),
-        "r_adm": plants.r_adm,
-        "cost": plants.paid,
-        "worst_share": float(shares[worst]),
-        "worst_scenario": numbers[worst],
-        "active": [_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]],
-        "support": len(support),
-    }
-    if plants.paid == "worst" and done.problem.goal == "cost":
-        found = done.design.result
-        costs = costs_of(done, found.basis, found.x)
+    entry = plants_entry(units, plants, numbers, at_each, binding) | {"support": len(support)}
+    dearest_counts = plants.paid == "worst" and done.problem.goal == "cost"
+    if dearest_counts:
+        costs = costs_of(done, done.design.result.basis, done.design.result.x)
         dearest = int(np.argmax(costs))
         entry["dearest"] = {"scenario": numbers[dearest], "cost": costs[dearest]}
     floors = [floor_at((*one.requirements, *one.side)) for one in done.problem.scenarios[1:]]
-    chosen = batch.thetas[kept]
-    floored = floor_entry(floors, numbers[1:], plants.names, chosen)
-    entry |= {"floor": floored} if floored else {}
-    if plants.searched is not None:
-        entry["searched"] = _searched(units, plants, plants.searched)
+    found, notes = told_of_plants(units, plants, kept, floors)
+    entry |= found
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
-    notes = (*_unstable(batch), *floor_notes(floored, len(kept)))
-    if plants.afresh is not None:
-        fresh = _fresh(done, plants, plants.afresh(), peak)
-        entry |= {"fresh": fresh} if fresh else {}
-        entry |= _estimates(done, plants, binding)
-        tried = fresh.get("draws", 0)
-        if tried < plants.fresh:
-            notes = (*notes, _FEWER.format(what_ended(), tried, plants.fresh))
-    tables, curves = {"scenarios": _table(units, plants, numbers, at_each)}, dict[str, Curves]()
+        promised = done.design.result.objective if dearest_counts else None
+        tried = partial(tried_on, done.design, done.experiment.samples)
+        fresh, fewer = fresh_entry(plants, plants.afresh(), tried, peak, promised)
+        entry |= fresh | _estimates(done, plants, binding)
+        notes += fewer
+    tables, curves = {"scenarios": scenario_table(units, plants, numbers, at_each)}, dict[str, Curves]()
     fan = fan_curves(done, numbers, binding)
     if fan is not None and done.design.result.x.any():
         tables["fan"], curves["fan"] = fan
     return RobustResult(entry, tables, curves, notes)
+
+
+def plants_entry(
+    units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept], binding: Sequence[int]
+) -> dict[str, Json]:
+    """Return where the plants come from, how many count, and the worst of them.
+
+    Args:
+        units: of the spec.
+        plants: all beside the nominal one.
+        numbers: of those that count, the nominal one being 0.
+        at_each: what each of these keeps.
+        binding: places among them.
+    """
+    worst = int(np.argmax([one.share for one in at_each]))
+    return {
+        "source": plants.source,
+        "scenarios": len(plants.batch.plants),
+        "rejected": plants.batch.rejected,
+        "discarded": len(plants.batch.plants) + 1 - len(numbers),
+        "r_adm": plants.r_adm,
+        "cost": plants.paid,
+        "worst_share": at_each[worst].share,
+        "worst_scenario": numbers[worst],
+        "active": [_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]],
+    }
+
+
+def told_of_plants(
+    units: Units, plants: Plants, kept: Sequence[int], floors: Sequence[Floor]
+) -> tuple[dict[str, Json], tuple[str, ...]]:
+    """Return `floor` and `searched`, and the notes on floors and on plants that are none.
+
+    Args:
+        units: of the spec.
+        plants: all beside the nominal one.
+        kept: the numbers of those that count.
+        floors: of these.
+    """
+    numbers = [number + 1 for number in kept]
+    floored = floor_entry(floors, numbers, plants.names, plants.batch.thetas[list(kept)])
+    entry: dict[str, Json] = {"floor": floored} if floored else {}
+    if plants.searched is not None:
+        entry["searched"] = _searched(units, plants, plants.searched)
+    return entry, (*_unstable(plants.batch), *floor_notes(floored, len(kept)))
 
 
 def _unstable(batch: Batch) -> tuple[str, ...]:
@@ -165,12 +194,26 @@ def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
     return {"risk": risk}
 
 
-def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak | None) -> dict[str, Json]:
-    """How many of other plants from the same distribution the design misses, as many as there is time for."""
+def fresh_entry(
+    plants: Plants,
+    afresh: Iterator[Batch],
+    try_on: Callable[[Batch, float], Sequence[Tried]],
+    peak: Peak | None = None,
+    promised: float | None = None,
+) -> tuple[dict[str, Json], tuple[str, ...]]:
+    """Return how many of other plants from the same distribution are missed, as many as there is time for.
+
+    Args:
+        plants: those that count.
+        afresh: the others.
+        try_on: what they keep; a share up to the number may be told as 0.
+        peak: see `robust_result`.
+        promised: the cost that a design promises at every plant.
+    """
     tried, peaks, rejected, largest, floors = list[Kept](), list[float](), 0, 0.0, list[Floor]()
     for batch in afresh:
         try:
-            at_each = tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
+            at_each = try_on(batch, min(largest, 1.0))
         except OutOfTimeError:
             break
         peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
@@ -179,10 +222,11 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
+    fewer = () if len(tried) >= plants.fresh else (_FEWER.format(what_ended(), len(tried), plants.fresh),)
     if not tried:
-        return {}
+        return {}, fewer
     shares = np.array([one.share for one in tried])
-    dearer = np.array([one.cost for one in tried]) > MET * done.design.result.objective  # of cost: worst
+    dearer = np.array([promised is not None and one.cost > MET * promised for one in tried])
     less = shares > MET
     missed = int(np.sum(less | dearer))
     entry: dict[str, Json] = {
@@ -201,8 +245,9 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
             entry[name] = count
     if peaks:
         entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
-    promised = plants.paid == "worst" and done.problem.goal == "cost"
-    return entry | ({"less": int(np.sum(less)), "dearer": int(np.sum(dearer))} if promised else {})
+    if promised is not None:
+        entry |= {"less": int(np.sum(less)), "dearer": int(np.sum(dearer))}
+    return {"fresh": entry}, fewer
 
 
 def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> dict[str, Json]:
@@ -235,8 +280,8 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> dict[s
     return {"estimates": {"draws": len(shares), "confidence": _MOST_OF_THEM, "largest": highest}}
 
 
-def _table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
-    """scenarios.csv: the plants that the design is for, with their parameters."""
+def scenario_table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
+    """Return scenarios.csv: the plants that count, with their parameters."""
     thetas = plants.batch.thetas
     where = [np.nan if one.frequency is None else one.frequency / units.frequency for one in at_each]
     listed = [place for place, number in enumerate(numbers) if number > 0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -36,6 +37,9 @@ _STARTS = 3  # beside the plant of the spec
 _NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
 
 
+Keeps = Callable[[Array, Alternative], Kept]
+
+
 @dataclass(frozen=True)
 class Found:
     """The worst plant that was found, at `theta` (k,), what it keeps, and how many were tried."""
@@ -48,11 +52,10 @@ class Found:
 
 @dataclass
 class _Ascent:
-    """One search for a design; the best so far stands first in `best`."""
+    """One search; the worst plant so far stands first in `best`."""
 
     region: Region
-    design: Design
-    samples: int
+    keeps: Keeps
     tried: int = 0
     best: list[tuple[Array, Alternative, Kept]] = field(default_factory=list)
 
@@ -64,8 +67,7 @@ class _Ascent:
         if plant is None:
             return 0.0
         self.tried += 1
-        (tried,) = tried_on(self.design, self.samples, Batch(theta[None], (plant,), 1))
-        kept = tried.kept
+        kept = self.keeps(theta, plant)
         if not self.best or kept.share > self.best[0][2].share:
             self.best[:] = [(theta, plant, kept)]
         return kept.share
@@ -95,18 +97,24 @@ class _Ascent:
         return (share - here) / step[axis] if share > 0.0 and np.isfinite(share) else 0.0
 
 
-def worst_plant(region: Region, design: Design, samples: int, starts: Sequence[Array]) -> Found:
-    """The worst plant of the region that ascents find.
+def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> Found:
+    """Return the worst plant of the region that ascents find.
 
     Args:
-        samples: of the delivered experiment.
+        region: where it is searched.
+        keeps: what a plant with parameters (k,) keeps.
         starts: parameters (k,) of plants to begin with, the worst known first.
     """
-    search = _Ascent(region, design, samples)
+    search = _Ascent(region, keeps)
     for theta in starts[: 1 + _STARTS]:
         search.from_start(region.nearest(theta))
     theta, plant, kept = search.best[0]
     return Found(theta, plant, kept, search.tried)
+
+
+def _kept_at(design: Design, samples: int, theta: Array, plant: Alternative) -> Kept:
+    (tried,) = tried_on(design, samples, Batch(theta[None], (plant,), 1))
+    return tried.kept
 
 
 Solve = Callable[[Question], tuple[Design, dict[str, Json]]]
@@ -129,7 +137,7 @@ def with_worst_plants(
         nominal = question.experiment.model.theta
         shares = np.array([one.share for one in kept[1:]])
         thetas = [nominal, *plants.batch.thetas[np.argsort(-shares, kind="stable")]]
-        found = worst_plant(region, design, samples, thetas)
+        found = worst_plant(region, partial(_kept_at, design, samples), thetas)
         told = Searched(region.name, found.theta, found.kept, found.tried, added)
         if found.kept.share <= _NEARLY or added == _MOST_ADDED:
             return replace(plants, searched=told), question, solved

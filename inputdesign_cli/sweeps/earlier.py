@@ -10,8 +10,8 @@ from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.specification.yaml.writer import to_yaml
-from inputdesign_cli.sweep.layout import SPEC, SUMMARY
-from inputdesign_cli.sweep.plan import Plan, without_sweep
+from inputdesign_cli.sweeps.layout import SPEC, SUMMARY
+from inputdesign_cli.sweeps.plan import Plan, without_sweep
 
 
 def check_same_sweep(plan: Plan, made_from: Sequence[str], root: Path) -> None:

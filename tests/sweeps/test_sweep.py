@@ -10,9 +10,10 @@ import pytest
 
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, SpecError
-from inputdesign_cli.sweep.layout import Layout
-from inputdesign_cli.sweep.running import list_points, sweep
-from inputdesign_cli.sweep.table import scalars, table_lines
+from inputdesign_cli.figures.sweep_table import read_sweep
+from inputdesign_cli.sweeps.layout import Layout
+from inputdesign_cli.sweeps.running import list_points, run_sweep
+from inputdesign_cli.sweeps.table import scalars, table_lines
 from tests.support.processes import running
 from tests.support.sweep_files import rows, timeless_files, timeless_rows
 
@@ -20,7 +21,9 @@ from tests.support.sweep_files import rows, timeless_files, timeless_rows
 def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
     seen = []
     out = tmp_path / "out"
-    done = sweep(spec, ["experiment.samples=10,20", "spectrum.order=0:2:1"], directory=out, watch=seen.append)
+    done = run_sweep(
+        spec, ["experiment.samples=10,20", "spectrum.order=0:2:1"], directory=out, watch=seen.append
+    )
     assert done.statuses == {"optimal": 6}
     table = rows(out)
     assert [(r["experiment.samples"], r["spectrum.order"]) for r in table] == [
@@ -43,29 +46,29 @@ def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
 
 def test_a_second_call_computes_nothing_and_a_wider_one_the_rest(spec, stub, tmp_path):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=10,20"], directory=out)
+    run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     before = timeless_files(out)
-    assert sweep(spec, ["experiment.samples=10,20"], directory=out).computed == 0
+    assert run_sweep(spec, ["experiment.samples=10,20"], directory=out).computed == 0
     assert timeless_files(out) == before
-    assert sweep(spec, ["experiment.samples=10,20,30"], directory=out).computed == 1
+    assert run_sweep(spec, ["experiment.samples=10,20,30"], directory=out).computed == 1
     assert stub == [10, 20, 30]
     assert [row["experiment.samples"] for row in rows(out)] == ["10", "20", "30"]
 
 
 def test_the_sweep_is_repeated_by_its_own_spec(spec, stub, tmp_path):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=10,20", "noise.variance=2"], directory=out)
-    assert sweep(out / "sweep.yaml", directory=out).computed == 0
+    run_sweep(spec, ["experiment.samples=10,20", "noise.variance=2"], directory=out)
+    assert run_sweep(out / "sweep.yaml", directory=out).computed == 0
 
 
 def test_points_that_say_the_same_are_computed_once(spec, stub, tmp_path):
-    done = sweep(spec, ["experiment.samples=10,10.0,1e1"], directory=tmp_path / "out")
+    done = run_sweep(spec, ["experiment.samples=10,10.0,1e1"], directory=tmp_path / "out")
     assert (stub, done.statuses) == ([10], {"optimal": 3})
 
 
 def test_failures_are_rows_with_reasons(spec, stub, tmp_path):
     out = tmp_path / "out"
-    done = sweep(spec, ["experiment.samples=6,7,8,9,-1,10"], directory=out)
+    done = run_sweep(spec, ["experiment.samples=6,7,8,9,-1,10"], directory=out)
     table = rows(out)
     assert [row["status"] for row in table] == [
         "optimal", "infeasible", "inaccurate", "error", "invalid", "optimal"
@@ -79,21 +82,21 @@ def test_failures_are_rows_with_reasons(spec, stub, tmp_path):
     assert isinstance(done.first_failure, InfeasibleError)
     assert "--set experiment.samples=7" in done.first_failure.diagnostics[0].message
     assert stub == [6, 7, 8, 9, 10]
-    again = sweep(spec, ["experiment.samples=6,7,8,9,-1,10"], directory=out)
+    again = run_sweep(spec, ["experiment.samples=6,7,8,9,-1,10"], directory=out)
     assert (again.computed, again.failures) == (0, 4)
-    retried = sweep(spec, ["experiment.samples=6,7,8,9,-1,10"], directory=out, rerun_failed=True)
+    retried = run_sweep(spec, ["experiment.samples=6,7,8,9,-1,10"], directory=out, rerun_failed=True)
     assert retried.computed == 4
     assert stub[5:] == [7, 8, 9]
 
 
 def test_a_failure_that_is_mended_leaves_no_trace(spec, stub, tmp_path, monkeypatch):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=6,7"], directory=out)
+    run_sweep(spec, ["experiment.samples=6,7"], directory=out)
     from inputdesign_cli import questions
 
     solve = questions.solve
     monkeypatch.setattr(questions, "solve", lambda s: solve(s.model_copy(update={"experiment": six(s)})))
-    assert sweep(spec, ["experiment.samples=6,7"], directory=out, rerun_failed=True).failures == 0
+    assert run_sweep(spec, ["experiment.samples=6,7"], directory=out, rerun_failed=True).failures == 0
     assert list((out / "failures").iterdir()) == []
 
 
@@ -105,7 +108,7 @@ def test_fail_fast_stops_and_keeps_what_is_done(spec, stub, tmp_path):
     out = tmp_path / "out"
     for _ in range(2):
         with pytest.raises(InfeasibleError):
-            sweep(spec, ["experiment.samples=6,7,10"], directory=out, fail_fast=True)
+            run_sweep(spec, ["experiment.samples=6,7,10"], directory=out, fail_fast=True)
         assert [row["status"] for row in rows(out)] == ["optimal", "infeasible", "pending"]
     assert stub == [6, 7]
 
@@ -117,21 +120,21 @@ def test_an_interrupt_leaves_a_table(spec, stub, tmp_path):
 
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        sweep(spec, ["experiment.samples=10,20,30"], directory=out, watch=stop)
+        run_sweep(spec, ["experiment.samples=10,20,30"], directory=out, watch=stop)
     assert [row["status"] for row in rows(out)] == ["optimal", "optimal", "pending"]
-    assert sweep(spec, ["experiment.samples=10,20,30"], directory=out).computed == 1
+    assert run_sweep(spec, ["experiment.samples=10,20,30"], directory=out).computed == 1
 
 
 def test_a_misspelt_key_is_refused_before_anything_is_written(spec, stub, tmp_path):
     with pytest.raises(SpecError) as caught:
-        sweep(spec, ["spectrum.ordr=1,2"], directory=tmp_path / "out")
+        run_sweep(spec, ["spectrum.ordr=1,2"], directory=tmp_path / "out")
     assert caught.value.diagnostics[0].code == "unknown-key"
     assert not (tmp_path / "out").exists()
 
 
 def test_a_verb_that_is_not_there_is_refused(spec, tmp_path):
     with pytest.raises(SpecError) as caught:
-        sweep(spec, ["experiment.samples=1,2"], directory=tmp_path / "out", verb="divine")
+        run_sweep(spec, ["experiment.samples=1,2"], directory=tmp_path / "out", verb="divine")
     assert caught.value.diagnostics[0].code == "not-supported"
     assert not (tmp_path / "out").exists()
 
@@ -143,10 +146,17 @@ def test_an_edited_data_file_is_another_point(tmp_path, stub):
     )
     (tmp_path / "r.csv").write_text("frequency,r_adm\n0.1,1\n3.2,1\n")
     setting = ["experiment.samples=10,20"]
-    assert sweep(spec, setting, directory=tmp_path / "out").computed == 2
-    assert sweep(spec, setting, directory=tmp_path / "out").computed == 0
+    assert run_sweep(spec, setting, directory=tmp_path / "out").computed == 2
+    assert run_sweep(spec, setting, directory=tmp_path / "out").computed == 0
     (tmp_path / "r.csv").write_text("frequency,r_adm\n0.1,2\n3.2,1\n")
-    assert sweep(spec, setting, directory=tmp_path / "out").computed == 2
+    assert run_sweep(spec, setting, directory=tmp_path / "out").computed == 2
+
+
+def test_swept_texts_are_no_formulas(spec, stub, tmp_path):
+    out, titles = tmp_path / "out", ["=1+1", "+x", "-y", "@z", "-0.5", "'=1"]
+    run_sweep(spec, [f"title={','.join(titles)}"], directory=out)
+    assert [row["title"] for row in rows(out)] == ["'=1+1", "'+x", "'-y", "'@z", "-0.5", "''=1"]
+    assert read_sweep(out).columns["title"] == titles
 
 
 def test_listing_writes_nothing(spec, stub, tmp_path):
@@ -154,7 +164,7 @@ def test_listing_writes_nothing(spec, stub, tmp_path):
     listed = list(list_points(spec, ["experiment.samples=6,7"], directory=out))
     assert [point.status for point in listed] == ["pending", "pending"]
     assert not out.exists()
-    sweep(spec, ["experiment.samples=6,7"], directory=out)
+    run_sweep(spec, ["experiment.samples=6,7"], directory=out)
     listed = list(list_points(spec, ["experiment.samples=6,7,8"], directory=out))
     assert [point.status for point in listed] == ["done", "failed", "pending"]
     assert (out / "points" / listed[0].key / "result.json").is_file()
@@ -164,18 +174,18 @@ def test_other_peoples_directories_are_left_alone(spec, stub, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "notes.txt").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
+        run_sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
     assert caught.value.diagnostics[0].code == "output-not-a-sweep"
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["notes.txt"]
     with pytest.raises(OutputError) as caught:
-        sweep(spec, ["experiment.samples=10,20"], directory=spec)
+        run_sweep(spec, ["experiment.samples=10,20"], directory=spec)
     assert caught.value.diagnostics[0].code == "output-not-a-directory"
 
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from inputdesign_cli.sweep.layout import opened
+from inputdesign_cli.sweeps.layout import opened
 with opened(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -187,18 +197,18 @@ def test_a_directory_is_swept_by_one_process_at_a_time(spec, stub, tmp_path):
     with running([sys.executable, "-c", HOLD, str(out)], stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout.readline() == "held\n"
         with pytest.raises(OutputError) as caught:
-            sweep(spec, ["experiment.samples=10,20"], directory=out)
+            run_sweep(spec, ["experiment.samples=10,20"], directory=out)
         assert caught.value.diagnostics[0].code == "sweep-locked"
         assert f"process {holder.pid}" in caught.value.diagnostics[0].message
-    assert sweep(spec, ["experiment.samples=10,20"], directory=out).computed == 2
+    assert run_sweep(spec, ["experiment.samples=10,20"], directory=out).computed == 2
 
 
 def test_what_a_killed_process_left_half_written_is_removed(spec, stub, tmp_path):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=10,20"], directory=out)
+    run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     (out / "points" / ".abc.partial-1").mkdir()
     (out / ".sweep.csv.partial-1").write_text("half")
-    sweep(spec, ["experiment.samples=10,20"], directory=out)
+    run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     assert not list(out.rglob(".*partial*"))
 
 
@@ -234,8 +244,8 @@ class Points(list):
 
 def test_processes_give_what_one_process_gives(spec, tmp_path):
     settings = ["experiment.samples=50,100,-1", "spectrum.order=1,2"]
-    sweep(spec, settings, directory=tmp_path / "one")
-    sweep(spec, settings, directory=tmp_path / "two", executor=Processes(2))
+    run_sweep(spec, settings, directory=tmp_path / "one")
+    run_sweep(spec, settings, directory=tmp_path / "two", executor=Processes(2))
     assert timeless_rows(tmp_path / "one") == timeless_rows(tmp_path / "two")
     assert timeless_files(tmp_path / "one") == timeless_files(tmp_path / "two")
     assert multiprocessing.active_children() == []
@@ -249,7 +259,7 @@ def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):
 
     monkeypatch.setattr("inputdesign_cli.outcome.run_directory.write_run", full)
     with pytest.raises(OutputError):
-        sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
+        run_sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
     assert [row["status"] for row in rows(tmp_path / "out")] == ["pending", "pending"]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.report.render import report_text
-from inputdesign_cli.sweep.running import list_points, sweep
+from inputdesign_cli.sweeps.running import list_points, run_sweep
 from tests.support.sweep_files import rows, timeless_files, timeless_rows
 
 SETTINGS = ["experiment.samples=60,80"]
@@ -17,7 +17,7 @@ SETTINGS = ["experiment.samples=60,80"]
 def swept(spec, tmp_path):
     """A sweep of real designs, and the files of its first point."""
     out = tmp_path / "out"
-    sweep(spec, SETTINGS, directory=out)
+    run_sweep(spec, SETTINGS, directory=out)
     return out, out / rows(out)[0]["run"]
 
 
@@ -57,12 +57,12 @@ def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
     assert statuses == ["damaged", "done"]
     with pytest.raises(DataError, match=run.name):
         report_text(out)
-    done = sweep(spec, SETTINGS, directory=out)
+    done = run_sweep(spec, SETTINGS, directory=out)
     assert (done.computed, len(done.damaged)) == (1, 1)
     assert run.name in done.damaged[0]
     assert timeless_files(out) == whole
     assert timeless_rows(out) == table
-    assert sweep(spec, SETTINGS, directory=out).damaged == []
+    assert run_sweep(spec, SETTINGS, directory=out).damaged == []
 
 
 def test_the_run_of_another_point_is_not_taken_for_that_of_this(swept, spec):
@@ -70,18 +70,18 @@ def test_the_run_of_another_point_is_not_taken_for_that_of_this(swept, spec):
     whole = timeless_files(out)
     shutil.rmtree(run)
     shutil.copytree(out / rows(out)[1]["run"], run)
-    assert sweep(spec, SETTINGS, directory=out).computed == 1
+    assert run_sweep(spec, SETTINGS, directory=out).computed == 1
     assert timeless_files(out) == whole
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"status": "optimal", "code": "x"}', "null"])
 def test_a_damaged_failure_is_computed_again(content, spec, stub, tmp_path):
     out, settings = tmp_path / "out", ["experiment.samples=7,10"]
-    sweep(spec, settings, directory=out)
+    run_sweep(spec, settings, directory=out)
     whole = timeless_files(out)
     (failure,) = (out / "failures").iterdir()
     failure.write_text(content)
-    done = sweep(spec, settings, directory=out)
+    done = run_sweep(spec, settings, directory=out)
     assert (done.computed, len(done.damaged)) == (1, 1)
     assert failure.name in done.damaged[0]
     assert timeless_files(out) == whole
@@ -90,17 +90,17 @@ def test_a_damaged_failure_is_computed_again(content, spec, stub, tmp_path):
 
 def test_a_damaged_point_that_is_not_reached_has_no_row(spec, stub, tmp_path):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=10,20"], directory=out)
+    run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     edited(value=-1.0)(out / rows(out)[1]["run"])
     with pytest.raises(Exception, match="seven"):
-        sweep(spec, ["experiment.samples=7,20"], directory=out, fail_fast=True)
+        run_sweep(spec, ["experiment.samples=7,20"], directory=out, fail_fast=True)
     assert [row["status"] for row in rows(out)] == ["infeasible", "pending"]
 
 
 @pytest.mark.parametrize("change", ["spec", "keys", "more keys", "verb"])
 def test_another_sweep_does_not_take_the_place_of_one(change, spec, stub, tmp_path):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=10,20"], directory=out)
+    run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     other = tmp_path / "other.yaml"
     other.write_text(spec.read_text().replace("variance: 1", "variance: 2"))
     before = {name: (out / name).read_bytes() for name in ("sweep.csv", "sweep.yaml", "sweep.json")}
@@ -112,18 +112,18 @@ def test_another_sweep_does_not_take_the_place_of_one(change, spec, stub, tmp_pa
     }[change]
     arguments = {"spec": spec, "settings": ["experiment.samples=10,20"], **arguments}
     with pytest.raises(OutputError, match="would lose its table") as caught:
-        sweep(**arguments, directory=out)
+        run_sweep(**arguments, directory=out)
     assert "--overwrite" in caught.value.diagnostics[0].hint
     assert {name: (out / name).read_bytes() for name in before} == before
-    sweep(**arguments, directory=out, overwrite=True)
+    run_sweep(**arguments, directory=out, overwrite=True)
     assert (out / "sweep.csv").read_bytes() != before["sweep.csv"]
 
 
 def test_the_same_spec_goes_on_under_another_name_and_when_it_was_edited(spec, stub, tmp_path):
     out = tmp_path / "out"
-    sweep(spec, ["experiment.samples=10,20"], directory=out)
+    run_sweep(spec, ["experiment.samples=10,20"], directory=out)
     copy = tmp_path / "copy.yaml"
     shutil.copy(spec, copy)
-    assert sweep(copy, ["experiment.samples=10,20,30"], directory=out).computed == 1
+    assert run_sweep(copy, ["experiment.samples=10,20,30"], directory=out).computed == 1
     copy.write_text(copy.read_text().replace("variance: 1", "variance: 2"))
-    assert sweep(copy, ["experiment.samples=10,20,30"], directory=out).computed == 3
+    assert run_sweep(copy, ["experiment.samples=10,20,30"], directory=out).computed == 3

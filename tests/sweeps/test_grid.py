@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import Sweep, parse_spec
-from inputdesign_cli.sweep.grid import Axis, Grid, build_grid, parse_settings
+from inputdesign_cli.sweeps.grid import Axis, Grid, build_grid, parse_settings
 
 
 def texts(*settings):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +14,9 @@ from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, read_template
-from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
-from inputdesign_cli.sweep.point import PointJob
-from inputdesign_cli.sweep.verbs import Verb
+from inputdesign_cli.sweeps.grid import Grid, Settings, build_grid, parse_settings
+from inputdesign_cli.sweeps.point import PointJob
+from inputdesign_cli.sweeps.verbs import Verb
 from inputdesign_cli.version import __version__
 
 _KEY_LENGTH = 24
@@ -92,7 +92,7 @@ def without_sweep(data: Mapping[str, Json]) -> dict[str, Json]:
 
 def build_plan(
     spec: Path,
-    settings: Sequence[str],
+    settings: Settings,
     *,
     zipped: bool,
     verb: Verb,

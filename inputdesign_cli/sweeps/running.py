@@ -28,11 +28,12 @@ from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.specification.yaml.writer import to_yaml
-from inputdesign_cli.sweep.earlier import check_same_sweep
-from inputdesign_cli.sweep.kept import flaw
-from inputdesign_cli.sweep.layout import SPEC, SUMMARY, TABLE, Layout, opened
-from inputdesign_cli.sweep.plan import Plan, build_plan
-from inputdesign_cli.sweep.point import (
+from inputdesign_cli.sweeps.earlier import check_same_sweep
+from inputdesign_cli.sweeps.grid import Settings
+from inputdesign_cli.sweeps.kept import flaw
+from inputdesign_cli.sweeps.layout import SPEC, SUMMARY, TABLE, Layout, opened
+from inputdesign_cli.sweeps.plan import Plan, build_plan
+from inputdesign_cli.sweeps.point import (
     BROKEN,
     FAILURES,
     LOST,
@@ -42,8 +43,8 @@ from inputdesign_cli.sweep.point import (
     run_point,
     run_point_elsewhere,
 )
-from inputdesign_cli.sweep.table import PENDING, table_lines
-from inputdesign_cli.sweep.verbs import Verb
+from inputdesign_cli.sweeps.table import PENDING, table_lines
+from inputdesign_cli.sweeps.verbs import Verb
 
 DAMAGED = "damaged"
 """Of a listed point: what is there of it does not hold, so that it is computed again."""
@@ -98,7 +99,7 @@ class SweepSummary:
 
 def list_points(
     spec: Path,
-    settings: Sequence[str] = (),
+    settings: Settings = (),
     *,
     directory: Path,
     zipped: bool = False,
@@ -117,9 +118,9 @@ def list_points(
         yield Listing(dict(zip(names, point, strict=True)), key, status)
 
 
-def sweep(
+def run_sweep(
     spec: Path,
-    settings: Sequence[str] = (),
+    settings: Settings = (),
     *,
     directory: Path,
     zipped: bool = False,
@@ -137,7 +138,9 @@ def sweep(
     """Run a verb at every point of a grid, but for the points that are done already.
 
     Args:
-        settings: `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points.
+        spec: the file, or with `text` where it would lie.
+        settings: `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points; or a mapping of keys to
+            values in place of the `sweep` block.
         confine: the folder outside of which the spec may name no files.
         text: of the spec, where it is in no file.
         executor: where the points are computed (default: in this process).

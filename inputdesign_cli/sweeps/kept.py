@@ -12,8 +12,8 @@ from inputdesign_cli.outcome.record import SPEC
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.sweep.layout import Layout
-from inputdesign_cli.sweep.point import FAILURES
+from inputdesign_cli.sweeps.layout import Layout
+from inputdesign_cli.sweeps.point import FAILURES
 
 # Values and bounds are written to all digits; a gap may be of a bound that was rounded up to the value.
 _ROUNDING = 1e-6

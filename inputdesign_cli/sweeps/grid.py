@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from inputdesign_cli.errors import Location, SpecError, bad_spec
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.specification.models.sweep import range_values
+from inputdesign_cli.specification.yaml.plain import plain
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.specification.yaml.scalars import resolve
 
+Settings = Sequence[str] | Mapping[str, object]
+"""What is varied: texts as `--set` takes them, or keys and their values."""
 MOST_POINTS = 1_000_000
 _WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
@@ -70,14 +73,17 @@ class Grid:
         return {"set": values, "zip": True} if self.zipped else {"set": values}
 
 
-def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
-    """`KEY=V1,V2,..` and `KEY=LOW:HIGH:STEP` as axes; `KEY=VALUE` stays an override of every point.
+def parse_settings(settings: Settings) -> tuple[list[str], list[Axis]]:
+    """Read `KEY=V1,V2,..` and `KEY=LOW:HIGH:STEP` as axes; `KEY=VALUE` stays an override of every point.
 
-    Commas inside brackets, braces and quotes belong to a value.
+    Commas inside brackets, braces and quotes belong to a value. A mapping of keys to values takes the place
+    of the spec's `sweep` block.
 
     Raises:
         SpecError: `bad-range`, `bad-override`, `sweep-twice`.
     """
+    if isinstance(settings, Mapping):
+        return [f"sweep={json.dumps({'set': plain(settings)})}"], []
     fixed: list[str] = []
     axes: dict[str, Axis] = {}
     for setting in settings:

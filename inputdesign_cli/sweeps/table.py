@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.text_formats import csv_line, shortest
-from inputdesign_cli.sweep.plan import Plan
+from inputdesign_cli.sweeps.plan import Plan
 
 Read = Callable[[str], Mapping[str, Json] | None]
 

@@ -13,7 +13,7 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.figures.trade import Trade
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweeps.running import run_sweep
 
 _LENGTHS = (0.25, 0.5, 1.0, 2.0)
 _AMPLITUDES = (0.5, 1.0, 2.0)
@@ -41,12 +41,12 @@ def run_trade(
         figure_format: of its figures: png, svg or pdf.
 
     Raises:
-        SpecError: `needs-limits` where an amplitude is to be varied that is not limited; see `sweep`.
-        OutputError: see `sweep`.
+        SpecError: `needs-limits` where an amplitude is to be varied that is not limited; see `run_sweep`.
+        OutputError: see `run_sweep`.
     """
     settings = [*overrides, *trade_settings(spec, words)]
     # The directory belongs to the run beside it, whatever was traded there before.
-    sweep(
+    run_sweep(
         file,
         settings,
         directory=directory,

@@ -1,0 +1,79 @@
+"""A sweep from Python: a table that a notebook can plot."""
+
+from __future__ import annotations
+
+import os
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.sweeps.grid import Settings
+from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.sweeps.verbs import Verb
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+def sweep(
+    spec: Spec | str | os.PathLike[str],
+    settings: Settings | str = (),
+    *,
+    directory: str | os.PathLike[str] | None = None,
+    zipped: bool = False,
+    verb: Verb = "solve",
+    executor: Executor | None = None,
+    overwrite: bool = False,
+) -> DataFrame | SweepTable:
+    """Run a verb at every point of a grid and return the table: one row a point, failures included.
+
+    The columns are those of sweep.csv: the keys that are varied, `status`, and the numbers of the results
+    under their paths in `result.json`.
+
+    Args:
+        spec: the name of its file, or a spec.
+        settings: `{"experiment.samples": [250, 500]}` in place of the spec's `sweep` block, or texts as
+            `--set` takes them: `["experiment.samples=250,500"]`.
+        directory: where the runs, the table and the figures are kept, so that a later call goes on with them
+            (default: nowhere).
+        zipped: whether values are taken side by side, not in every combination.
+        verb: solve, analyse or simulate.
+        executor: where the points are computed (default: in this process).
+        overwrite: whether to replace the table of another sweep.
+
+    Returns:
+        A DataFrame, or without pandas a `SweepTable`, whose `table["cost"]` is a column.
+
+    Raises:
+        SpecError, OutputError: before anything is computed; later OutputError only.
+    """
+    text = spec.to_yaml() if isinstance(spec, Spec) else None
+    file = spec.resolve_path("<spec>") if isinstance(spec, Spec) else Path(spec)
+    with TemporaryDirectory(prefix="idesign-") if directory is None else nullcontext(directory) as kept:
+        run_sweep(
+            file,
+            [settings] if isinstance(settings, str) else settings,
+            directory=Path(kept),
+            zipped=zipped,
+            verb=verb,
+            text=text,
+            executor=executor,
+            overwrite=overwrite,
+        )
+        table = read_sweep(Path(kept))
+    # A folder that is gone holds no runs.
+    columns = {name: cells for name, cells in table.columns.items() if directory is not None or name != "run"}
+    return _framed(replace(table, columns=columns))
+
+
+def _framed(table: SweepTable) -> DataFrame | SweepTable:
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        return table
+    return DataFrame({name: table[name] for name in table.columns})
