@@ -145,6 +145,6 @@ def status(directory: CampaignDirectory, json_output: Json = False) -> None:
         typer.echo(json_text(dict(memory.campaign)), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
-    from inputdesign_cli.outcome.record import load_result
+    from inputdesign_cli.outcome.run_directory import read_outcome
 
-    typer.echo(summary(load_result(directory), memory.time_unit, []))
+    typer.echo(summary(read_outcome(directory), memory.time_unit, []))

@@ -185,4 +185,4 @@ def show(
     elif not quiet:
         from inputdesign_cli.cli.summary import summary
 
-        typer.echo(summary(results.result, results.time_unit, files, replaced=replaced))
+        typer.echo(summary(results.outcome, results.time_unit, files, replaced=replaced))

@@ -93,7 +93,7 @@ def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]
         return []
     axes = [key for key in table.axes if len(set(table.columns[key])) > 1]
     numeric = [key for key in axes if _usable(table.numbers(key))]
-    zipped = bool(table.summary.get("zip"))
+    zipped = table.summary.zip
     found: list[tuple[str, Callable[[Figure], None]]] = []
     if numeric and (zipped or len(axes) <= MOST_KEYS):
         along, *others = sorted(axes, key=lambda key: (key not in numeric, -len(set(table.columns[key]))))

@@ -6,12 +6,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome import read_plain
 from inputdesign_cli.outcome.objectives import objective
-from inputdesign_cli.outcome.results import Array, Json
+from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.text_formats import csv_rows
 from inputdesign_cli.regular_file import read_regular
 
@@ -20,16 +22,35 @@ QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
 
 
 @dataclass(frozen=True)
+class SweepAxis:
+    """A key that is varied, with its values as texts."""
+
+    key: str
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SweepContent:
+    """What `sweep.json` says of a sweep."""
+
+    verb: Literal["solve", "analyse", "simulate"]
+    axes: tuple[SweepAxis, ...]
+    title: str | None = None
+    zip: bool = False
+    environment: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True)
 class SweepTable:
     """The content of `sweep.json` and the columns of `sweep.csv` as text."""
 
-    summary: Mapping[str, Json]
+    summary: SweepContent
     columns: Mapping[str, list[str]]
 
     @property
     def axes(self) -> list[str]:
         """The keys that were varied."""
-        return [axis["key"] for axis in self.summary["axes"]]
+        return [axis.key for axis in self.summary.axes]
 
     @property
     def rows(self) -> int:
@@ -85,11 +106,13 @@ def read_sweep(root: Path) -> SweepTable:
         DataError: `run-missing` or `run-unreadable`.
     """
     try:
-        summary = json.loads(read_regular(root / "sweep.json"))
+        summary = read_plain(SweepContent, json.loads(read_regular(root / "sweep.json")), "sweep.json")
         header, *rows = csv_rows(read_regular(root / "sweep.csv"))
         columns = {name: [row[i] for row in rows] for i, name in enumerate(header)}
         table = SweepTable(summary, columns)
-        _ = table.axes, table.rows
+        missing = {"status", "code", "run", *table.axes} - columns.keys()
+        if missing:
+            raise ValueError(f"sweep.csv has no column {min(missing)}")
     except (FileNotFoundError, NotADirectoryError) as error:
         message = f"{root} holds no sweep: there is no {Path(error.filename).name} in it"
         raise DataError.because("run-missing", message, hint="run it with `idesign sweep`") from None

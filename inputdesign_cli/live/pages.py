@@ -8,8 +8,6 @@ from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location
-from inputdesign_cli.outcome.results import Json
-from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.render import filled
 from inputdesign_cli.report.run_page import run_page
 
@@ -23,8 +21,8 @@ class Followed:
     name: str
     state: str = "computing"  # computing, done, failed
     told: str = ""
-    designs: tuple[dict[str, Json], ...] = ()
-    errors: tuple[dict[str, Json], ...] = field(default=())
+    designs: tuple[dict[str, object], ...] = ()
+    errors: tuple[dict[str, object], ...] = field(default=())
     awaits: str = "computes whenever it is saved"
 
     def computing(self) -> Followed:
@@ -41,7 +39,7 @@ class Followed:
         painters: Executor | None = None,
     ) -> Followed:
         """With the design in `run` and nothing wrong; without `pictures` these are still being drawn."""
-        made = run_page(run, Trail(), pictures=pictures, painters=painters) | {"clock": clock}
+        made = run_page(run, pictures=pictures, painters=painters) | {"clock": clock}
         told = (
             f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
         )
@@ -83,7 +81,7 @@ def message_page(name: str, told: str, awaits: str = "computes whenever it is sa
     return Followed(name, "waiting", told, awaits=awaits).page
 
 
-def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str, Json]:
+def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str, object]:
     """A diagnostic for the page, with the lines about its place."""
     place = diagnostic.location
     shown: list[tuple[str, str, bool]] = []

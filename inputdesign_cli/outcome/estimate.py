@@ -49,4 +49,5 @@ class Identification:
     prior: PriorAgreement | None = None
     records: tuple[int, ...] | None = None
     operating_point: Mapping[str, float] | None = None
+    means_removed: bool | None = None
     fit_percent: float | tuple[float | None, ...] | None = None

@@ -15,10 +15,11 @@ from pathlib import Path
 from types import MappingProxyType
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
 from inputdesign_cli.outcome.curves_file import curves_json
 from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, not_a_run
 from inputdesign_cli.outcome.provenance import environment
-from inputdesign_cli.outcome.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files
+from inputdesign_cli.outcome.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files, unreadable
 from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.outcome.results import Json, Results
 from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain
@@ -141,6 +142,25 @@ def read_run(directory: Path) -> dict[str, Json]:
         message = f"{directory} lacks {', '.join(missing)}, which its {RESULT} lists"
         raise DataError.because("run-incomplete", message, hint="run the spec again")
     return result
+
+
+def read_outcome(directory: Path, result: Mapping[str, object] | None = None) -> Outcome:
+    """Return the outcome of a whole run, typed.
+
+    Args:
+        directory: of the run.
+        result: its `result.json`, where that was read already.
+
+    Raises:
+        DataError: as `read_run`, and `run-unreadable` where an entry is not what `write_run` writes.
+    """
+    content = read_run(directory) if result is None else result
+    if "spec_sha256" not in content:  # every run has it, of whatever kind
+        raise unreadable(directory / RESULT, 'it has no "spec_sha256"')
+    try:
+        return read_plain(Outcome, content)
+    except OutcomeError as error:
+        raise unreadable(directory / RESULT, str(error)) from error
 
 
 def _write_files(

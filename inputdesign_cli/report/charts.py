@@ -14,7 +14,6 @@ from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.curves_file import read_curves
-from inputdesign_cli.outcome.results import Json, Result
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.described import captioned, described
 from inputdesign_cli.report.numbers import spoken
@@ -37,10 +36,13 @@ class Chart:
     readings: str = ""
 
 
-def run_charts(run: Path, result: Result, time_unit: str, by: Executor) -> dict[str, Chart]:
+def run_charts(run: Path, files: object, time_unit: str, by: Executor) -> dict[str, Chart]:
     """The charts of a run by file stem, drawn for a page; of an older run the pictures that it has.
 
     Args:
+        run: its directory.
+        files: the names that its result lists.
+        time_unit: of the spec.
         by: draws them.
     """
     jobs = [(stem, curves, time_unit) for stem, curves in read_curves(run).items()]
@@ -50,7 +52,7 @@ def run_charts(run: Path, result: Result, time_unit: str, by: Executor) -> dict[
             raise done.error or RuntimeError(f"{done.job[0]} was not drawn")
         drawn[done.job[0]] = done.answer
     charts = {stem: drawn[stem] for stem, _, _ in jobs}
-    for name in result.get("files", ()):
+    for name in files if isinstance(files, list) else ():
         stem, _, kind = name.rpartition(".")
         if kind in _PICTURES and stem not in charts and (run / name).is_file():
             charts[stem] = file_chart(run / name)
@@ -77,7 +79,7 @@ def _caption(stem: str, curves: Curves) -> str:
 
 def readable_chart(drawn: Callable[[Callable[[Figure], object]], bytes], alt: str, caption: str) -> Chart:
     """A chart of which values can be read; `drawn` makes the SVG and hands its page to what it is given."""
-    panels: list[dict[str, Json]] = []
+    panels: list[dict[str, object]] = []
     content = drawn(lambda page: panels.extend(readings(page)))
     told = json.dumps(panels, separators=(",", ":")) if panels else ""
     return Chart(_svg_uri(content), alt, caption, told)

@@ -1,114 +1,141 @@
-"""A result in words, a line a fact: the same in the terminal and on a page."""
+"""A result in words, one fact a line: the same in the terminal and on a page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
+from inputdesign_cli.outcome import (
+    ClosedLoopError,
+    Loop,
+    MeasuredLines,
+    Objective,
+    Outcome,
+    RequirementMet,
+    Robust,
+    Signal,
+)
+from inputdesign_cli.outcome.design import Coverage
 from inputdesign_cli.outcome.objectives import objective
-from inputdesign_cli.outcome.results import Json, Result
+from inputdesign_cli.outcome.robust import ActivePlant, FreshPlants, SearchedPlant
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.report.numbers import Fact, enumerated, precise, shown, spoken
 
-# Gaps below this are told as such.
+# Smaller relative gaps differ from machine to machine.
 _CLOSED = 1e-6
-
-# A plant that errs by so little more than those that bind errs as much as they do.
+# A plant whose ratio is larger by no more than this share errs as much as those that bind.
 _AS_MUCH = 1e-4
-
-# By so much more than what was asked an exact confidence is told to be exceeded.
+# An exact confidence is exceeded if more than this share is kept beyond what was asked.
 _ROOM = 0.005
-
-# Types of spectra that are short for something.
+# Smaller shares of cost and accuracy are not worth a word.
+_LITTLE_LESS, _LITTLE_MORE = 5e-4, 5e-5
 _SHORT = {"fir": "FIR"}
-
-# What is said of an excitation that was given, by the status of the result.
+# The status of an excitation that was given, in words.
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
 
 
-def facts(result: Result, time_unit: str) -> Iterator[Fact]:
-    """What an experiment costs and what it buys, as far as the result has the numbers."""
-    found = result.get("objective", {})
-    kind, cost = found.get("kind"), "energy" if "moments" in result else "cost"
-    if "value" in found:
-        yield (
-            cost if kind == "least_cost" else objective(kind).name,
-            _clean(found["value"], kind),
-            "; ".join(filter(None, [_paid(result), white(result)])),
-        )
-    if kind == "closed_loop_error":
-        yield _of_structure(result["closed_loop_error"])
-    if kind != "least_cost" and "cost" in result:
-        yield cost, shown(result["cost"]), ""
-    power = result.get("power", {})
-    powers = ", ".join(f"{name} {enumerated(power[name])}" for name in power)
-    if powers:
-        yield "power", powers, "at the plant of the spec" if _paid(result) else ""
-    limits = "; ".join(_limits(result))
-    if limits:
-        yield "limits", limits, ""
-    error = result.get("model_error", {})
-    if "worst_ratio" in error:
-        where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
-        at = "at the plant of the spec" if "robust" in result else ""
-        yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", at
-    asked = result.get("requirements", result.get("assessment", {}).get("requirements", []))
-    yield from (_loop(entry["loop"], time_unit) for entry in asked if "loop" in entry)
-    if "worst_ratio" in result.get("frequency_response", {}):
-        yield _lines(result["frequency_response"], time_unit)
-    if "confidence" in error:
-        told = error["confidence"]
-        yield (
-            "confidence",
-            _kept(told),
-            f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
-            f"not {error['alpha']:.4g}",
-        )
-    if "robust" in result:
-        yield from _robust(result["robust"], result.get("objective", {}))
-    if "mean_squared_error" in result:
-        error = result["mean_squared_error"]
-        parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"
-        yield "error", f"{error['value']:.6g} = {parts}", ""
-    deviations = result.get("information", {}).get("standard_deviation")
-    if deviations and result.get("status") in GIVEN and "identification" not in result:
-        yield "std", ", ".join(f"{name} {deviations[name]:.4g}" for name in deviations), ""
-    if "samples" in result.get("signal", {}):
-        yield "signal", ", ".join(_signal(result)), ""
-    if "improvement" in result.get("simulation", {}):
-        measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
+def facts(outcome: Outcome, time_unit: str) -> Iterator[Fact]:
+    """Yield what an experiment costs and what accuracy it gives, as far as the result has the numbers."""
+    yield from _value_and_cost(outcome)
+    yield from _power_and_limits(outcome)
+    yield from _accuracy(outcome, time_unit)
+    if outcome.robust is not None:
+        yield from _robust(outcome.robust, outcome.objective)
+    error = outcome.mean_squared_error
+    if error is not None:
+        parts = f"squared bias {error.bias_squared:.6g} + variance {error.variance:.6g}"
+        yield "error", f"{error.value:.6g} = {parts}", ""
+    information = outcome.information
+    deviations = None if information is None else information.standard_deviation
+    if deviations and outcome.status in GIVEN and outcome.identification is None:
+        yield "std", ", ".join(f"{name} {value:.4g}" for name, value in deviations.items()), ""
+    if outcome.signal is not None:
+        yield "signal", ", ".join(_signal(outcome, outcome.signal)), ""
+    simulation = outcome.simulation
+    if simulation is not None and simulation.improvement is not None:
+        measured, theory = 100 * simulation.improvement.measured, 100 * simulation.improvement.theory
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
 
 
-def _of_structure(found: Mapping[str, Json]) -> Fact:
+def _value_and_cost(outcome: Outcome) -> Iterator[Fact]:
+    found, cost = outcome.objective, "cost" if outcome.moments is None else "energy"
+    kind = None if found is None else found.kind
+    if found is not None:
+        name = cost if kind == "least_cost" else objective(kind).name
+        yield name, _clean(found.value, found.kind), "; ".join(filter(None, [_paid(outcome), white(outcome)]))
+    if outcome.closed_loop_error is not None:
+        yield _of_structure(outcome.closed_loop_error)
+    if kind != "least_cost" and outcome.cost is not None:
+        yield cost, shown(outcome.cost), ""
+
+
+def _power_and_limits(outcome: Outcome) -> Iterator[Fact]:
+    power = outcome.power
+    if power is not None:
+        kinds = (("input", power.input), ("output", power.output), ("excitation", power.excitation))
+        powers = ", ".join(f"{name} {enumerated(values)}" for name, values in kinds if values is not None)
+        yield "power", powers, "at the plant of the spec" if _paid(outcome) else ""
+    limits = "; ".join(_limits(outcome))
+    if limits:
+        yield "limits", limits, ""
+
+
+def _accuracy(outcome: Outcome, time_unit: str) -> Iterator[Fact]:
+    error = outcome.model_error
+    if error is not None and error.worst_ratio is not None:
+        at = "" if error.worst_frequency is None else f" at {error.worst_frequency:.4g} rad/{time_unit}"
+        of = "" if outcome.robust is None else "at the plant of the spec"
+        yield "model error", f"r_u / r_adm at most {error.worst_ratio:.6g}{at}", of
+    for requirement in _requirements(outcome):
+        if requirement.loop is not None:
+            yield _loop(requirement.loop, time_unit)
+    lines = outcome.frequency_response
+    if lines is not None and lines.worst_ratio is not None:
+        yield _lines(lines, time_unit)
+    if error is not None and error.confidence is not None:
+        kept = error.confidence
+        yield (
+            "confidence",
+            _kept(kept),
+            f"asked {100 * (kept.asked or 0.0):g} %; chi-squared would take alpha "
+            f"{kept.chi_squared_alpha or 0.0:.4g}, not {error.alpha:.4g}",
+        )
+
+
+def _requirements(outcome: Outcome) -> tuple[RequirementMet, ...]:
+    if outcome.requirements is not None:
+        return outcome.requirements
+    return () if outcome.assessment is None else outcome.assessment.requirements
+
+
+def _of_structure(found: ClosedLoopError) -> Fact:
     """The error of the loop by the covariance of the model structure, with the design and white input."""
-    design, white_input = (found["parametric"][name] for name in ("design", "white"))
-    saved = 1.0 - design["loss"]["mean"] / white_input["loss"]["mean"]
+    design, white_input = (found.parametric[name] for name in ("design", "white"))
+    saved = 1.0 - design.loss.mean / white_input.loss.mean
     less = f"mean loss {per_cent(abs(saved))} {'less' if saved >= 0.0 else 'more'} with the design"
-    times = f"{white_input['value'] / design['value']:.3g} times as much"
-    told = f"white excitation: {shown(white_input['value'])}, {times}; {less}"
-    return "for this structure", shown(design["value"]), told
+    times = f"{white_input.value / design.value:.3g} times as much"
+    compared = f"white excitation: {shown(white_input.value)}, {times}; {less}"
+    return "for this structure", shown(design.value), compared
 
 
-def _kept(told: Mapping[str, Json]) -> str:
-    """How many estimates meet the bounds: of simulated experiments, or drawn by asymptotic theory."""
-    runs = "runs" in told
-    low, high = (f"{100 * share:.1f}" for share in told["kept_limits" if runs else "exact_limits"])
-    share = f"{100 * told['kept' if runs else 'exact']:.1f} % ({low} to {high})"
-    if runs:
-        spent = ", more than asked: it costs more than it need" if _beyond(told) else ""
-        return f"{share} of {told['runs']} simulated experiments meet it{spent}"
-    return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
+def _kept(found: Coverage) -> str:
+    """How many estimates meet the bounds: from simulated experiments, or drawn by asymptotic theory."""
+    if found.kept is None or found.kept_limits is None:
+        share = _share(found.exact, found.exact_limits)
+        return f"{share} of {found.draws} estimates drawn by asymptotic theory meet it"
+    beyond = found.kept_limits[0] > (found.asked or 0.0) + _ROOM
+    more = ", more than asked: a smaller alpha would cost less" if beyond else ""
+    return f"{_share(found.kept, found.kept_limits)} of {found.runs} simulated experiments meet it{more}"
 
 
-def _beyond(told: Mapping[str, Json]) -> bool:
-    """Whether an exact confidence is exceeded by more than the chance of its runs."""
-    return bool(told["kept_limits"][0] > told["asked"] + _ROOM)
+def _share(value: float, limits: tuple[float, float]) -> str:
+    low, high = (f"{100 * limit:.1f}" for limit in limits)
+    return f"{100 * value:.1f} % ({low} to {high})"
 
 
-def _limits(result: Result) -> Iterator[str]:
+def _limits(outcome: Outcome) -> Iterator[str]:
     """Which limits the design exhausts, and how far single samples of the record use theirs."""
-    binding = [_limit(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
-    shares = result.get("signal", {}).get("of_limits", {})
+    binding = [_limit(limit.name) for limit in outcome.limits or () if limit.binding]
+    shares = {} if outcome.signal is None else outcome.signal.of_limits or {}
     if binding:
         by = " by the spectrum" if shares else ""
         yield f"{', '.join(dict.fromkeys(binding))} exhausted{by}"
@@ -122,229 +149,236 @@ def _limit(name: str) -> str:
     return " ".join(reversed(spoken(name).split(".")))
 
 
-def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
+def _lines(found: MeasuredLines, time_unit: str) -> Fact:
     """How the lines of a frequency response are measured, and how well."""
-    counted = found["periods"] - found["transient"]
-    blocks = "" if found["blocks"] == 1 else f" in each of {found['blocks']} blocks"
-    of = f"of {found['asked']} " if found.get("asked", found["lines"]) > found["lines"] else ""
+    counted = (found.periods or 0) - (found.transient or 0)
+    blocks = "" if found.blocks == 1 else f" in each of {found.blocks} blocks"
+    of = f"of {found.asked} " if (found.asked or 0) > (found.lines or 0) else ""
     text = (
-        f"{found['lines']} {of}lines, {counted} of {found['periods']} periods of {found['period']} samples "
-        f"count{blocks}; standard deviations at most {found['worst_ratio']:.6g} of those admitted"
+        f"{found.lines} {of}lines, {counted} of {found.periods} periods of {found.period} samples "
+        f"count{blocks}; standard deviations at most {found.worst_ratio or 0.0:.6g} of those admitted"
     )
-    return "response", text, f"worst at {found['worst_frequency']:.4g} rad/{time_unit}"
+    return "response", text, f"worst at {found.worst_frequency or 0.0:.4g} rad/{time_unit}"
 
 
-def _loop(found: Mapping[str, Json], time_unit: str) -> Fact:
-    """The controller of a loop, and the margin that is kept."""
-    settings = {name: found[name] for name in ("Kp", "Ti", "Td") if name in found}
-    told = ", ".join(
-        f"{name} {value:.4g}{'' if name == 'Kp' else f' {time_unit}'}" for name, value in settings.items()
+def _loop(found: Loop, time_unit: str) -> Fact:
+    """The controller of a loop, and the margins that are kept."""
+    settings = {"Kp": found.Kp, "Ti": found.Ti, "Td": found.Td}
+    named = ", ".join(
+        f"{name} {value:.4g}{'' if name == 'Kp' else f' {time_unit}'}"
+        for name, value in settings.items()
+        if value is not None
     )
-    peak = f"|S| at most {found['nominal_peak']:.4g} with this plant"
+    peak = f"|S| at most {found.nominal_peak or 0.0:.4g} with this plant"
     kept = (
-        f"asked: at most {found['max_sensitivity']:.4g} with every plant within r_u, so a gain margin "
-        f"of {found['gain_margin']:.3g} and a phase margin of {found['phase_margin']:.3g} degrees"
+        f"asked: at most {found.max_sensitivity or 0.0:.4g} with every plant within r_u, so a gain margin "
+        f"of {found.gain_margin or 0.0:.3g} and a phase margin of {found.phase_margin or 0.0:.3g} degrees"
     )
-    return "loop", f"{told}, {peak}" if told else peak, kept
+    return "loop", f"{named}, {peak}" if named else peak, kept
 
 
-def _paid(result: Result) -> str:
-    """Of which plants a cost is that is not the nominal one; empty for that, and where all cost the same."""
-    robust, loop = result.get("robust", {}), "excitation" in result.get("power", {})
-    if result.get("objective", {}).get("kind") != "least_cost" or not robust or not loop:
+def _paid(outcome: Outcome) -> str:
+    """Say which plants a cost is for, unless it is the nominal one or all cost the same."""
+    robust, found = outcome.robust, outcome.objective
+    loop = outcome.power is not None and outcome.power.excitation is not None
+    if found is None or found.kind != "least_cost" or robust is None or not loop:
         return ""
-    number = 1 + robust["scenarios"] - robust["discarded"]
+    number = 1 + robust.scenarios - robust.discarded
     return {"mean": f"mean over {number} plants", "worst": f"the largest of {number} plants"}.get(
-        robust["cost"], ""
+        robust.cost, ""
     )
 
 
-def _robust(found: Mapping[str, Json], objective: Mapping[str, Json]) -> Iterator[Fact]:
+def _robust(found: Robust, target: Objective | None) -> Iterator[Fact]:
     """What holds at the plants that the true one might be, and at others drawn in the same way."""
-    best = objective.get("kind") == "accuracy_factor"
-    kept = found["scenarios"] - found["discarded"]
-    bound = [_bound_by(item) for item in found["active"][:3]]
-    more = ", .." if len(found["active"]) > len(bound) else ""
-    left = f"; {found['discarded']} are left out" if found["discarded"] else ""
-    drawn = "listed" if found["source"] == "scenarios" else "drawn"
-    again = (
-        f"{found['rejected']} that were unstable, or no plants, were drawn again" if found["rejected"] else ""
-    )
-    added = found.get("searched", {}).get("added", 0)
-    sought = f" and {added} that a search found" if added else ""
-    asked = "what is asked, or the floor below," if "floor" in found else "what is asked"
-    these = f"the plant of the spec and {kept - added} {drawn}{sought}{left}"
-    missed = found.get("missed", 0)
-    yield "plants", f"{asked} {f'is missed at {missed} of' if missed else 'holds at'} {these}", again
-    if "floor" in found:
-        raised, lost = (len(found["floor"][name]) for name in ("raised", "lost"))
+    again = f"{found.rejected} that were unstable, or no plants, were drawn again" if found.rejected else ""
+    yield "plants", _held_at(found), again
+    if found.floor is not None:
+        raised, lost = len(found.floor.raised), len(found.floor.lost)
         never = f"; at {lost} of them no model keeps what is asked" if lost else ""
         yield (
             "floor",
-            f"of these plants {raised} are held to {found['floor']['share']:g} of the r_adm of the plant of "
+            f"of these plants {raised} are held to {found.floor.share:g} of the r_adm of the plant of "
             f"the spec only{never}",
             "see the notes",
         )
-    if "missed" in found:
-        yield "least served", f"{bound[0]}: {found['worst_share']:.4g} of what is admitted", ""
-    elif bound:
-        yield "binding", ", ".join(bound) + more, ""
-    if "dearest" in found:
-        told = found["dearest"]
-        at = f"plant {told['scenario']}" if told["scenario"] else "the plant of the spec"
-        yield "dearest", f"{at}, where it costs {shown(told['cost'])}", ""
-    if "searched" in found:
-        told = found["searched"]
-        yield (
-            "worst plant",
-            _worst_found(told, objective),
-            f"searched by ascent from {told['tried']} plants, not proved",
-        )
-    if "fresh" in found:
-        told = found["fresh"]
-        low, high = (f"{100 * share:.3g}" for share in told["limits"])
-        yield (
-            "fresh plants",
-            f"of {told['draws']} more, drawn alike, {_missed(told, best)}: {per_cent(told['share'])} "
-            f"({low} to {high})",
-            _held(told) or "said of plants drawn as the spec says, not of the true plant",
-        )
-        if "beyond_limits" in told:
-            peaks = told["beyond_limits"]
-            yield (
-                "limits there",
-                f"single samples keep them at the plants that the design is for; of {told['draws']} more "
-                f"{peaks['draws']} go beyond, up to {per_cent(peaks['largest'])} of a limit",
-                "without noise",
-            )
+    bound = [_bound_by(item) for item in found.active[:3]]
+    if bound:
+        yield "binding", ", ".join(bound) + (", .." if len(found.active) > len(bound) else ""), ""
+    if found.dearest is not None:
+        number = found.dearest.scenario
+        at = f"plant {number}" if number else "the plant of the spec"
+        yield "dearest", f"{at}, where it costs {shown(found.dearest.cost)}", ""
+    if found.searched is not None:
+        tried = f"searched by ascent from {found.searched.tried} plants, not proved"
+        yield "worst plant", _worst_found(found.searched, target), tried
+    if found.fresh is not None:
+        yield from _fresh(found.fresh, best=target is not None and target.kind == "accuracy_factor")
 
 
-def _held(told: Mapping[str, Json]) -> str:
-    """What counts as getting what is asked, where r_adm is the floor at some of the fresh plants."""
-    if not told.get("raised"):
+def _held_at(found: Robust) -> str:
+    kept = found.scenarios - found.discarded
+    left = f"; {found.discarded} are left out" if found.discarded else ""
+    drawn = "listed" if found.source == "scenarios" else "drawn"
+    added = 0 if found.searched is None else found.searched.added
+    sought = f" and {added} that a search found" if added else ""
+    asked = "what is asked" if found.floor is None else "what is asked, or the floor below,"
+    return f"{asked} holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
+
+
+def _fresh(found: FreshPlants, *, best: bool) -> Iterator[Fact]:
+    low, high = (f"{100 * share:.3g}" for share in found.limits)
+    yield (
+        "fresh plants",
+        f"of {found.draws} more, drawn in the same way, {_missed(found, best)}: {per_cent(found.share)} "
+        f"({low} to {high})",
+        _held(found) or "the true plant may lie outside of what the spec describes",
+    )
+    if found.beyond_limits is not None:
+        peaks = found.beyond_limits
+        yield (
+            "limits there",
+            f"single samples keep them at the plants that the design is for; of {found.draws} more "
+            f"{peaks.draws} go beyond, up to {per_cent(peaks.largest)} of a limit",
+            "without noise",
+        )
+
+
+def _held(found: FreshPlants) -> str:
+    """What counts as met where r_adm is the floor at some of the fresh plants."""
+    if not found.raised:
         return ""
-    lost = f", {told['lost']} of which no model keeps what is asked" if told.get("lost") else ""
-    return f"{told['raised']} are held to the floor only{lost}"
+    lost = f", {found.lost} of which no model keeps what is asked" if found.lost else ""
+    return f"{found.raised} are held to the floor only{lost}"
 
 
-def _missed(told: Mapping[str, Json], best: bool) -> str:
-    """How many plants miss what, of those that were tried."""
-    missed, less, dearer = told["missed"], told.get("less", told["missed"]), told.get("dearer", 0)
+def _missed(found: FreshPlants, best: bool) -> str:
+    """How many of the fresh plants miss what is asked."""
+    missed, dearer = found.missed, found.dearer or 0
+    less = missed if found.less is None else found.less
     if best and missed:
-        return f"{missed} are less sure than these, with errors up to {told['largest']:.4g} times as large"
+        return f"{missed} are less sure than these, with errors up to {found.largest:.4g} times as large"
     if not dearer:
         return f"{missed} get less than that"
     both = f" ({less + dearer - missed} of them both)" if less + dearer > missed else ""
     return f"{less} get less than that, {dearer} cost more{both}, {missed} in all"
 
 
-def _worst_found(told: Mapping[str, Json], objective: Mapping[str, Json]) -> str:
-    """Say how bad the worst plant is; for the best accuracy `share` is relative to the ratio reached."""
-    share, kind = told["share"], objective.get("kind")
-    if kind in (None, "least_cost", "shortest_experiment"):
-        return f"{share:.4g} of what is admitted is the worst that was found in {told['region']}"
-    reached = f": {share * objective['value']:.4g} of what is admitted" if kind == "accuracy_factor" else ""
+def _worst_found(found: SearchedPlant, target: Objective | None) -> str:
+    """How bad the worst plant is: its ratio, relative to the ratio that is reached where that is best."""
+    share, kind = found.share, None if target is None else target.kind
+    if kind in ("least_cost", "shortest_experiment"):
+        return f"{share:.4g} of what is admitted is the worst that was found in {found.region}"
+    best = target is not None and kind == "accuracy_factor"
+    reached = f": {share * target.value:.4g} of what is admitted" if best and target is not None else ""
     if share <= 1.0 + _AS_MUCH:
-        return f"none was found in {told['region']} that errs more than those that the design is for{reached}"
+        none = f"none was found in {found.region} that errs more"
+        return f"{none} than those that the design is for{reached}"
     more = f"errs {per_cent(share - 1.0)} more than those that the design is for"
-    return f"the worst that was found in {told['region']} {more}{reached}"
+    return f"the worst that was found in {found.region} {more}{reached}"
 
 
-def _bound_by(item: Mapping[str, Json]) -> str:
-    if not item["scenario"]:
+def _bound_by(item: ActivePlant) -> str:
+    if not item.scenario:
         return "the plant of the spec"
-    values = ", ".join(f"{name} {value:.4g}" for name, value in item["parameters"].items())
-    return f"plant {item['scenario']} ({values})"
+    values = ", ".join(f"{name} {value:.4g}" for name, value in (item.parameters or {}).items())
+    return f"plant {item.scenario} ({values})"
 
 
-def white(result: Result) -> str:
-    """What white excitation costs or reaches instead: at the same accuracy, or within the same limits."""
-    kind = result.get("objective", {}).get("kind")
-    found = result.get("baseline", {}).get("white", {})
-    value, ratio = found.get(objective(kind).white), found.get("ratio")
-    multiple = kind in ("least_cost", "closed_loop_error")
-    if value is None or (multiple and (ratio is None or not value)):
+def white(outcome: Outcome) -> str:
+    """Say what white excitation costs or reaches: at the same accuracy, or within the same limits."""
+    found = None if outcome.baseline is None else outcome.baseline.white
+    kind = "" if outcome.objective is None else outcome.objective.kind
+    if found is None:
         return ""
-    told = f"white excitation: {_clean(value, kind)}"
-    if not multiple:
-        return told
-    told += ", as much" if f"{ratio:.3g}" == "1" else f", {ratio:.3g} times as much"
-    asymptotic = result.get("closed_loop_error", {}).get("covariance") == "asymptotic"
-    return f"{told}, both by asymptotic theory with model order factor 1" if asymptotic else told
+    value = {"cost": found.cost, "samples": found.samples, "value": found.value}.get(
+        objective(kind).white, found.mean_squared_error
+    )
+    multiple = kind in ("least_cost", "closed_loop_error")
+    if value is None or (multiple and (found.ratio is None or not value)):
+        return ""
+    said = f"white excitation: {_clean(value, kind)}"
+    if not multiple or found.ratio is None:
+        return said
+    said += ", as much" if f"{found.ratio:.3g}" == "1" else f", {found.ratio:.3g} times as much"
+    loop = outcome.closed_loop_error
+    asymptotic = loop is not None and loop.covariance == "asymptotic"
+    return f"{said}, both by asymptotic theory with model order factor 1" if asymptotic else said
 
 
 def _gap(relative: float) -> str:
-    """How near the proof comes: what a solver leaves below a millionth changes from machine to machine."""
+    """How near the proof comes to the value."""
     return (
         f", gap {relative:.1e}" if relative >= _CLOSED else f", gap below {_CLOSED:.0e}".replace("e-0", "e-")
     )
 
 
-def proofs(result: Result) -> Iterator[str]:
-    """What is proved of other experiments."""
-    found = result.get("objective", {})
-    kind = result.get("spectrum", {}).get("type", "such")
+def proofs(outcome: Outcome) -> Iterator[str]:
+    """Yield what is proved of all other experiments."""
+    found = outcome.objective
+    if found is None:
+        return
+    kind = "such" if outcome.spectrum is None else outcome.spectrum.type
     family = f"no {_SHORT.get(kind, kind)} spectrum gets"
-    if "frequency_response" in result and "objective" in result:
+    if outcome.frequency_response is not None:
         family = "no powers of these lines get"
-    if "moments" in result:
-        family = f"no {result['moments']['structure']} moments get"
-    for key, side in (("lower_bound", "below"), ("upper_bound", "above")):
-        if key in found and found.get("relative_gap") != 1.0:  # or else nothing is proved yet
-            gap = _gap(found["relative_gap"]) if "relative_gap" in found else ""
-            yield f"{family} {side} {shown(found[key])}{gap}"
-    side = "above" if objective(found.get("kind")).maximised else "below"
-    for what in ("spectrum", "structure"):
-        if f"any_{what}_bound" in found:
-            whatever = "spectrum at all gets" if what == "spectrum" else "moments at all get"
-            yield f"no {whatever} {side} {shown(found[f'any_{what}_bound'])}"
+    if outcome.moments is not None:
+        family = f"no {outcome.moments.structure} moments get"
+    for bound, side in ((found.lower_bound, "below"), (found.upper_bound, "above")):
+        if bound is not None and found.relative_gap != 1.0:  # 1 stands for "nothing is proved yet"
+            gap = "" if found.relative_gap is None else _gap(found.relative_gap)
+            yield f"{family} {side} {shown(bound)}{gap}"
+    side = "above" if objective(found.kind).maximised else "below"
+    if found.any_spectrum_bound is not None:
+        yield f"no spectrum at all gets {side} {shown(found.any_spectrum_bound)}"
+    if found.any_structure_bound is not None:
+        yield f"no moments at all get {side} {shown(found.any_structure_bound)}"
 
 
 def _clean(value: float, kind: str) -> str:
-    """Seven digits; the logarithm of one (criterion D) is zero, whatever rounding says."""
+    """Seven digits; a logarithm (criterion D) that is zero up to rounding is zero."""
     return shown(0.0 if kind == "D" and abs(value) < 1e-12 else value)
 
 
-def _signal(result: Result) -> Iterator[str]:
+def _signal(outcome: Outcome, signal: Signal) -> Iterator[str]:
     """The samples of the record, and what they attain."""
-    signal = result["signal"]
-    yield f"{signal['samples']} samples"
-    peak, of_u = (enumerated(signal[key]) if signal.get(key) else "" for key in ("peak", "input_peak"))
-    looped = bool(of_u) and of_u != peak  # what excites is then another signal than the input
-    for key in ("power", "peak", "crest_factor"):
-        if signal.get(key):
-            yield f"{spoken(key)}{' of r' * looped} {enumerated(signal[key])}"
-    if looped:
+    yield f"{signal.samples} samples"
+    peak, of_u = (enumerated(values) if values else "" for values in (signal.peak, signal.input_peak))
+    looped = bool(of_u) and of_u != peak  # the excitation is then another signal than the input
+    sizes = {"power": signal.power, "peak": signal.peak, "crest factor": signal.crest_factor}
+    for name, values in sizes.items():
+        if values:
+            yield f"{name}{' of r' * looped} {enumerated(values)}"
+    if looped and signal.output_peak is not None:
         yield f"peak of u {of_u}"
-        yield f"peak of y {enumerated(signal['output_peak'])}"
-    if "mean_squared_error" in signal:
-        yield f"error {signal['mean_squared_error']:.6g} with these samples"
-    if "worst_ratio" in signal:
-        error = "worst_ratio" in result.get("model_error", {})
+        yield f"peak of y {enumerated(signal.output_peak)}"
+    if signal.mean_squared_error is not None:
+        yield f"error {signal.mean_squared_error:.6g} with these samples"
+    if signal.worst_ratio is not None:
+        error = outcome.model_error is not None and outcome.model_error.worst_ratio is not None
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
-        designed = "robust" in result and "missed" not in result["robust"]
-        of = ", at the worst of these plants" if designed else ""
-        yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples{of}"
-    if "confidence" in signal:
-        told = signal["confidence"]
-        kept, of = ("kept", "simulated experiments") if "runs" in told else ("exact", "estimates")
-        yield f"kept by {100 * told[kept]:.1f} % of the {of}"
-    if "criterion" in signal:
-        yield f"criterion {signal['criterion']:.6g} with these samples"
-    yield from _beside_the_design(result.get("objective", {}), signal)
+        of = "" if outcome.robust is None else ", at the worst of these plants"
+        yield f"{ratio} at most {precise(signal.worst_ratio)} with these samples{of}"
+    kept = signal.confidence
+    if kept is not None:
+        share, of = (kept.exact, "estimates") if kept.kept is None else (kept.kept, "simulated experiments")
+        yield f"kept by {100 * share:.1f} % of the {of}"
+    if signal.criterion is not None:
+        yield f"criterion {signal.criterion:.6g} with these samples"
+    yield from _beside_the_design(outcome.objective, signal)
 
 
-def _beside_the_design(found: Mapping[str, Json], signal: Mapping[str, Json]) -> Iterator[str]:
-    """What the samples buy less, where the best was asked for, or what else they cost."""
-    if "efficiency" in signal or found.get("kind") == "accuracy_factor":
-        less = 1.0 - signal.get("efficiency", 1.0)
-        if "worst_ratio" in signal:
-            less = 1.0 - found["value"] / signal["worst_ratio"]
-        if less >= 5e-4:
+def _beside_the_design(found: Objective | None, signal: Signal) -> Iterator[str]:
+    """How much less accurate the samples are than the best spectrum, or how much more they cost."""
+    best = found if found is not None and found.kind == "accuracy_factor" else None
+    if signal.efficiency is not None or best is not None:
+        less = 1.0 - (1.0 if signal.efficiency is None else signal.efficiency)
+        if signal.worst_ratio is not None and found is not None:
+            less = 1.0 - found.value / signal.worst_ratio
+        if less >= _LITTLE_LESS:
             yield f"{per_cent(less)} less accuracy than the design"
         return
-    more = signal.get("extra_power", 0.0)
-    if abs(more) < 5e-5:
-        return
-    side = "above" if more > 0 else "below"
-    yield f"at a cost {per_cent(abs(more))} {side} that of the designed spectrum"
+    more = signal.extra_power or 0.0
+    if abs(more) >= _LITTLE_MORE:
+        side = "above" if more > 0 else "below"
+        yield f"at a cost {per_cent(abs(more))} {side} that of the designed spectrum"

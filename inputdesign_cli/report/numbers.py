@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from inputdesign_cli.outcome.results import Json
-
 BREAK = "\n"  # within a cell: what follows is a remark
 # A line of a table of facts: name, value, and a note that may be empty.
 Fact = tuple[str, str, str]
@@ -20,8 +18,8 @@ class Rows:
     rows: tuple[tuple[str, ...], ...]
 
 
-def shown(value: Json) -> str:
-    """A number with seven digits."""
+def shown(value: object) -> str:
+    """Return a number with seven digits."""
     return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
@@ -30,13 +28,13 @@ def precise(ratio: float) -> str:
     return f"{ratio:.7g}" if ratio > 1.0 + 1e-6 and f"{ratio:.4g}" == "1" else f"{ratio:.4g}"
 
 
-def listed(values: Json) -> str:
-    """A number, or one for each channel, with four digits."""
-    return " ".join(f"{value:.4g}" for value in (values if isinstance(values, list | tuple) else [values]))
+def listed(values: Iterable[float]) -> str:
+    """Return one number for each channel, with four digits."""
+    return " ".join(f"{value:.4g}" for value in values)
 
 
-def enumerated(values: Json) -> str:
-    """The same in a sentence: `1, 2 and 3`."""
+def enumerated(values: Iterable[float]) -> str:
+    """Return numbers as a sentence has them: `1, 2 and 3`."""
     *others, last = listed(values).split(" ")
     return f"{', '.join(others)} and {last}" if others else last
 
@@ -46,6 +44,6 @@ def spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
-def provenance(environment: Mapping[str, Json], more: Iterable[Fact] = ()) -> list[Fact]:
+def provenance(environment: Mapping[str, object], more: Iterable[Fact] = ()) -> list[Fact]:
     """Versions, and what else tells where numbers come from."""
     return [*more, *((name, str(version), "") for name, version in environment.items() if version)]

@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.record import RESULT, unreadable
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.hover import SCRIPT
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-# What a record leads to that somebody else wrote or changed: no schema says what each of its numbers must be.
-_BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 _GENERATOR = b'<meta name="generator" content="idesign '
 
 
@@ -52,29 +48,25 @@ def is_page(file: Path) -> bool:
 
 
 def _filled(
-    template: str, directory: Path, record: str, content_of: Callable[[Path, Trail], dict[str, Json]]
+    template: str, directory: Path, record: str, content_of: Callable[[Path], dict[str, object]]
 ) -> str:
-    """The page about a directory.
+    """Return the page about a directory.
 
-    It carries the SHA-256 of the file `record`, which tells whether it is about what stands beside it.
+    It carries the SHA-256 of the file `record`, so that a reader can see whether it is about what stands
+    beside it, and the date of the record, so that the same run gives the same page.
     """
-    trail = Trail()
     try:
         digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
-        # That of the record, not of the page: the same run gives the same page.
         date = datetime.fromtimestamp((directory / record).stat().st_mtime).strftime("%Y-%m-%d %H:%M")
-        content = content_of(directory, trail)
-        source = directory.name or directory.resolve().name
-        return filled(
-            template, {"source": source, "record": record, "digest": digest, "date": date, **content}
-        )
-    except _BROKEN as error:
-        what = f'"{trail.last}" is' if trail.last else "its entries are"
-        raise unreadable(directory / record, f"{what} not what idesign writes") from error
+        content = content_of(directory)
+    except (OSError, UnicodeDecodeError) as error:
+        raise unreadable(directory / record, str(error)) from error
+    source = directory.name or directory.resolve().name
+    return filled(template, {"source": source, "record": record, "digest": digest, "date": date, **content})
 
 
-def filled(template: str, content: Mapping[str, Json]) -> str:
-    """A template with its content; whatever text comes from a spec or a result is escaped."""
+def filled(template: str, content: Mapping[str, object]) -> str:
+    """Return a template with its content; whatever text comes from a spec or a result is escaped."""
     return _templates().get_template(template).render(version=__version__, hover=_script(), **content)
 
 

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor, InProcess
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.objectives import objective
-from inputdesign_cli.outcome.record import RESULT, unreadable
-from inputdesign_cli.outcome.results import Json, Result
-from inputdesign_cli.outcome.run_directory import read_run
+from inputdesign_cli.outcome.run_directory import read_outcome, read_run
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import run_charts
 from inputdesign_cli.report.evidence import (
@@ -25,7 +24,6 @@ from inputdesign_cli.report.evidence import (
     simulation_table,
 )
 from inputdesign_cli.report.facts import facts, proofs, white
-from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
@@ -44,61 +42,43 @@ _NOT_NUMBERS = frozenset(
     {"format", "title", "files", "environment", "spec_sha256", "asked_sha256", "made_from"}
 )
 _MOST_ENTRIES = 16
-# What these fields of a result are, where it has them: somebody else may have written it.
-_FIELDS = {
-    str: (("title", "status"), "a text"),
-    list: (("requirements", "limits", "notes", "made_from"), "a list"),
-    dict: (
-        (
-            "objective",
-            "power",
-            "model_error",
-            "information",
-            "baseline",
-            "signal",
-            "solver",
-            "timing_s",
-            "environment",
-            "identification",
-            "assessment",
-            "simulation",
-            "robust",
-            "moments",
-            "mean_squared_error",
-        ),
-        "a mapping",
-    ),
-}
 
 
-def run_page(
-    run: Path, trail: Trail, *, pictures: bool = True, painters: Executor | None = None
-) -> dict[str, Json]:
-    """The content of the template for a run, with pictures or not. Raises `DataError` as `read_run` does.
+def run_page(run: Path, *, pictures: bool = True, painters: Executor | None = None) -> dict[str, object]:
+    """Return the content of the template for a run, with pictures or not.
 
     Args:
-        painters: draw the pictures (default: this process).
+        run: its directory.
+        pictures: whether they are drawn.
+        painters: draw them (default: this process).
+
+    Raises:
+        DataError: as `read_run`, and `run-unreadable` where an entry is not what idesign writes.
     """
-    result = trail.follow(read_run(run))
-    _check_fields(run, result)
-    verb = _verb(result)
+    result = read_run(run)
+    outcome = read_outcome(run, result)
+    verb = _verb(outcome)
     text = read_regular(run / "spec.yaml").decode()
     try:
         question = read_question(text, str(run / "spec.yaml"), verb)
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
         raise DataError.because("run-unreadable", message, hint="run the spec again") from error
-    charts = run_charts(run, result, question.time_unit, painters or InProcess()) if pictures else {}
+    charts = (
+        run_charts(run, outcome.provenance.get("files", ()), question.time_unit, painters or InProcess())
+        if pictures
+        else {}
+    )
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
     sections = [(heading, [n for n in names if n in charts]) for heading, names in _SECTIONS]
     sections.append(("Further figures", [name for name in charts if name not in placed]))
-    proved = [f"{text[0].upper()}{text[1:]}." for text in proofs(result)]
+    proved = [f"{text[0].upper()}{text[1:]}." for text in proofs(outcome)]
     shown = [(h, names) for h, names in sections if names or (h == "The certificate" and proved)]
-    estimated, simulated = estimate_table(result), simulation_table(result)
-    cited, assumed = citations(question, result), assumptions(question, result)
-    status = str(result.get("assessment", {}).get("top_up_status") or result.get("status", ""))
+    estimated, simulated = estimate_table(outcome), simulation_table(outcome.simulation)
+    cited, assumed = citations(question, outcome), assumptions(question, outcome)
+    top_up = None if outcome.assessment is None else outcome.assessment.top_up_status
     return {
         "title": question.title or run.resolve().name,
         "contents": [
@@ -113,34 +93,34 @@ def run_page(
             "All numbers",
         ],
         "question": question.sentences,
-        "answer": " ".join([_answer(verb, result), *simulation_answer(result)]),
-        "notes": result.get("notes", []),
+        "answer": " ".join([_answer(verb, outcome), *simulation_answer(outcome)]),
+        "notes": outcome.notes or (),
         "estimate": estimated,
-        "estimate_facts": list(estimate_facts(result)),
-        "verdicts": requirement_table(result, question.time_unit),
+        "estimate_facts": list(estimate_facts(outcome)),
+        "verdicts": requirement_table(outcome, question.time_unit),
         "data_figures": data,
         "facts": [
-            ("status", status, ""),
-            *((name, text, "") for name, text in campaign_facts(result)),
-            *facts(result, question.time_unit),
+            ("status", top_up or outcome.status or "", ""),
+            *((name, text, "") for name, text in campaign_facts(outcome)),
+            *facts(outcome, question.time_unit),
             ("units", question.units, ""),
         ],
         "charts": charts,
         "sections": shown,
         "proofs": proved,
         "simulation": simulated,
-        "simulated_runs": result.get("simulation", {}).get("runs"),
+        "simulated_runs": None if outcome.simulation is None else outcome.simulation.runs,
         "run_charts": runs,
         "assumptions": assumed,
-        "command": _command(verb, result),
-        "explored": "exploration" in result,
+        "command": _command(verb, outcome),
+        "explored": outcome.exploration is not None,
         "campaign": verb == "campaign",
-        "files": _data_files(result),
+        "files": _data_files(outcome),
         "spec": text,
         "provenance": provenance(
-            result.get("environment", {}),
+            _environment(outcome),
             [
-                ("SHA-256 of spec.yaml", str(result.get("spec_sha256", "")), ""),
+                ("SHA-256 of spec.yaml", str(outcome.provenance.get("spec_sha256", "")), ""),
                 ("seed of the signal", str(question.seed), ""),
             ],
         ),
@@ -149,78 +129,78 @@ def run_page(
     }
 
 
-def _check_fields(run: Path, result: Result) -> None:
-    """Raise `DataError` (`run-unreadable`) that names the first field which is missing or not of its kind."""
-    if "spec_sha256" not in result:  # every run has it, of whatever kind
-        raise unreadable(run / RESULT, 'it has no "spec_sha256"')
-    for kind, (names, called) in _FIELDS.items():
-        for name in names:
-            if not isinstance(result.get(name, kind()), kind):
-                raise unreadable(run / RESULT, f'"{name}" is not {called}')
-
-
-def _verb(result: Result) -> str:
-    if "campaign" in result:
+def _verb(outcome: Outcome) -> str:
+    if outcome.campaign is not None:
         return "campaign"
-    if "assessment" in result:
+    if outcome.assessment is not None:
         return "assess"
-    if "identification" in result:
+    if outcome.identification is not None:
         return "identify"
-    if result.get("simulation"):
+    if outcome.simulation is not None:
         return "simulate"
-    return "solve" if "objective" in result else "analyse"
+    return "analyse" if outcome.objective is None else "solve"
 
 
-def _data_files(result: Result) -> list[str]:
+def _environment(outcome: Outcome) -> Mapping[str, object]:
+    found = outcome.provenance.get("environment", {})
+    return found if isinstance(found, Mapping) else {}
+
+
+def _sources(outcome: Outcome) -> list[str]:
+    """The names of the files that the run was made from, the spec first."""
+    found = outcome.provenance.get("made_from", ())
+    return [Path(str(name)).name for name in found] if isinstance(found, list) else []
+
+
+def _data_files(outcome: Outcome) -> list[str]:
     """The names of the records that the run was made from."""
-    return [Path(str(name)).name for name in result.get("made_from", [])[1:]]
+    return _sources(outcome)[1:]
 
 
-def _command(verb: str, result: Result) -> str:
-    """What makes the run again, with the names of the data and what was taken away from them."""
-    if "exploration" in result:
-        names = [Path(str(name)).name for name in result.get("made_from", [])] or ["DATA"]
-        found = result["exploration"]
-        columns = ",".join(f"{role}={column}" for role, column in found.get("channels", {}).items())
+def _command(verb: str, outcome: Outcome) -> str:
+    """Return the command that makes the run again, with its data and what was removed from them."""
+    if outcome.exploration is not None:
+        names = _sources(outcome) or ["DATA"]
+        columns = ",".join(f"{role}={column}" for role, column in outcome.exploration.channels.items())
         return shlex.join(["idesign", "explore", *names, *(["--columns", columns] if columns else [])])
-    if verb not in ("assess", "identify"):
+    found = outcome.identification
+    if verb not in ("assess", "identify") or found is None:
         return f"idesign {verb} spec.yaml"
-    data, found = _data_files(result) or ["DATA"], result["identification"]
+    data = _data_files(outcome) or ["DATA"]
     words = [verb, "spec.yaml", *data] if verb == "assess" else [verb, *data, "--spec", "spec.yaml"]
-    if verb == "identify" and "theta" not in found:
+    if verb == "identify" and found.theta is None:
         words.append("--frequency-response")
-    if found.get("means_removed"):
+    if found.means_removed:
         words.append("--remove-means")
-    elif found.get("operating_point"):
-        levels = [f"{name}={float(level)!r}" for name, level in found["operating_point"].items()]
+    elif found.operating_point:
+        levels = [f"{name}={level!r}" for name, level in found.operating_point.items()]
         words += ["--operating-point", ",".join(levels)]
     return shlex.join(["idesign", *words])
 
 
-def _answer(verb: str, result: Result) -> str:
+def _answer(verb: str, outcome: Outcome) -> str:
     if verb == "campaign":
-        return campaign_answer(result)
-    if "identification" in result:
-        return estimate_answer(result)
-    found = result.get("objective", {})
-    kind, value = found.get("kind", ""), found.get("value")
-    if value is None:
-        ratio = result.get("model_error", {}).get("worst_ratio")
+        return campaign_answer(outcome)
+    if outcome.identification is not None:
+        return estimate_answer(outcome)
+    found = outcome.objective
+    if found is None:
+        ratio = None if outcome.model_error is None else outcome.model_error.worst_ratio
         if ratio is None:
             return "The numbers are below."
         verdict = "within" if ratio <= 1 else "beyond"
         return f"The error of the model stays {verdict} what is admitted: r_u / r_adm is at most {ratio:.5g}."
-    sentence = objective(kind).answer
-    if kind == "shortest_experiment":
-        said = f"{sentence.format(result['samples'])} (as a real number {value:.6g})"
+    sentence = objective(found.kind).answer
+    if found.kind == "shortest_experiment":
+        said = f"{sentence.format(outcome.samples)} (as a real number {found.value:.6g})"
     else:
-        said = sentence.format(f"{value:.6g}")
-    compared = white(result)
+        said = sentence.format(f"{found.value:.6g}")
+    compared = white(outcome)
     return f"{said} ({compared})." if compared else f"{said}."
 
 
-def flat(value: Json, path: str = "") -> list[tuple[str, str]]:
-    """Every entry of a result by its path; of a long list its length only."""
+def flat(value: object, path: str = "") -> list[tuple[str, str]]:
+    """Return every entry of a result by its path; of a long list its length only."""
     if isinstance(value, Mapping):
         if set(value) == {"re", "im"}:
             return [(path, f"{shown(value['re'])} {value['im']:+.7g}i")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.report.question import Question
 
 _LEAST_COSTLY = (
@@ -41,18 +41,18 @@ _PREDICTION_ERROR = (
 )
 
 
-def assumptions(question: Question, result: Result) -> list[str]:
+def assumptions(question: Question, outcome: Outcome) -> list[str]:
     """What the numbers rest on, beyond the arithmetic."""
-    rests = "The design is best" if "objective" in result else "The figures hold"
-    if result.get("frequency_response", {}).get("method"):
+    rests = "The design is best" if outcome.objective is not None else "The figures hold"
+    if outcome.frequency_response is not None and outcome.frequency_response.method:
         said = [
             "The plant is linear and in steady state; the noise is that which the scatter of the data tells."
         ]
-    elif "identification" in result:
+    elif outcome.identification is not None:
         from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."
         chosen = "Orders and delays were chosen by what estimates from one part simulate of the other."
-        said = [chosen if "exploration" in result else from_spec]
-    elif "robust" in result:
+        said = [chosen if outcome.exploration is not None else from_spec]
+    elif outcome.robust is not None:
         said = [
             f"The plant is as the uncertainty of the spec describes it. {rests} for the plants that were "
             "drawn from it or listed; shares of other plants are those of plants drawn in the same way. If "
@@ -63,14 +63,14 @@ def assumptions(question: Question, result: Result) -> list[str]:
             f"The plant and the noise are as the spec has them. {rests} for this nominal system; the "
             "accuracy of a model of another system may differ."
         ]
-    if "worst_ratio" in result.get("model_error", {}):
+    if outcome.model_error is not None and outcome.model_error.worst_ratio is not None:
         first = " and of first order in the parameters" if question.linearised else ""
         said.append(
             "The covariance of the estimate is the asymptotic one of a consistent and efficient estimate; "
             f"r_u is therefore asymptotic in the number of samples{first}."
         )
-    objective = result.get("objective", {})
-    if "lower_bound" in objective or "upper_bound" in objective:
+    found = outcome.objective
+    if found is not None and (found.lower_bound is not None or found.upper_bound is not None):
         said.append(
             "The proved bounds are values of dual points, computed in double precision; they hold to the "
             "rounding of integrals and eigenvalues, and of maxima over frequency sought on a refined grid."
@@ -80,19 +80,19 @@ def assumptions(question: Question, result: Result) -> list[str]:
             "Powers are those that the excitation r adds to the normal operation of the loop; what the noise "
             "causes anyway is not counted."
         )
-    if "worst_ratio" in result.get("signal", {}):
+    if outcome.signal is not None and outcome.signal.worst_ratio is not None:
         said.append(
             "The worst ratio of the signal is computed from the very samples of signal.csv, which start "
             "from rest; the spectrum's own figures hold for a stationary signal of that spectrum."
         )
-    if result.get("solver", {}).get("method") == "lmi":
+    if outcome.solver is not None and outcome.solver.method == "lmi":
         said.append("The accuracy was imposed on a grid of frequencies: between them it may be violated.")
     return said
 
 
-def citations(question: Question, result: Result) -> list[str]:
+def citations(question: Question, outcome: Outcome) -> list[str]:
     """The sources of the methods that were used."""
-    kind = result.get("objective", {}).get("kind")
+    kind = None if outcome.objective is None else outcome.objective.kind
     cited = []
     lines = "frequency_response" in question.asked
     if lines:
@@ -105,9 +105,9 @@ def citations(question: Question, result: Result) -> list[str]:
         cited.append(_MEAN_SQUARED)
     if question.family == "polynomial":
         cited.append(_SPECTRAL)
-    if "risk" in result.get("robust", {}):
+    if outcome.robust is not None and outcome.robust.risk is not None:
         cited += _SCENARIOS
-    if "any_spectrum_bound" in result.get("objective", {}):
+    if outcome.objective is not None and outcome.objective.any_spectrum_bound is not None:
         cited.append(_EQUIVALENCE)
     if not question.regression and not lines:
         cited.append(_PREDICTION_ERROR)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,12 +15,11 @@ from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import bound_of, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
-from inputdesign_cli.outcome.results import Json
-from inputdesign_cli.outcome.run_directory import read_run
+from inputdesign_cli.outcome.run_directory import read_outcome
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, readable_chart
-from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import citations
@@ -36,42 +35,43 @@ _SHOWN = (
 )
 
 
-def sweep_page(root: Path, trail: Trail) -> dict[str, Json]:
-    """The content of the template for a sweep.
+def sweep_page(root: Path) -> dict[str, object]:
+    """Return the content of the template for a sweep.
 
     Raises:
         DataError: as `read_sweep`; `run-unreadable`, what is there of a point does not hold.
     """
     table = read_sweep(root)
     _check_points(table, root)
-    summary = trail.follow(table.summary)
+    summary = table.summary
     columns = [(name, title) for name, title in _columns(table) if any(table.columns.get(name, []))]
     names = [*table.axes, *(name for name, _ in columns)]
     rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]
-    question, result = _first_run(table, root)
+    question, first = _first_run(table, root)
+    cited = citations(question, first) if question else []
     return {
-        "title": summary.get("title") or root.resolve().name,
+        "title": summary.title or root.resolve().name,
         "contents": [
             "The question",
             "The answer",
             "The points",
             *(["Points without a result"] if any(table.columns["code"]) else []),
             "How to reproduce it",
-            *(["Methods"] if question and citations(question, result) else []),
+            *(["Methods"] if cited else []),
         ],
         "question": question.sentences if question else (),
-        "zipped": summary.get("zip", False),
-        "axes": [(axis["key"], _values(axis["values"]), "") for axis in summary["axes"]],
+        "zipped": summary.zip,
+        "axes": [(axis.key, _values(axis.values), "") for axis in summary.axes],
         "answer": _answer(table),
         "charts": list(_charts(table)),
         "header": [*table.axes, *(title for _, title in columns)],
         "rows": rows,
         "left_out": table.rows - len(rows),
         "failures": _failures(table),
-        "verb": summary["verb"],
+        "verb": summary.verb,
         "spec": read_regular(root / "sweep.yaml").decode(),
-        "provenance": provenance(summary.get("environment", {})),
-        "citations": citations(question, result) if question else [],
+        "provenance": provenance(summary.environment or {}),
+        "citations": cited,
     }
 
 
@@ -93,16 +93,16 @@ def _columns(table: SweepTable) -> list[tuple[str, str]]:
     return [("status", "status"), *kinds, *value, *white, *_SHOWN]
 
 
-def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str, Json]]:
-    """The question and the result of the first point that has one: they speak for the others."""
+def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, Outcome]:
+    """Return the question and the result of the first point that has one: they speak for the others."""
     run = next((run for run in table.columns["run"] if run), None)
     if run is None:
-        return None, {}
+        return None, Outcome()
     try:
         text = read_regular(root / run / "spec.yaml").decode()
-        return read_question(text, verb=table.summary["verb"]), read_run(root / run)
+        return read_question(text, verb=table.summary.verb), read_outcome(root / run)
     except (OSError, SpecError, DataError):
-        return None, {}
+        return None, Outcome()
 
 
 def _answer(table: SweepTable) -> str:
@@ -146,7 +146,7 @@ def _failures(table: SweepTable) -> list[tuple[str, str, str]]:
     ]
 
 
-def _values(texts: list[str]) -> str:
+def _values(texts: Sequence[str]) -> str:
     if len(texts) <= 12:
         return ", ".join(texts)
     return f"{', '.join(texts[:3])}, ... {texts[-1]} ({len(texts)} values)"
