@@ -133,15 +133,16 @@ def proceed(
 
 
 def status(directory: CampaignDirectory, json_output: Json = False) -> None:
-    """Tell how a campaign stands: what has been reached, and what comes next."""
+    """Show how a campaign stands: what has been reached, and what comes next."""
+    from inputdesign_cli.outcome import write_plain
     from inputdesign_cli.outcome.text_formats import json_text
     from inputdesign_cli.questions.campaign.memory import read_memory
 
     memory = read_memory(directory)
     if json_output:
-        typer.echo(json_text(dict(memory.campaign)), nl=False)
+        typer.echo(json_text(write_plain(memory.campaign)), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
     from inputdesign_cli.outcome.record import load_result
 
-    typer.echo(summary(load_result(directory), memory.time_unit, []))
+    typer.echo(summary(load_result(directory), memory.campaign.time_unit, []))

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.build import build_planner
+from inputdesign_cli.questions.campaign.plans import Planner
 
 SPEC = """
 title: in parts
@@ -47,9 +48,9 @@ def applied(directory: Path, path: Path, scale: float = 1.0, gain: float = GAIN,
     return written(path, times[-n:], scale * u[-n:], y[-n:])
 
 
-def planner(text: str = SPEC, *overrides: str) -> SpecPlanner:
+def planner(text: str = SPEC, *overrides: str) -> Planner:
     """What plans the parts of a spec."""
-    return SpecPlanner(parse_spec(text, overrides=overrides))
+    return build_planner(parse_spec(text, overrides=overrides))
 
 
 def record(samples: int = 200, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:

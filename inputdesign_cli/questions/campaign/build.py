@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.questions.assessment.build import build_identification
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.questions.assessment.build import ask, build_identification
+from inputdesign_cli.questions.assessment.identify import ModelQuestion
+from inputdesign_cli.questions.building.rebuild import Rebuild
 from inputdesign_cli.questions.building.signal_settings import operating_points
 from inputdesign_cli.questions.building.simulation import build_simulation
-from inputdesign_cli.questions.building.system import record_step
-from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.building.system import build_cost, build_experiment, record_step
+from inputdesign_cli.questions.building.uncertainty import farthest_radius
+from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.rounds import Rounds
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
 from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
@@ -109,13 +116,36 @@ def _check(spec: Spec, stated: Campaign) -> None:
         raise spec.complain("not-supported", f"a campaign does not go with {what}", hint=hint, key=key)
 
 
+def build_planner(spec: Spec) -> Planner:
+    """Return the planner of the parts.
+
+    Raises:
+        SpecError, DataError: see `build_experiment` and `farthest_radius`.
+    """
+    nominal = build_experiment(spec)
+    return Planner(
+        nominal=nominal,
+        farthest=farthest_radius(spec, nominal),
+        cost=build_cost(spec),
+        step=record_step(spec),
+        bounded=spec.limits.bounds_power,
+        seed=spec.signal.seed or 0,
+        designs=Rebuild(spec, build_convex, blocks_of),
+        asked=Rebuild(spec, _asked, blocks_of),
+    )
+
+
+def _asked(spec: Spec) -> Callable[[int, Array], ModelQuestion]:
+    return partial(ask, spec)
+
+
 def build_campaign(spec: Spec) -> CampaignTask:
     """The design of the first plan in one shot, and the study of whole campaigns.
 
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.
     """
-    rules, planner = build_rules(spec), SpecPlanner(spec)
+    rules, planner = build_rules(spec), build_planner(spec)
     design, study = build_convex(spec), build_simulation(spec, planner.nominal)
     truth = planner.nominal.model if study.truth is None else study.truth.model
     loop = planner.nominal.loop if study.truth is None else study.truth.loop
@@ -125,7 +155,7 @@ def build_campaign(spec: Spec) -> CampaignTask:
             planner=planner,
             rules=rules,
             true=replace(planner.nominal, model=truth, loop=loop),
-            step=record_step(spec),
+            step=planner.step,
             cost=study.cost,
             runs=study.runs,
             seed=study.seed,
@@ -142,7 +172,7 @@ def build_rounds(spec: Spec) -> Rounds:
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.
     """
-    rules, planner = build_rules(spec), SpecPlanner(spec)
+    rules, planner = build_rules(spec), build_planner(spec)
     return Rounds(build_identification(spec), planner, rules, operating_points(spec))
 
 

@@ -7,28 +7,21 @@ it looks at is the information, not the error ([anscombe-1952], [chow-robbins-19
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
-from typing import Literal, Protocol
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.identify import ModelQuestion
 
-Kind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 REACHED = 1.0 + 1e-9
 """A ratio no larger than this meets what is asked."""
 # What is left of a part is one of its own where it has more than this share of its samples.
 _REMAINDER = 0.1
-# Of the way from the last estimate that could be built on to one that cannot.
-_SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
 
 @dataclass(frozen=True)
@@ -164,9 +157,9 @@ class Planned:
     take: int
     power: float
     cost: float
-    kind: Kind
+    kind: PlanKind
     capped: bool = False
-    claim: Callable[[], Mapping[str, Json]] | None = field(default=None, compare=False, repr=False)
+    claim: Callable[[], PlanClaim] | None = field(default=None, compare=False, repr=False)
     why: str = ""
     share: float = 1.0
     lead: int = 0
@@ -226,89 +219,6 @@ class Oracle:
     record: float | None = None
 
 
-class Planner(Protocol):
-    """Asks and plans at any estimate."""
-
-    @property
-    def nominal(self) -> Experiment:
-        """The experiment on the plant of the spec, in raw parameters."""
-
-    def radius(self, model: Model) -> float:
-        """Of the farthest pole of the plant, or of its loop; infinite where there is no stable loop."""
-
-    @property
-    def farthest(self) -> float:
-        """The radius beyond which an estimate is not built on."""
-
-    def question(self, model: Model, information: Array) -> ModelQuestion:
-        """What is asked, at a model and in coordinates where the information (k, k) of the data is I.
-
-        Raises:
-            IdesignError: nothing can be asked of this model.
-            LinAlgError: the information is singular.
-        """
-
-    def plan(
-        self,
-        rules: Rules,
-        known: Standing | None,
-        done: int,
-        seed: int,
-        first: float | None,
-        before: Array | None = None,
-    ) -> Planned:
-        """The experiment after so many samples.
-
-        Args:
-            known: None before any data.
-            seed: of the record.
-            first: cost of a sample of the first plan, which the cap is relative to.
-            before: (n, r), what was applied about the operating point and still tells; None for nothing.
-
-        Raises:
-            IdesignError: there is no first one.
-        """
-
-    def cheapest(self, model: Model) -> float:
-        """Cost, summed over the samples, of the spectrum of the design that knows the plant.
-
-        Raises:
-            IdesignError: there is none.
-        """
-
-    def knowing(self, model: Model) -> tuple[float, Array | None]:
-        """That cost, and the record (samples, r) of that design; None where none fits.
-
-        Raises:
-            IdesignError: there is none.
-        """
-
-
-def ratio_of(question: ModelQuestion, information: Array) -> float:
-    """The largest ratio of what is asked at an information (k, k) in its coordinates."""
-    return max(requirement.worst(information).ratio for requirement in question.requirements)
-
-
-def standing(
-    planner: Planner, estimate: Model, informed: Callable[[Model], Array], last: Model
-) -> Standing | None:
-    """What can be built on: the estimate, or the nearest to it on the way from the `last` one.
-
-    None where not even that can be told from the data.
-
-    Args:
-        informed: information (k, k) of the data at a model.
-    """
-    for share in _SHARES:
-        model = estimate if share == 1.0 else estimate.at(last.theta + share * (estimate.theta - last.theta))
-        if not planner.radius(model) <= planner.farthest:
-            continue
-        try:
-            information = informed(model)
-            question = planner.question(model, information)
-            ratio = ratio_of(question, question.information)
-        except (IdesignError, np.linalg.LinAlgError):
-            continue
-        if np.isfinite(ratio):
-            return Standing(model, information, ratio, share)
-    return None
+def power_of(record: Array) -> float:
+    """Return the mean square of all channels (n, r) together."""
+    return float(np.sum(np.mean(record**2, axis=0)))

@@ -15,7 +15,8 @@ from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.outcome.results import Results, typed
 from inputdesign_cli.questions.campaign.outcome import campaigns_curves, campaigns_entry
-from inputdesign_cli.questions.campaign.schedule import Oracle, Planner, Rules, Schedule
+from inputdesign_cli.questions.campaign.plans import Planner
+from inputdesign_cli.questions.campaign.schedule import Oracle, Rules, Schedule
 from inputdesign_cli.questions.campaign.trials import CampaignJob, Ended, energy_of, run_campaigns
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 

@@ -18,7 +18,8 @@ from inputdesign_cli.identification import Estimate, fit_batch, identify, inform
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.neglected import mattering, neglected
-from inputdesign_cli.questions.campaign.schedule import Planner, Rules, Standing, ratio_of, standing
+from inputdesign_cli.questions.campaign.plans import Planner, ratio_of, standing
+from inputdesign_cli.questions.campaign.schedule import Rules, Standing
 
 Ending = Literal["stopped", "missed", "undecided", "unplanned"]
 _SEEDS = 2**31

@@ -169,7 +169,7 @@ def test_every_file_that_decides_is_known_by_its_digest(run, begun, tmp_path):
 
 def test_what_is_told_of_a_changed_signal_mends_it(run, begun, tmp_path):
     appended(begun / "signal.csv")
-    assert "plan_01.csv beside it holds the same samples" in run("status", "c")[2]
+    assert "plan_01.csv in the same directory" in run("status", "c")[2]
     (begun / "signal.csv").write_bytes((begun / "plan_01.csv").read_bytes())
     assert run("status", "c")[0] == 0
 
