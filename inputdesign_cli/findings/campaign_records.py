@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from inputdesign_cli.finding import Finding, FindingKind, Severity
 
 RECORD_WITHOUT_EXCITATION = FindingKind(
@@ -70,23 +72,26 @@ def hardly_followed(
         follows: whether the record may be one of the plan.
         other: the file of a plan that the record follows better.
     """
-    figures = {"plan": plan, "correlation": likeness, "correlation_in_step": spliced}
+    kind = RECORD_FOLLOWS_IN_PART
+    figures: dict[str, object] = {"plan": plan, "correlation": likeness, "in_step": spliced}
     if other is not None:
+        kind = PART_REPEATED
+        figures |= {"other": other}
         message = (
             f"{given} holds {other} once more, not {plan} (correlation {likeness:.2f}). Withdraw it with "
             "--withdraw if it was given by mistake: samples would count twice"
         )
-        return [PART_REPEATED.found(message, where=given, **figures, other=other)]
-    if likeness > like:
+    elif likeness > like:
         return []
-    if not follows:
+    elif not follows:
+        kind = RECORD_UNLIKE_PLAN
         message = (
             f"{given} hardly follows {plan} (correlation {likeness:.2f}). Withdraw it with --withdraw if it "
             "was given by mistake. The estimate uses what was recorded"
         )
-        return [RECORD_UNLIKE_PLAN.found(message, where=given, **figures)]
-    message = (
-        f"{given} follows {plan} only in part: the correlation is {likeness:.2f}, and {spliced:.2f} with "
-        "shifted or lost samples put in place. The estimate uses what was recorded"
-    )
-    return [RECORD_FOLLOWS_IN_PART.found(message, where=given, **figures)]
+    else:
+        message = (
+            f"{given} follows {plan} only in part: the correlation is {likeness:.2f}, and {spliced:.2f} with "
+            "shifted or lost samples put in place. The estimate uses what was recorded"
+        )
+    return [replace(kind.found(message, where=given), figures=figures)]

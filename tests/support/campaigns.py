@@ -57,3 +57,10 @@ def record(samples: int = 200, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """(n, 1), (n, 1): white noise, and what the true plant answers."""
     u = np.random.default_rng(seed).standard_normal(samples)
     return u[:, None], answered(u)[:, None]
+
+
+def found(result: dict, code: str) -> list[dict]:
+    """The findings of a result that have this code; each stands in the notes as well."""
+    listed = [one for one in result.get("findings", []) if one["code"] == code]
+    assert {one["message"] for one in listed} <= set(result.get("notes", []))
+    return listed

@@ -1,4 +1,4 @@
-"""Spec -> how its experiment goes in parts, real ones and simulated ones."""
+"""Build campaigns from a spec, real and simulated ones."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _TENTH, _LONGEST, _CAP = 10, 3, 10.0
 
 
 def build_rules(spec: Spec) -> Rules:
-    """How the campaign of a spec goes.
+    """Return the rules of the campaign of a spec.
 
     Raises:
-        SpecError: it states none, or what this version does not do in parts; `conflicting-keys`.
+        SpecError: there is no campaign, or it is not supported in parts; `conflicting-keys`.
     """
     stated = spec.campaign
     if stated is None:
         raise spec.complain(
             "missing-key",
-            "the spec has no campaign, so that there is one experiment and no parts of it",
-            hint="add campaign: {block: 50}, or design the one with idesign solve",
+            "the spec has no campaign: its experiment has no parts",
+            hint="add campaign: {block: 50}, or design the whole experiment with idesign solve",
             key="campaign",
         )
     _check(spec, stated)
@@ -56,7 +56,7 @@ def build_rules(spec: Spec) -> Rules:
 
 
 def _rate(spec: Spec) -> tuple[float, ...] | None:
-    """The largest move of each input; in a loop it is about u, and nothing is applied to u itself."""
+    """Return the largest move of each input; in a loop it limits u, and the reference is applied."""
     if spec.limits.rate is None or spec.closed_loop:
         return None
     return tuple(np.broadcast_to(np.asarray(spec.limits.rate, dtype=float), (spec.plant.inputs,)).tolist())
@@ -98,7 +98,7 @@ def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
 
 
 def _check(spec: Spec, stated: Campaign) -> None:
-    """Raise `SpecError` (`not-supported`) for what is not done in parts."""
+    """Raise `SpecError` (`not-supported`) for designs that cannot go in parts."""
     what, hint, key = "", "state accuracy.model_error and let the power follow", "campaign"
     accuracy = spec.accuracy
     elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
@@ -140,7 +140,7 @@ def _asked(spec: Spec) -> Callable[[int, Array], ModelQuestion]:
 
 
 def build_campaign(spec: Spec) -> CampaignTask:
-    """The design of the first plan in one shot, and the study of whole campaigns.
+    """Return the design of the whole experiment, and the study of whole campaigns.
 
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.
@@ -167,7 +167,7 @@ def build_campaign(spec: Spec) -> CampaignTask:
 
 
 def build_rounds(spec: Spec) -> Rounds:
-    """What the rounds of a real campaign need.
+    """Return what the rounds of a real campaign need.
 
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.
@@ -177,9 +177,9 @@ def build_rounds(spec: Spec) -> Rounds:
 
 
 def check_applied_in_parts(spec: Spec) -> None:
-    """Raise `SpecError` (`not-supported`) for what a spec asks of its record and no part has."""
+    """Raise `SpecError` (`not-supported`) for keys of `signal` that do not apply to parts."""
     unlike = {
-        "samples": (spec.signal.samples, "campaign.block or campaign.stages have the lengths of parts"),
+        "samples": (spec.signal.samples, "campaign.block or campaign.stages state the lengths of parts"),
         "also": (spec.signal.also, "remove it: signal.csv is the file of a part"),
     }
     for name, (stated, hint) in unlike.items():

@@ -128,7 +128,7 @@ def _read(directory: Path, withdrawing: int | None) -> Memory:
 
 def _possible(campaign: Campaign) -> bool:
     """Return whether the numbers are of a kind that idesign writes."""
-    lengths = [one.samples for one in (*campaign.records, *campaign.plans)]
+    lengths = [record.samples for record in campaign.records] + [plan.samples for plan in campaign.plans]
     sizes = [*(record.energy for record in campaign.records), *(plan.power for plan in campaign.plans)]
     cost = campaign.first_cost
     return (

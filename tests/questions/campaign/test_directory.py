@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.outcome.run_directory import read_run
-from tests.support.campaigns import answered, applied, planned, written
-
-
-def found(result, code):
-    """The findings of a result that have this code; each stands in the notes as well."""
-    listed = [one for one in result.get("findings", []) if one["code"] == code]
-    assert {one["message"] for one in listed} <= set(result.get("notes", []))
-    return listed
+from tests.support.campaigns import answered, applied, found, planned, written
 
 
 def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
