@@ -29,6 +29,28 @@ from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 CampaignDirectory = Annotated[
     Path, typer.Argument(metavar="DIR", help="The directory that idesign campaign wrote.")
 ]
+Recorded = Annotated[
+    Path | None, typer.Argument(metavar="DATA", help="What was recorded of the part that signal.csv was for.")
+]
+Withdraw = Annotated[
+    int | None,
+    typer.Option("--withdraw", metavar="N", min=1, help="Leave out record N from now on; its file stays."),
+]
+AsApplied = Annotated[
+    bool,
+    typer.Option(
+        "--as-applied",
+        help="Take a record of something else than what was planned: at another scale, an earlier plan, "
+        "or none.",
+    ),
+]
+Regardless = Annotated[
+    bool,
+    typer.Option(
+        "--regardless",
+        help="Go on, from now on, where tests of the residuals refute the structure of the model.",
+    ),
+]
 _EXIT = {"running": EXIT_DONE, "stopped": EXIT_DONE, "missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
 
 
@@ -61,31 +83,10 @@ def campaign(
 
 def proceed(
     directory: CampaignDirectory,
-    data: Annotated[
-        Path | None,
-        typer.Argument(metavar="DATA", help="What was recorded of the part that signal.csv was for."),
-    ] = None,
-    withdraw: Annotated[
-        int | None,
-        typer.Option(
-            "--withdraw", metavar="N", min=1, help="Leave out record N from now on; its file stays."
-        ),
-    ] = None,
-    as_applied: Annotated[
-        bool,
-        typer.Option(
-            "--as-applied",
-            help="Take a record of something else than what was planned: at another scale, an earlier plan, "
-            "or none.",
-        ),
-    ] = False,
-    regardless: Annotated[
-        bool,
-        typer.Option(
-            "--regardless",
-            help="Go on, from now on, where tests of the residuals refute the structure of the model.",
-        ),
-    ] = False,
+    data: Recorded = None,
+    withdraw: Withdraw = None,
+    as_applied: AsApplied = False,
+    regardless: Regardless = False,
     columns: Columns = "",
     operating_point: OperatingPoint = "",
     figures: Figures = True,

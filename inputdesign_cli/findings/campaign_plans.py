@@ -15,7 +15,7 @@ PART_WITHOUT_DESIGN = FindingKind(
 PLAN_CAPPED = FindingKind(
     "plan-capped",
     Severity.NOTE,
-    "the plan falls short of what is asked",
+    "the plan misses the accuracy that is asked",
     "A sample may cost at most campaign.power_cap times a sample of the first plan; the default is 10. The "
     "campaign ends after campaign.max_samples. Within these bounds and `limits` no plan meets what is asked.",
     "Raise campaign.power_cap, campaign.max_samples or a limit, or ask for less.",
@@ -69,8 +69,8 @@ def planned_otherwise(
         found.append(PART_WITHOUT_DESIGN.found(message, where=file, why=why))
     if capped:
         message = (
-            f"{file} falls short of what is asked: campaign.power_cap (default: 10 times the first plan) or "
-            "limits allow no more until campaign.max_samples"
+            f"{file} misses the accuracy that is asked: campaign.power_cap (default: 10 times the first "
+            "plan) or limits allow no more until campaign.max_samples"
         )
         found.append(PLAN_CAPPED.found(message, where=file))
     if share < _NEARLY:

@@ -9,7 +9,7 @@ from inputdesign_cli.finding import Finding, FindingKind, Severity
 RECORD_WITHOUT_EXCITATION = FindingKind(
     "record-without-excitation",
     Severity.NOTE,
-    "a record has no column of what was applied",
+    "a record has no column of the reference",
     "In closed loop the plan is a reference, column r. A record without it cannot be compared with its plan. "
     "Its energy is taken from the plan.",
     "Record r as well.",
@@ -37,14 +37,36 @@ RECORD_UNLIKE_PLAN = FindingKind(
     "use what was recorded.",
     "Withdraw the record with --withdraw if it was given by mistake.",
 )
+RECORD_SCALED = FindingKind(
+    "record-scaled",
+    Severity.NOTE,
+    "a part was applied at another scale than planned",
+    "The record follows its plan at another scale. It was taken because of --as-applied. Estimates use what "
+    "was recorded.",
+    "Withdraw the record with --withdraw if a column is in another unit, and give it in the right one.",
+)
+RECORD_WITHDRAWN = FindingKind(
+    "record-withdrawn",
+    Severity.NOTE,
+    "a record does not count any more",
+    "Estimates leave out a withdrawn record. Its samples were applied, so that its length and energy remain "
+    "part of the campaign. Its file stays.",
+    "Nothing.",
+)
 RECORD_FOLLOWS_IN_PART = FindingKind(
     "record-follows-in-part",
     Severity.NOTE,
     "a record follows its plan in part",
-    "The correlation of what was applied with its plan is below 0.9. Lost samples, clipping or rounding are "
+    "The correlation of a record with its plan is below 0.9. Lost samples, clipping or rounding are "
     "possible causes. Estimates use what was recorded.",
     "Compare the columns of the record with the plan.",
 )
+
+
+def withdrawn_record(file: str, number: int) -> list[Finding]:
+    """Return the finding for a record that is withdrawn."""
+    message = f"record {number} ({file}) does not count any more; its samples and energy remain spent"
+    return [RECORD_WITHDRAWN.found(message, where=file, record=number)]
 
 
 def without_excitation(given: str, plan: str) -> list[Finding]:
@@ -62,7 +84,15 @@ def shorter(given: str, plan: str, samples: int, planned: int) -> list[Finding]:
 
 
 def hardly_followed(
-    given: str, plan: str, *, likeness: float, spliced: float, like: float, follows: bool, other: str | None
+    given: str,
+    plan: str,
+    *,
+    likeness: float,
+    spliced: float,
+    like: float,
+    follows: bool,
+    other: str | None,
+    scale: float = 1.0,
 ) -> list[Finding]:
     """Return a finding if what was applied is not the plan that was due.
 
@@ -71,6 +101,7 @@ def hardly_followed(
         like: the correlation from which on a record follows its plan.
         follows: whether the record may be one of the plan.
         other: the file of a plan that the record follows better.
+        scale: at which the plan was applied, if that is not 1 up to chance.
     """
     kind = RECORD_FOLLOWS_IN_PART
     figures: dict[str, object] = {"plan": plan, "correlation": likeness, "in_step": spliced}
@@ -81,6 +112,10 @@ def hardly_followed(
             f"{given} holds {other} once more, not {plan} (correlation {likeness:.2f}). Withdraw it with "
             "--withdraw if it was given by mistake: samples would count twice"
         )
+    elif scale != 1.0 and abs(likeness) > like:
+        kind = RECORD_SCALED
+        figures |= {"scale": scale}
+        message = f"{given} was applied at {scale:.4g} times the scale of {plan}"
     elif likeness > like:
         return []
     elif not follows:

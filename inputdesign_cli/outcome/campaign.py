@@ -55,7 +55,7 @@ class PlannedPart:
         samples: of the part; `planned_samples`: of the whole plan.
         power: mean square of the plan; `part_power`: of the part.
         cost: of a sample of the design; `part_cost`: of a sample of the part.
-        capped: whether the plan falls short of what is asked.
+        capped: whether the plan misses the accuracy that is asked.
         offset: levels that the excitation varies about.
         why: the reason why there is no design.
     """

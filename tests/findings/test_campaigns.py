@@ -44,6 +44,14 @@ def test_a_record_that_is_taken_may_follow_its_plan_or_not(likeness, follows, ot
         assert one.figures.get("other") == other
 
 
+def test_a_scale_is_named_where_the_plan_is_followed():
+    given = {"spliced": 0.99, "like": 0.9, "follows": True, "other": None, "scale": 0.5}
+    (scaled,) = hardly_followed("r.csv", "plan_02.csv", likeness=0.99, **given)
+    assert (scaled.code, scaled.figures["scale"]) == ("record-scaled", 0.5)
+    (turned,) = hardly_followed("r.csv", "plan_02.csv", likeness=-0.99, **given)
+    assert turned.code == "record-scaled"
+
+
 def test_a_complete_record_is_not_shorter():
     assert shorter("r.csv", "plan_01.csv", 60, 60) == []
     (one,) = shorter("r.csv", "plan_01.csv", 59, 60)

@@ -61,6 +61,7 @@ def accepted(
         like=LIKE,
         follows=match.follows,
         other=other,
+        scale=match.scale if match.off else 1.0,
     )
     findings += shorter(given.name, due.file, samples, due.samples)
     record = PartRecord(

@@ -16,6 +16,7 @@ from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.campaign_estimates import campaign_refuted
 from inputdesign_cli.findings.campaign_plans import planned_otherwise
+from inputdesign_cli.findings.campaign_records import withdrawn_record
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
@@ -103,7 +104,8 @@ def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
         )
     records[number - 1] = replace(records[number - 1], withdrawn=True)
     campaign = replace(memory.campaign, records=tuple(records))
-    return _again(decide, memory, campaign, dict(memory.files), Outcome())
+    said = Outcome().saying(withdrawn_record(records[number - 1].file, number))
+    return _again(decide, memory, campaign, dict(memory.files), said)
 
 
 def _again(

@@ -106,7 +106,7 @@ class Planner:
             done: samples that have been applied.
             seed: of the record.
             first: cost of a sample of the first plan, which the cap is relative to.
-            before: (n, r), what was applied about the operating point; None for nothing.
+            before: (n, r), applied so far about the operating point; None before any.
 
         Raises:
             IdesignError: there is no first plan.

@@ -100,7 +100,7 @@ class Decision:
 
     Attributes:
         plan: the next part; None at the end.
-        part: its samples as they are applied, with their times.
+        part: its samples and their times for signal.csv.
         seed: of its record.
         offsets: (r,) the levels that they vary about.
     """
@@ -120,7 +120,7 @@ class Part:
 
     Attributes:
         table: times, inputs, outputs and, in a loop, the reference.
-        excitation: (n, r), what was applied; None where the file has no column of it.
+        excitation: (n, r), u or the reference; None if the file has no column of it.
         rows: (n,), the numbers of the samples from the first one on; samples without values are left out.
         of_loop: whether the excitation is the reference of a loop.
     """
@@ -133,7 +133,7 @@ class Part:
 
     @property
     def samples(self) -> int:
-        """How many were applied, to the last that is known."""
+        """Number of samples that were applied, up to the last known one."""
         return int(self.rows[-1]) + 1
 
 
@@ -182,13 +182,13 @@ def _judged(task: Rounds, past: Past) -> Judgement:
 
 
 def _refuted(task: Rounds, found: Identified, past: Past) -> bool:
-    """Whether tests refute the structure, and nobody wants to go on; faults of measurement can be mended."""
+    """Return whether tests refute the structure; faulty measurements can be mended, and users may go on."""
     asked = not past.regardless and task.rules.refuted(found.estimate)
     return asked and not mismeasured(task.identification, found)
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
-    """A record of the user's, as it is kept.
+    """Read a record of the user.
 
     Raises:
         DataError: the file cannot be used.
@@ -207,14 +207,14 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
 
 
 def _numbered(time: Array) -> NDArray[np.int64]:
-    """(n,): the times (n,) counted in samples from the first."""
+    """Return times (n,) as numbers of samples from the first."""
     if time.size < 2:
         return np.zeros(time.size, dtype=np.int64)
     return np.rint((time - time[0]) / np.median(np.diff(time))).astype(np.int64)
 
 
 def _part(task: Rounds, plan: Planned, done: int) -> Table:
-    """signal.csv of a part: its times go on where those of the last part end."""
+    """Return signal.csv of a part; its times continue the times of the last part."""
     units = task.identification.header.units
     applied = plan.applied + task.offsets
     time_of = units.sample_time * np.arange(done, done + len(applied), dtype=np.float64)
@@ -231,7 +231,7 @@ def _found(task: Rounds, records: Sequence[Path]) -> Identified:
 
 
 def continued(data: Data, step: float) -> Data:
-    """The same, files whose times go on where those of the file before end taken as one record.
+    """Join files whose times continue the times of the file before into one record.
 
     Args:
         step: the sample time.

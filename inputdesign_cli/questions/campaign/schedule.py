@@ -143,7 +143,7 @@ class Planned:
         record: (rest, r) about the operating point, of which `take` samples are applied.
         power: of the record; `cost`: of a sample of the design at the estimate.
         kind: the purpose; a `stopgap` is white noise if there is no design.
-        capped: whether it falls short of what is asked, by the cap or by limits.
+        capped: whether the cap or limits make it miss the accuracy that is asked.
         claim: returns what is proved of the design; None for white noise.
         why: the reason why there is no design.
         share: of its power that the next part has, which would cost more than the cap otherwise.

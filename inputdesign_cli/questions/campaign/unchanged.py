@@ -22,8 +22,7 @@ _DIGESTS = "digests"
 def digests(campaign: Campaign, files: Mapping[str, bytes]) -> dict[str, str]:
     """Return SHA-256 of each file that decisions rest on, and of the decisions themselves.
 
-    Digests of records stay as they are: a record that was withdrawn may have changed since. Plans may be
-    made anew.
+    A record keeps its digest: one that was withdrawn may have changed since. Plans may be made anew.
     """
     found = {name: _sha256(content) for name, content in files.items() if _READ.fullmatch(name)}
     records = {name: digest for name, digest in (campaign.digests or {}).items() if name.startswith("record")}

@@ -65,8 +65,9 @@ def test_a_withdrawn_record_does_not_count_and_stays(run, begun, tmp_path):
         run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--no-figures")
     before = read_run(begun)["campaign"]
     code, out, _ = run("next", "c", "--withdraw", 2, "--json", "--no-figures")
-    after = json.loads(out)["campaign"]
-    assert code == 0
+    result = json.loads(out)
+    after, (gone,) = result["campaign"], found(result, "record-withdrawn")
+    assert (code, gone["where"], gone["figures"]) == (0, "record_02.csv", {"record": 2})
     assert after["rounds"][-1]["records"] == [1]
     # It was applied: its samples and its energy are spent.
     assert after["rounds"][-1]["samples"] == before["rounds"][-1]["samples"]
@@ -84,7 +85,9 @@ def test_a_record_at_another_scale_is_refused(run, begun, tmp_path, scale):
     assert code == 2
     assert "record-other-scale" in err
     assert f"{scale:g} times" in err
-    assert run("next", "c", record, "--as-applied", "--no-figures")[0] == 0
+    code, out, _ = run("next", "c", record, "--as-applied", "--no-figures", "--json")
+    (scaled,) = found(json.loads(out), "record-scaled")
+    assert (code, scaled["figures"]["scale"]) == (0, pytest.approx(scale, rel=1e-6))
 
 
 @pytest.mark.parametrize("missing", [0, 4])
