@@ -17,8 +17,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from inputdesign_cli import load_spec, parse_spec
-from inputdesign_cli.questions.campaign.build import build_campaign
-from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.build import build_campaign, build_planner
 from inputdesign_cli.questions.campaign.outcome import way_entry
 from inputdesign_cli.questions.campaign.study import oracle_of, tried, ways_of
 from inputdesign_cli.specification import Spec
@@ -75,7 +74,7 @@ def spec_of(case: Case) -> Spec:
     if case.wrong:
         block = f"simulation={{plant: {json.dumps(truth.content['plant'])}}}"
         return parse_spec(case.text + COMMON, overrides=[case.wrong, block, f"campaign={case.campaign}"])
-    planner = SpecPlanner(truth)
+    planner = build_planner(truth)
     power = ENERGY * planner.cheapest(planner.nominal.model) / SAMPLES
     pilot = f"campaign={{block: 50, pilot: {{samples: {SAMPLES}, power: {power!r}}}}}"
     return parse_spec(case.text + COMMON, overrides=[pilot])

@@ -29,6 +29,28 @@ from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 CampaignDirectory = Annotated[
     Path, typer.Argument(metavar="DIR", help="The directory that idesign campaign wrote.")
 ]
+Recorded = Annotated[
+    Path | None, typer.Argument(metavar="DATA", help="What was recorded of the part that signal.csv was for.")
+]
+Withdraw = Annotated[
+    int | None,
+    typer.Option("--withdraw", metavar="N", min=1, help="Leave out record N from now on; its file stays."),
+]
+AsApplied = Annotated[
+    bool,
+    typer.Option(
+        "--as-applied",
+        help="Take a record of something else than what was planned: at another scale, an earlier plan, "
+        "or none.",
+    ),
+]
+Regardless = Annotated[
+    bool,
+    typer.Option(
+        "--regardless",
+        help="Go on, from now on, where tests of the residuals refute the structure of the model.",
+    ),
+]
 _EXIT = {"running": EXIT_DONE, "stopped": EXIT_DONE, "missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
 
 
@@ -61,31 +83,10 @@ def campaign(
 
 def proceed(
     directory: CampaignDirectory,
-    data: Annotated[
-        Path | None,
-        typer.Argument(metavar="DATA", help="What was recorded of the part that signal.csv was for."),
-    ] = None,
-    withdraw: Annotated[
-        int | None,
-        typer.Option(
-            "--withdraw", metavar="N", min=1, help="Leave out record N from now on; its file stays."
-        ),
-    ] = None,
-    as_applied: Annotated[
-        bool,
-        typer.Option(
-            "--as-applied",
-            help="Take a record of something else than what was planned: at another scale, an earlier plan, "
-            "or none.",
-        ),
-    ] = False,
-    regardless: Annotated[
-        bool,
-        typer.Option(
-            "--regardless",
-            help="Go on, from now on, where tests of the residuals refute the structure of the model.",
-        ),
-    ] = False,
+    data: Recorded = None,
+    withdraw: Withdraw = None,
+    as_applied: AsApplied = False,
+    regardless: Regardless = False,
     columns: Columns = "",
     operating_point: OperatingPoint = "",
     figures: Figures = True,
@@ -136,15 +137,16 @@ def proceed(
 
 
 def status(directory: CampaignDirectory, json_output: Json = False) -> None:
-    """Tell how a campaign stands: what has been reached, and what comes next."""
+    """Show how a campaign stands: what has been reached, and what comes next."""
+    from inputdesign_cli.outcome import write_plain
     from inputdesign_cli.outcome.text_formats import json_text
     from inputdesign_cli.questions.campaign.memory import read_memory
 
     memory = read_memory(directory)
     if json_output:
-        typer.echo(json_text(dict(memory.campaign)), nl=False)
+        typer.echo(json_text(write_plain(memory.campaign)), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
     from inputdesign_cli.outcome.run_directory import read_outcome
 
-    typer.echo(summary(read_outcome(directory), memory.time_unit, []))
+    typer.echo(summary(read_outcome(directory), memory.campaign.time_unit, []))

@@ -1,56 +1,89 @@
-"""What is said of a campaign: its records and rounds."""
+"""What is said of a campaign: its records, its rounds and its plans.
+
+A directory of an older version lacks some keys. These fields are None then.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from inputdesign_cli.outcome.codec import others
+from inputdesign_cli.outcome.design import Objective, Spectrum
+
+State = Literal["running", "stopped", "missed", "undecided"]
+PlanKind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 
 
 @dataclass(frozen=True)
 class PartRecord:
-    """A record that was brought: of which plan, and whether it counts."""
+    """A record of a part, compared with its plan.
+
+    Attributes:
+        file: its name in the directory; `given`: the name of the user's file.
+        samples: that were applied; `plan`: the file of the plan.
+        energy: cost of these samples.
+        likeness: correlation with the plan; `scale`: at which the plan was applied.
+    """
 
     file: str
     given: str
     samples: int
     plan: str
     withdrawn: bool
-    energy: float | None = None
+    energy: float
     likeness: float | None = None
     scale: float | None = None
     details: Mapping[str, object] = others()
 
 
 @dataclass(frozen=True)
+class PlanClaim:
+    """What is proved of the design behind a plan."""
+
+    status: str
+    objective: Objective
+    spectrum: Spectrum
+
+
+@dataclass(frozen=True)
 class PlannedPart:
-    """The next part: samples to apply of those that are planned, its power and cost, and why it is so."""
+    """A part to be applied.
+
+    Attributes:
+        samples: of the part; `planned_samples`: of the whole plan.
+        power: mean square of the plan; `part_power`: of the part.
+        cost: of a sample of the design; `part_cost`: of a sample of the part.
+        capped: whether the plan misses the accuracy that is asked.
+        offset: levels that the excitation varies about.
+        why: the reason why there is no design.
+    """
 
     file: str
     samples: int
-    planned_samples: int
     power: float
-    part_power: float
-    cost: float
-    part_cost: float
-    kind: str
-    capped: bool
-    seed: int
     offset: tuple[float, ...]
-    design: Mapping[str, object] | None = None
+    planned_samples: int | None = None
+    part_power: float | None = None
+    cost: float | None = None
+    part_cost: float | None = None
+    kind: PlanKind | None = None
+    capped: bool | None = None
+    seed: int | None = None
+    design: PlanClaim | None = None
     why: str | None = None
     details: Mapping[str, object] = others()
 
 
 @dataclass(frozen=True)
 class Round:
-    """What was decided after some records, and at which estimate."""
+    """A decision after some records, with the estimate that it rests on."""
 
     samples: int
     energy: float
     records: tuple[int, ...]
-    state: str
+    state: State
     estimate: Mapping[str, float] | None = None
     standard_deviation: Mapping[str, float] | None = None
     worst_ratio: float | None = None
@@ -59,13 +92,44 @@ class Round:
     details: Mapping[str, object] = others()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """The records and decisions of an experiment in parts."""
+    """The records and decisions of an experiment in parts.
 
-    state: str
-    records: tuple[PartRecord, ...]
-    rounds: tuple[Round, ...]
+    Attributes:
+        version: of the form of the directory.
+        folder: from the directory to where file names in the spec start.
+        last: the last estimate that was built on, by the names of the parameters.
+        first_cost: of a sample of the first design.
+        digests: SHA-256 of the files that decisions are made by, and of the decisions.
+        regardless: whether to go on although tests refute the structure.
+    """
+
+    version: int
+    time_unit: str
+    folder: str
+    state: State
     samples: int | None = None
     max_samples: int | None = None
+    records: tuple[PartRecord, ...]
+    rounds: tuple[Round, ...]
+    last: Mapping[str, float] | None = None
+    first_cost: float | None = None
+    digests: Mapping[str, str] | None = None
+    regardless: bool | None = None
     details: Mapping[str, object] = others()
+
+    @property
+    def done(self) -> int:
+        """Samples that have been applied, in records that count or not."""
+        return sum(record.samples for record in self.records)
+
+    @property
+    def plan(self) -> PlannedPart | None:
+        """The part that is due; None if the campaign has ended."""
+        return self.rounds[-1].plan
+
+    @property
+    def plans(self) -> tuple[PlannedPart, ...]:
+        """Every plan, in order."""
+        return tuple(one.plan for one in self.rounds if one.plan is not None)

@@ -11,10 +11,10 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.identification import identify, information_of_data
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.campaign.build import build_campaign, build_rules
-from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.build import build_campaign, build_planner, build_rules
+from inputdesign_cli.questions.campaign.plans import ratio_of, standing
 from inputdesign_cli.questions.campaign.rounds import continued
-from inputdesign_cli.questions.campaign.schedule import Schedule, Standing, ratio_of, standing
+from inputdesign_cli.questions.campaign.schedule import Schedule, Standing
 from inputdesign_cli.questions.campaign.study import ways_of
 from inputdesign_cli.tasks.build.data import Data
 from tests.support.campaigns import SPEC, planner, record
@@ -128,10 +128,11 @@ def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
     )
     assert np.allclose(by_hand.signal, plan.record)
     # What is kept of the plan is what the result says, with its bound.
-    told, kept = by_hand.result, plan.claim()
-    assert kept["objective"]["lower_bound"] == pytest.approx(told["objective"]["lower_bound"], rel=1e-9)
-    assert kept["objective"]["lower_bound"] <= kept["objective"]["value"] * (1 + 1e-9)
-    assert kept["spectrum"]["coefficients"] == pytest.approx(told["spectrum"]["coefficients"], rel=1e-9)
+    wanted, kept = by_hand.outcome, plan.claim()
+    assert kept.objective.lower_bound == pytest.approx(wanted.objective.lower_bound, rel=1e-9)
+    assert kept.objective.lower_bound <= kept.objective.value * (1 + 1e-9)
+    coefficients = [one.spectrum.details["coefficients"] for one in (kept, wanted)]
+    assert coefficients[0] == pytest.approx(coefficients[1], rel=1e-9)
     # The ratio is what the design says of the prior alone.
     question = at.question(model, known.information)
     assert ratio_of(question, question.information) == pytest.approx(known.ratio)
@@ -140,7 +141,7 @@ def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
 def test_a_plan_that_ends_with_its_part_is_made_for_what_the_data_leave_open():
     u, y = record(150)
     spec = parse_spec(SPEC, overrides=["uncertainty={intervals: {b1: [3, 4]}, scenarios: 10, fresh: 0}"])
-    at = SpecPlanner(spec)
+    at = build_planner(spec)
     known = standing(at, at.nominal.model, lambda m: 0.2 * information_of_data(m, u, y), at.nominal.model)
     costs = {}
     for last in ("robust", "nominal"):

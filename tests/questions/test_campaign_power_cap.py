@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.questions.campaign.build import build_rules
-from inputdesign_cli.questions.campaign.schedule import standing
+from inputdesign_cli.questions.campaign.plans import standing
 from tests.support.campaigns import SPEC, planner, record
 
 

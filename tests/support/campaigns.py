@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.campaign.build import build_planner
+from inputdesign_cli.questions.campaign.plans import Planner
 
 SPEC = """
 title: in parts
@@ -47,12 +48,19 @@ def applied(directory: Path, path: Path, scale: float = 1.0, gain: float = GAIN,
     return written(path, times[-n:], scale * u[-n:], y[-n:])
 
 
-def planner(text: str = SPEC, *overrides: str) -> SpecPlanner:
+def planner(text: str = SPEC, *overrides: str) -> Planner:
     """What plans the parts of a spec."""
-    return SpecPlanner(parse_spec(text, overrides=overrides))
+    return build_planner(parse_spec(text, overrides=overrides))
 
 
 def record(samples: int = 200, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """(n, 1), (n, 1): white noise, and what the true plant answers."""
     u = np.random.default_rng(seed).standard_normal(samples)
     return u[:, None], answered(u)[:, None]
+
+
+def found(result: dict, code: str) -> list[dict]:
+    """The findings of a result that have this code; each stands in the notes as well."""
+    listed = [one for one in result.get("findings", []) if one["code"] == code]
+    assert {one["message"] for one in listed} <= set(result.get("notes", []))
+    return listed

@@ -1,16 +1,17 @@
-"""Whether a record is taken for that of the plan which is due, and what is said of it."""
+"""Decide whether a record is taken for the part that is due."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.results import Json
-from inputdesign_cli.outcome.text_formats import csv_rows, read_csv
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.campaign_records import hardly_followed, shorter, without_excitation
+from inputdesign_cli.outcome.campaign import PartRecord, PlannedPart
+from inputdesign_cli.outcome.text_formats import csv_columns
 from inputdesign_cli.questions.campaign.applied import LIKE, UNLIKE, Match, copied, matched, standing_in
 from inputdesign_cli.questions.campaign.memory import Memory
 from inputdesign_cli.questions.campaign.rounds import Part
@@ -19,48 +20,54 @@ from inputdesign_cli.questions.campaign.rounds import Part
 _FEW = 3
 
 
-def accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[dict[str, Json], list[str]]:
-    """What is kept of a record, compared with its plan, and what is to be said of it.
+def accepted(
+    memory: Memory, due: PlannedPart, file: str, given: Path, part: Part, *, unlike: bool
+) -> tuple[PartRecord, list[Finding]]:
+    """Return the entry of a record, compared with the part that is due, and its findings.
+
+    Args:
+        file: its name in the directory; `given`: the file of the user.
+        unlike: whether to take a record of something else.
 
     Raises:
         DataError: `record-copied`, `record-too-long`, `record-other-part`, `record-other-scale`,
             `record-unlike`.
     """
-    plan = memory.plan
-    assert plan is not None
     _check_answers(given, part)
-    if part.samples > plan["samples"]:
+    if part.samples > due.samples:
         raise DataError.because(
             "record-too-long",
-            f"{given.name} has {part.samples} samples, and the plan {plan['file']} has {plan['samples']}",
+            f"{given.name} has {part.samples} samples, and the plan {due.file} has {due.samples}",
             hint="give the samples from the start of the plan to its end; is it the record of another part?",
         )
-    entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
+    power = due.power if due.part_power is None else due.part_power
+    entry = PartRecord(file, given.name, part.samples, due.file, False, part.samples * power)
     if part.excitation is None:
-        told = f"{given.name} has no column r: whether {plan['file']} was applied cannot be told"
-        energy = part.samples * (plan["part_power"] if "part_power" in plan else plan["power"])
-        return entry | {"energy": energy}, [told, *_shorter(given, plan, part.samples)]
-    applied = part.excitation - np.array(plan["offset"], dtype=float)
-    match = _matched(memory, plan, part, part.excitation)
+        ended = shorter(given.name, due.file, part.samples, due.samples)
+        return entry, [*without_excitation(given.name, due.file), *ended]
+    match = _matched(memory, due, part, part.excitation)
     samples = match.begins + part.samples
-    other = _of_another(memory, plan, part, part.excitation, match.likeness)
+    other = _of_another(memory, due, part, part.excitation, match.likeness)
     if not unlike:
-        _check_columns(given, memory, plan, part, part.excitation)
-        _check_applied(given, plan, match, other, loop=part.of_loop)
-    energy = float(np.sum(applied**2)) * samples / len(part.rows)
-    entry |= {"samples": samples, "scale": match.scale} if match.likeness > LIKE else {"samples": samples}
-    entry |= {"energy": energy, "likeness": match.likeness}
-    return entry, [*_noted(plan, match, other), *_shorter(given, plan, samples)]
-
-
-def _shorter(given: Path, plan: Mapping[str, Json], samples: int) -> list[str]:
-    """That the plan was not applied to its end."""
-    if samples == plan["samples"]:
-        return []
-    return [
-        f"{given.name} ends after {samples} of the {plan['samples']} samples of {plan['file']}: the rest is "
-        "planned anew"
-    ]
+        _check_columns(given, memory, due, part, part.excitation)
+        _check_applied(given, due.file, match, other, loop=part.of_loop)
+    energy = float(np.sum((part.excitation - due.offset) ** 2)) * samples / len(part.rows)
+    scale = match.scale if match.likeness > LIKE else None
+    findings = hardly_followed(
+        given.name,
+        due.file,
+        likeness=match.likeness,
+        spliced=match.spliced,
+        like=LIKE,
+        follows=match.follows,
+        other=other,
+        scale=match.scale if match.off else 1.0,
+    )
+    findings += shorter(given.name, due.file, samples, due.samples)
+    record = PartRecord(
+        file, given.name, samples, due.file, False, energy, likeness=match.likeness, scale=scale
+    )
+    return record, findings
 
 
 def _check_answers(given: Path, part: Part) -> None:
@@ -81,44 +88,39 @@ def _check_answers(given: Path, part: Part) -> None:
                 )
 
 
-def _check_columns(
-    given: Path, memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array
-) -> None:
+def _check_columns(given: Path, memory: Memory, due: PlannedPart, part: Part, excitation: Array) -> None:
     """Raise `DataError` (`record-unlike`) where another column than its own is what was planned."""
-    whole, offset = _whole(memory, plan), np.array(plan["offset"], dtype=float)
     own = "r" if part.of_loop else "u"
     others = {name: column for name, column in _signals(part).items() if not name.startswith(own)}
-    found = standing_in(whole[part.rows], excitation - offset, others)
+    found = standing_in(_whole(memory, due)[part.rows], excitation - due.offset, others)
     if found is None:
         return
     channel, name, likeness = found
     raise DataError.because(
         "record-unlike",
-        f"the columns of {given.name} look swapped: {name} follows {plan['file']} as {own}{channel} should "
+        f"the columns of {given.name} look swapped: {name} follows {due.file} as {own}{channel} should "
         f"(correlation {likeness:.2f}), and {own}{channel} does not",
         hint=f"{_renamed(f'{own}{channel}', name)}; if it was really applied so, say --as-applied: the "
-        "estimate goes by what was recorded",
+        "estimate uses what was recorded",
     )
 
 
 def _renamed(applied: str, other: str) -> str:
-    """How to say which column is which; a reference goes by the header alone."""
+    """Return how to name the columns; a reference is known by the header alone."""
     if applied.startswith("r"):
         return "give the columns their right names in the first line of the file"
     return f"say which column is which, --columns {applied}=NAME,{other}=NAME,.."
 
 
 def _signals(part: Part) -> dict[str, Array]:
-    """The columns (m,) of a record without its times."""
+    """Return the columns (m,) of a record without its times."""
     _, *signals = part.table.columns.items()
     return dict(signals)
 
 
-def _check_applied(
-    given: Path, plan: Mapping[str, Json], match: Match, other: str | None, *, loop: bool
-) -> None:
+def _check_applied(given: Path, due: str, match: Match, other: str | None, *, loop: bool) -> None:
     """Raise `DataError` (`record-other-part`, `record-other-scale`, `record-unlike`) for what is no plan."""
-    due, forced = plan["file"], "--as-applied: the estimate goes by what was recorded"
+    forced = "--as-applied: the estimate uses what was recorded"
     if other is not None:
         raise DataError.because(
             "record-other-part",
@@ -126,10 +128,10 @@ def _check_applied(
             hint=f"give the record of {due}; if {other} was really applied once more, say {forced}",
         )
     if match.exchanged is not None:
-        told = ", ".join(f"{k}" for k in match.exchanged)
+        order = ", ".join(f"{k}" for k in match.exchanged)
         raise DataError.because(
             "record-unlike",
-            f"the channels of {given.name} are not in the order of {due}: it holds them as {told}",
+            f"the channels of {given.name} are not in the order of {due}: it holds them as {order}",
             hint="say which column is which channel, --columns u1=NAME,u2=NAME,..; if they were really "
             f"applied so, say {forced}",
         )
@@ -151,52 +153,26 @@ def _check_applied(
         )
 
 
-def _noted(plan: Mapping[str, Json], match: Match, other: str | None) -> list[str]:
-    """What is to be said of a record that is taken."""
-    due, told = plan["file"], f"correlation {match.likeness:.2f}"
-    if other is not None:
-        return [
-            f"what was applied is {other} once more, not {due} ({told}): withdraw the record with --withdraw "
-            "if it was given by mistake, else samples count twice"
-        ]
-    if match.likeness > LIKE:
-        return []
-    if not match.follows:
-        return [
-            f"what was applied is hardly {due} ({told}): withdraw the record with --withdraw if it was given "
-            "by mistake; the estimate goes by what was recorded"
-        ]
-    return [
-        f"what was applied follows {due} only in part ({told}, {match.spliced:.2f} with samples shifted or "
-        "lost): it is taken as recorded"
-    ]
+def _matched(memory: Memory, plan: PlannedPart, part: Part, excitation: Array) -> Match:
+    """Compare what was applied (m, r) with a plan, about its levels."""
+    strongest = max(each.power for each in memory.campaign.plans) ** 0.5
+    return matched(_whole(memory, plan), excitation - plan.offset, part.rows, strongest)
 
 
-def _matched(memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array) -> Match:
-    """How what was applied (m, r) follows a plan, about its levels."""
-    offset, whole = np.array(plan["offset"], dtype=float), _whole(memory, plan)
-    strongest = max(float(each["power"]) for each in _plans(memory)) ** 0.5
-    return matched(whole, excitation - offset, part.rows, strongest)
-
-
-def _whole(memory: Memory, plan: Mapping[str, Json]) -> Array:
-    """(n, r): the samples of a plan about its level."""
-    columns = list(read_csv(memory.directory / plan["file"]).values())[1:]
-    return np.asarray(np.stack(columns, axis=1) - np.array(plan["offset"], dtype=float), dtype=float)
-
-
-def _plans(memory: Memory) -> list[dict[str, Json]]:
-    return [entry["plan"] for entry in memory.campaign["rounds"] if entry.get("plan")]
+def _whole(memory: Memory, plan: PlannedPart) -> Array:
+    """Return the samples (n, r) of a plan about its levels."""
+    columns = list(csv_columns(memory.files[plan.file]).values())[1:]
+    return np.asarray(np.stack(columns, axis=1) - plan.offset, dtype=float)
 
 
 def _of_another(
-    memory: Memory, due: Mapping[str, Json], part: Part, excitation: Array, likeness: float
+    memory: Memory, due: PlannedPart, part: Part, excitation: Array, likeness: float
 ) -> str | None:
-    """The file of another plan that what was applied is, where that is nearer than the one that is due."""
+    """Return the file of another plan that was applied, if it is nearer than the one that is due."""
     found = {
-        plan["file"]: abs(_matched(memory, plan, part, excitation).likeness)
-        for plan in _plans(memory)
-        if plan["file"] != due["file"] and len(csv_rows(memory.files.get(plan["file"], b""))) > part.samples
+        plan.file: abs(_matched(memory, plan, part, excitation).likeness)
+        for plan in memory.campaign.plans
+        if plan.file != due.file and plan.file in memory.files and len(_whole(memory, plan)) >= part.samples
     }
     likest = max(found, key=found.__getitem__, default=None)
     return likest if likest is not None and found[likest] > max(LIKE, abs(likeness)) else None

@@ -1,7 +1,7 @@
-"""What was applied, compared with what was planned: where in the plan a record begins, how far it follows.
+"""Compare a record with its plan: where in the plan the record begins, and how well it follows.
 
-Records are as loggers write them: they begin late or early, some of their samples are lost, actuators clip
-and sensors round. All of that leaves most of a record in step with its plan; another experiment is not.
+Loggers begin late or early and lose samples, actuators clip, sensors round. Most of a record is in step with
+its plan nevertheless; a record of another experiment is not.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 
 LIKE = 0.9
-"""From this correlation on a record follows its plan; below, that is told."""
+"""From this correlation on a record follows its plan; below it there is a finding."""
 UNLIKE = 0.5
 """Below it does not, unless samples are lost or shifted and the rest follows to 0.6."""
 _SPLICED = 0.6
@@ -43,7 +43,7 @@ _MOST = 6
 
 @dataclass(frozen=True)
 class Match:
-    """How a record follows a plan.
+    """The relation of a record to a plan.
 
     Attributes:
         begins: the sample of the plan that the record begins with.
@@ -67,7 +67,7 @@ class Match:
 
 
 def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: float) -> Match:
-    """How a record follows its plan, both about the level that was planned.
+    """Compare a record with its plan, both about the level that was planned.
 
     Args:
         plan: (n, r); `applied`: (m, r), whose `rows` (m,) are counted from its first.
@@ -91,9 +91,9 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
 
 
 def standing_in(plan: Array, applied: Array, others: Mapping[str, Array]) -> tuple[int, str, float] | None:
-    """A channel of a plan, from 1, that another column follows, as planned, and its own does not.
+    """Return a channel of a plan that another column follows instead of its own column.
 
-    With the name of that column and its likeness; None where there is none.
+    Return its number from 1, the name of the column and its correlation; None if there is no such channel.
 
     Args:
         plan, applied: (m, r) both at the samples of the record.
@@ -109,7 +109,7 @@ def standing_in(plan: Array, applied: Array, others: Mapping[str, Array]) -> tup
 
 
 def copied(column: Array, other: Array) -> bool:
-    """Whether a column (m,) is another one, at any scale and about any level."""
+    """Return whether a column (m,) is a copy of `other`, at any scale and about any level."""
     return abs(_correlation(_centred(column), _centred(other))) > 1.0 - _COPY
 
 
@@ -119,7 +119,7 @@ def _far(found: tuple[float, bool]) -> tuple[bool, float]:
 
 
 def likeness(plan: Array, applied: Array) -> float:
-    """The correlation of two signals (m, r), about their means or not, whichever is larger in size."""
+    """Return the correlation of two signals (m, r), about their means or not, whichever is larger in size."""
     return max(_correlation(plan, applied), _correlation(_centred(plan), _centred(applied)), key=abs)
 
 
@@ -133,7 +133,7 @@ def _correlation(plan: Array, applied: Array) -> float:
 
 
 def _followed(plan: Array, applied: Array, strongest: float) -> float:
-    """The likeness of one channel (m,); of one that is at rest, whether it was."""
+    """Return the correlation of one channel (m,); 1 or 0 for a channel that should be at rest."""
     if _rms(plan) < _AT_REST * strongest:
         return float(_rms(_centred(applied)) <= _MOVED * strongest)
     return likeness(plan, applied)
@@ -144,7 +144,7 @@ def _rms(signal: Array) -> float:
 
 
 def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
-    """The sample of the plan (n, r) that a record (m, r) of these `rows` begins with, if not the first."""
+    """Return the sample of the plan (n, r) that a record (m, r) of these `rows` begins with."""
 
     def at(start: int) -> float:
         return abs(likeness(plan[start + rows], applied))
@@ -154,10 +154,10 @@ def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
 
 
 def _in_step(plan: Array, applied: Array, places: NDArray[np.int64]) -> tuple[float, Array]:
-    """The correlation where the record (m,) may slip against the plan (n,), by a few samples in all.
+    """Return the correlation if the record (m,) may slip against the plan (n,) by a few samples.
 
-    By dynamic programming over the samples: the state is the slip, and a change of it has its price. Beside
-    it the samples (m,) of the plan that the record follows.
+    Return also the samples (m,) of the plan that the record follows. Dynamic programming over the samples:
+    the state is the slip, and each change of it has a price.
     """
     slips = np.arange(-_SLIPS, _SLIPS + 1)
     padded = np.pad(plan - plan.mean(), _SLIPS + 1)
@@ -180,10 +180,10 @@ def _in_step(plan: Array, applied: Array, places: NDArray[np.int64]) -> tuple[fl
 
 
 def _moves(plan: Array, applied: Array) -> float:
-    """The scale of a plan in a record (m,), in standard deviations, where what is left is coloured noise.
+    """Return the scale of a plan in a record (m,), in standard deviations, if the rest is coloured noise.
 
-    Slow signals that have nothing to do with each other are correlated over a few samples; whitened, by
-    regressions of what is left on its past ([cochrane-orcutt-1949]), they are not.
+    Unrelated slow signals are correlated over a few samples. They are not after whitening by regressions of
+    the residual on its past ([cochrane-orcutt-1949]).
     """
     x, y = _centred(plan), _centred(applied)
     scale, sure = _scaled(x, y)
@@ -195,7 +195,7 @@ def _moves(plan: Array, applied: Array) -> float:
 
 
 def _scaled(plan: Array, applied: Array) -> tuple[float, float]:
-    """The scale of a plan in a record (m,), both about their means, and in its standard deviations."""
+    """Return the scale of a plan in a record (m,), both about their means, and its t-ratio."""
     size = float(np.sum(plan**2))
     if size == 0.0:
         return 0.0, 0.0
@@ -206,12 +206,12 @@ def _scaled(plan: Array, applied: Array) -> tuple[float, float]:
 
 
 def _past(signal: Array) -> Array:
-    """(m - 2, 2): the samples before each of a signal (m,)."""
+    """Return the two samples (m - 2, 2) before each sample of a signal (m,)."""
     return np.column_stack([signal[_COLOUR - k : -k] for k in range(1, _COLOUR + 1)])
 
 
 def _scale(plan: Array, applied: Array) -> tuple[float, bool]:
-    """The scale at which a plan (m,) was applied, and whether samples that are not clipped refute one."""
+    """Return the scale at which a plan (m,) was applied, and whether samples without clipping refute 1."""
     scale = _fitted(plan, applied)[0]
     if abs(likeness(plan, applied)) <= LIKE or not _off(plan, applied):
         return scale, False
@@ -221,7 +221,7 @@ def _scale(plan: Array, applied: Array) -> tuple[float, bool]:
 
 
 def _off(plan: Array, applied: Array) -> bool:
-    """Whether another scale than one explains a record (m,) better than chance does."""
+    """Return whether another scale than one explains a record (m,) better than chance does."""
     scale, rest = _fitted(plan, applied)
     size = float(np.sum(_centred(plan) ** 2)) or float(np.sum(plan**2))
     deviation = np.sqrt(rest / (size * max(len(plan) - 2, 1)))
@@ -230,7 +230,7 @@ def _off(plan: Array, applied: Array) -> bool:
 
 
 def _fitted(plan: Array, applied: Array) -> tuple[float, float]:
-    """The scale of a plan (m,), with a level where that explains more, and the squares that are left."""
+    """Return the scale of a plan (m,), with a level if that explains more, and the sum of squared errors."""
     found = []
     for p, a in ((plan, applied), (_centred(plan), _centred(applied))):
         size = float(np.sum(p**2))
@@ -242,7 +242,7 @@ def _fitted(plan: Array, applied: Array) -> tuple[float, float]:
 
 
 def _exchanged(plan: Array, applied: Array, strongest: float, own: float) -> tuple[int, ...] | None:
-    """Which channels of the record (m, r) follow those of the plan, where another order does so better.
+    """Return the channels of the record (m, r) in the order of the plan; None if their own order fits best.
 
     Args:
         own: the likeness of the channel that follows least in their own order.

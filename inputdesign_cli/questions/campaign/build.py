@@ -1,16 +1,23 @@
-"""Spec -> how its experiment goes in parts, real ones and simulated ones."""
+"""Build campaigns from a spec, real and simulated ones."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.questions.assessment.build import build_identification
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.questions.assessment.build import ask, build_identification
+from inputdesign_cli.questions.assessment.identify import ModelQuestion
+from inputdesign_cli.questions.building.rebuild import Rebuild
 from inputdesign_cli.questions.building.signal_settings import operating_points
 from inputdesign_cli.questions.building.simulation import build_simulation
-from inputdesign_cli.questions.building.system import record_step
-from inputdesign_cli.questions.campaign.build_plans import SpecPlanner
+from inputdesign_cli.questions.building.system import build_cost, build_experiment, record_step
+from inputdesign_cli.questions.building.uncertainty import farthest_radius
+from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.rounds import Rounds
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
 from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
@@ -22,17 +29,17 @@ _TENTH, _LONGEST, _CAP = 10, 3, 10.0
 
 
 def build_rules(spec: Spec) -> Rules:
-    """How the campaign of a spec goes.
+    """Return the rules of the campaign of a spec.
 
     Raises:
-        SpecError: it states none, or what this version does not do in parts; `conflicting-keys`.
+        SpecError: there is no campaign, or it is not supported in parts; `conflicting-keys`.
     """
     stated = spec.campaign
     if stated is None:
         raise spec.complain(
             "missing-key",
-            "the spec has no campaign, so that there is one experiment and no parts of it",
-            hint="add campaign: {block: 50}, or design the one with idesign solve",
+            "the spec has no campaign: its experiment has no parts",
+            hint="add campaign: {block: 50}, or design the whole experiment with idesign solve",
             key="campaign",
         )
     _check(spec, stated)
@@ -49,7 +56,7 @@ def build_rules(spec: Spec) -> Rules:
 
 
 def _rate(spec: Spec) -> tuple[float, ...] | None:
-    """The largest move of each input; in a loop it is about u, and nothing is applied to u itself."""
+    """Return the largest move of each input; in a loop it limits u, and the reference is applied."""
     if spec.limits.rate is None or spec.closed_loop:
         return None
     return tuple(np.broadcast_to(np.asarray(spec.limits.rate, dtype=float), (spec.plant.inputs,)).tolist())
@@ -91,7 +98,7 @@ def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
 
 
 def _check(spec: Spec, stated: Campaign) -> None:
-    """Raise `SpecError` (`not-supported`) for what is not done in parts."""
+    """Raise `SpecError` (`not-supported`) for designs that cannot go in parts."""
     what, hint, key = "", "state accuracy.model_error and let the power follow", "campaign"
     accuracy = spec.accuracy
     elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
@@ -109,13 +116,36 @@ def _check(spec: Spec, stated: Campaign) -> None:
         raise spec.complain("not-supported", f"a campaign does not go with {what}", hint=hint, key=key)
 
 
+def build_planner(spec: Spec) -> Planner:
+    """Return the planner of the parts.
+
+    Raises:
+        SpecError, DataError: see `build_experiment` and `farthest_radius`.
+    """
+    nominal = build_experiment(spec)
+    return Planner(
+        nominal=nominal,
+        farthest=farthest_radius(spec, nominal),
+        cost=build_cost(spec),
+        step=record_step(spec),
+        bounded=spec.limits.bounds_power,
+        seed=spec.signal.seed or 0,
+        designs=Rebuild(spec, build_convex, blocks_of),
+        asked=Rebuild(spec, _asked, blocks_of),
+    )
+
+
+def _asked(spec: Spec) -> Callable[[int, Array], ModelQuestion]:
+    return partial(ask, spec)
+
+
 def build_campaign(spec: Spec) -> CampaignTask:
-    """The design of the first plan in one shot, and the study of whole campaigns.
+    """Return the design of the whole experiment, and the study of whole campaigns.
 
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.
     """
-    rules, planner = build_rules(spec), SpecPlanner(spec)
+    rules, planner = build_rules(spec), build_planner(spec)
     design, study = build_convex(spec), build_simulation(spec, planner.nominal)
     truth = planner.nominal.model if study.truth is None else study.truth.model
     loop = planner.nominal.loop if study.truth is None else study.truth.loop
@@ -125,7 +155,7 @@ def build_campaign(spec: Spec) -> CampaignTask:
             planner=planner,
             rules=rules,
             true=replace(planner.nominal, model=truth, loop=loop),
-            step=record_step(spec),
+            step=planner.step,
             cost=study.cost,
             runs=study.runs,
             seed=study.seed,
@@ -137,19 +167,19 @@ def build_campaign(spec: Spec) -> CampaignTask:
 
 
 def build_rounds(spec: Spec) -> Rounds:
-    """What the rounds of a real campaign need.
+    """Return what the rounds of a real campaign need.
 
     Raises:
         SpecError, DataError: see `build_rules` and the builders of a design.
     """
-    rules, planner = build_rules(spec), SpecPlanner(spec)
+    rules, planner = build_rules(spec), build_planner(spec)
     return Rounds(build_identification(spec), planner, rules, operating_points(spec))
 
 
 def check_applied_in_parts(spec: Spec) -> None:
-    """Raise `SpecError` (`not-supported`) for what a spec asks of its record and no part has."""
+    """Raise `SpecError` (`not-supported`) for keys of `signal` that do not apply to parts."""
     unlike = {
-        "samples": (spec.signal.samples, "campaign.block or campaign.stages have the lengths of parts"),
+        "samples": (spec.signal.samples, "campaign.block or campaign.stages state the lengths of parts"),
         "also": (spec.signal.also, "remove it: signal.csv is the file of a part"),
     }
     for name, (stated, hint) in unlike.items():

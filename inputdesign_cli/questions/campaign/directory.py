@@ -13,13 +13,19 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.outcome.curves import Curves, SignalCurves
-from inputdesign_cli.outcome.results import Json, Results, Table, typed
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.campaign_estimates import campaign_refuted
+from inputdesign_cli.findings.campaign_plans import planned_otherwise
+from inputdesign_cli.findings.campaign_records import withdrawn_record
+from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
+from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.acceptance import accepted
 from inputdesign_cli.questions.campaign.memory import VERSION, Memory
-from inputdesign_cli.questions.campaign.pictures import history
 from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
+from inputdesign_cli.questions.campaign.schedule import Planned, Standing, power_of
 from inputdesign_cli.questions.campaign.unchanged import digests
 from inputdesign_cli.regular_file import read_regular
 
@@ -27,23 +33,24 @@ Decide = Callable[[Past], Decision]
 
 
 def begun(decide: Decide, folder: Path, directory: Path) -> Results:
-    """The first plan.
+    """Return the results with the first plan.
 
     Args:
-        folder: what names of files in the spec start from.
+        folder: what names of files in the spec are relative to.
         directory: where the campaign will be.
     """
-    decision = decide(Past((), 0, None, None, None, 1))
-    campaign: dict[str, Json] = {
-        "version": VERSION,
-        "time_unit": decision.header.units.time_unit,
-        "folder": os.path.relpath(os.path.realpath(folder), os.path.realpath(directory)),
-        "samples": decision.rules.schedule.samples,
-        "max_samples": decision.rules.end,
-        "records": [],
-        "rounds": [],
-    }
-    return _decided(decision, campaign, {})
+    decision = decide(Past())
+    campaign = Campaign(
+        version=VERSION,
+        time_unit=decision.header.units.time_unit,
+        folder=os.path.relpath(os.path.realpath(folder), os.path.realpath(directory)),
+        state="running",
+        samples=decision.rules.schedule.samples,
+        max_samples=decision.rules.end,
+        records=(),
+        rounds=(),
+    )
+    return _decided(decision, campaign, {}, Outcome())
 
 
 def advanced(
@@ -55,10 +62,10 @@ def advanced(
     unlike: bool = False,
     regardless: bool = False,
 ) -> Results:
-    """The next decision, with a new record or with those at hand.
+    """Return the results of the next decision, with a new record or with those at hand.
 
     Args:
-        given: the file of the user, and what was read of it.
+        given: the file of the user; `part`: its content.
         unlike: whether to take a record at another scale than its plan, like another plan, or like none.
         regardless: whether to go on, from now on, where tests refute the structure.
 
@@ -66,89 +73,79 @@ def advanced(
         DataError: `campaign-over`; `data-repeated`, `record-copied`, `record-too-long`, `record-other-part`,
             `record-other-scale`, `record-unlike`; what is wrong with a record.
     """
-    records, files, notes = memory.records, dict(memory.files), list[str]()
+    campaign, files, said = memory.campaign, dict(memory.files), Outcome()
     if given is not None and part is not None:
-        name, text = f"record_{len(records) + 1:02d}", csv_text(part.table)
-        _check_going_on(memory)
-        _check_new(records, files, given, text)
-        entry, of_the_plan = accepted(memory, given, part, unlike=unlike)
+        name, text = f"record_{len(campaign.records) + 1:02d}", csv_text(part.table)
+        due = _due(memory)
+        _check_new(campaign.records, files, given, text)
+        record, findings = accepted(memory, due, f"{name}.csv", given, part, unlike=unlike)
         files[f"{name}.csv"] = text.encode()
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
-        records.append({"file": f"{name}.csv", "given": given.name, **entry})
-        notes = [*part.notes, *of_the_plan]
-    decided = _again(decide, memory, records, files, given=given, regardless=regardless)
-    if not notes:
-        return decided
-    told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
-    return replace(decided, outcome=typed({**decided.result, "notes": list(told)}))
+        campaign = replace(campaign, records=(*campaign.records, record))
+        said = Outcome(notes=part.notes).saying(findings)
+    if regardless:
+        campaign = replace(campaign, regardless=True)
+    return _again(decide, memory, campaign, files, said, given)
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
-    """The decision without a record, whose file stays.
+    """Return the results of the decision without a record, whose file stays.
 
     Raises:
         DataError: `record-unknown`.
     """
-    records = memory.records
-    if not 1 <= number <= len(records) or records[number - 1]["withdrawn"]:
-        left = [str(n + 1) for n, record in enumerate(records) if not record["withdrawn"]]
+    records = list(memory.campaign.records)
+    if not 1 <= number <= len(records) or records[number - 1].withdrawn:
+        left = [str(n) for n, record in enumerate(records, 1) if not record.withdrawn]
         raise DataError.because(
             "record-unknown",
             f"there is no record {number} that could be withdrawn",
-            hint=f"those that count are {', '.join(left)}" if left else "none counts",
+            hint=f"the records that count are {', '.join(left)}" if left else "no record counts",
         )
-    records[number - 1]["withdrawn"] = True
-    return _again(decide, memory, records, dict(memory.files))
+    records[number - 1] = replace(records[number - 1], withdrawn=True)
+    campaign = replace(memory.campaign, records=tuple(records))
+    said = Outcome().saying(withdrawn_record(records[number - 1].file, number))
+    return _again(decide, memory, campaign, dict(memory.files), said)
 
 
 def _again(
     decide: Decide,
     memory: Memory,
-    records: list[dict[str, Json]],
+    campaign: Campaign,
     files: dict[str, bytes],
-    *,
+    said: Outcome,
     given: Path | None = None,
-    regardless: bool = False,
 ) -> Results:
-    counting = [str(record["file"]) for record in records if not record["withdrawn"]]
-    campaign = {**memory.campaign, "records": records}
-    campaign |= {"regardless": True} if regardless else {}
-    last = campaign.get("last")
+    """Decide by all records that count.
+
+    Args:
+        said: notes and findings about a new record, which was `given`.
+    """
+    counting = [record.file for record in campaign.records if not record.withdrawn]
     with _on_disc(files, counting, given) as paths:
         past = Past(
             records=paths,
-            done=sum(int(record["samples"]) for record in records),
-            applied=_applied(files, records),
-            last=None if last is None else np.array(list(last.values()), dtype=float),
-            first_cost=campaign.get("first_cost"),
-            number=len(campaign["rounds"]) + 1,
-            regardless=bool(campaign.get("regardless", False)),
+            done=campaign.done,
+            applied=_applied(files, campaign.records),
+            last=None if campaign.last is None else np.array(list(campaign.last.values()), dtype=float),
+            first_cost=campaign.first_cost,
+            number=len(campaign.rounds) + 1,
+            regardless=bool(campaign.regardless),
         )
         decision = decide(past)
-    if decision.refuted:
-        told = _refuted(memory.directory, records, past.done, decision.rules.end)
-        decision = replace(decision, notes=(told, *decision.notes))
-    results = _decided(decision, campaign, files)
-    return replace(results, outcome=typed({**results.result, "made_from": list(memory.made_from)}))
+    if decision.judged.refuted:
+        every = len(counting) == len(campaign.records)
+        end = decision.rules.end
+        said = said.saying(campaign_refuted(memory.directory, campaign.done, end, counting, every=every))
+    results = _decided(decision, campaign, files, said)
+    provenance = {**results.outcome.provenance, "made_from": list(memory.made_from)}
+    return replace(results, outcome=replace(results.outcome, provenance=provenance))
 
 
-def _refuted(directory: Path, records: Sequence[Mapping[str, Json]], done: int, end: int) -> str:
-    """That a campaign ends before its time, and what to do."""
-    every = all(not record["withdrawn"] for record in records)
-    names = ["record_??.csv"] if every else [r["file"] for r in records if not r["withdrawn"]]
-    listed = " ".join(str(directory / name) for name in names)
-    return (
-        f"the campaign ends after {done} of at most {end} samples: tests of the residuals refute the "
-        "structure of the model (see the other notes), and what it lacks it would lack however long it went "
-        f"on. Look for another one in what has been recorded, `idesign explore {listed}`, and begin another "
-        f"campaign with it. To go on as it is: `idesign next {directory} --regardless`"
-    )
-
-
-def _applied(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
-    """(n, r): what was applied, as it was planned."""
+def _applied(files: Mapping[str, bytes], records: Sequence[PartRecord]) -> Array | None:
+    """Return the planned samples (n, r) that were applied."""
     parts = [
-        np.stack(list(csv_columns(files[record["plan"]]).values())[1:], axis=1)[: int(record["samples"])]
+        np.stack(list(csv_columns(files[record.plan]).values())[1:], axis=1)[: record.samples]
         for record in records
     ]
     return np.concatenate(parts) if parts else None
@@ -156,9 +153,9 @@ def _applied(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) 
 
 @contextmanager
 def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | None) -> Iterator[list[Path]]:
-    """The records that count as files, the new one as well, which is not in the directory yet.
+    """Write the records that count to files; the new one is not in the directory yet.
 
-    What is wrong with the new one is said of the file that was `given`.
+    Errors about the new one name the file that was `given`.
     """
     with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
         paths = [Path(folder) / name for name in names]
@@ -173,7 +170,7 @@ def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | Non
 
 
 def _of_the_campaign(diagnostic: Diagnostic, folder: Path, known: Mapping[str, str]) -> Diagnostic:
-    """A diagnostic that names a record by itself, or as it is known to the user, not by where it was read."""
+    """Return a diagnostic that names the file of the user or of the directory, not the one in `folder`."""
     message = diagnostic.message
     for name, user in known.items():
         message = message.replace(name, user)
@@ -184,98 +181,157 @@ def _of_the_campaign(diagnostic: Diagnostic, folder: Path, known: Mapping[str, s
     return replace(diagnostic, message=message, location=place)
 
 
-def _check_going_on(memory: Memory) -> None:
-    """Raise `DataError` (`campaign-over`) where no part is due."""
-    if memory.state != "running" or memory.plan is None:
+def _due(memory: Memory) -> PlannedPart:
+    """Return the part that is due.
+
+    Raises:
+        DataError: `campaign-over`.
+    """
+    campaign = memory.campaign
+    if campaign.state != "running" or campaign.plan is None:
         raise DataError.because(
             "campaign-over",
-            f"the campaign in {memory.directory} has ended: {memory.state}",
+            f"the campaign in {memory.directory} has ended: {campaign.state}",
             hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; where "
             "tests refute the structure, --regardless without a record goes on as it is",
         )
+    return campaign.plan
 
 
-def _check_new(
-    records: Sequence[Mapping[str, Json]], files: Mapping[str, bytes], given: Path, text: str
-) -> None:
+def _check_new(records: Sequence[PartRecord], files: Mapping[str, bytes], given: Path, text: str) -> None:
     """Raise `DataError` (`data-repeated`) where the same samples have been given before."""
     for record in records:
-        if files[record["file"]] == text.encode():
+        if files[record.file] == text.encode():
             raise DataError.because(
                 "data-repeated",
-                f"{given.name} holds the samples of {record['file']}, given as {record['given']}",
-                hint="give each record once"
-                + (": it was withdrawn, and stays so" if record["withdrawn"] else ""),
+                f"{given.name} holds the samples of {record.file}, given as {record.given}",
+                hint="give each record once" + (" (this one stays withdrawn)" if record.withdrawn else ""),
             )
 
 
-def _decided(decision: Decision, campaign: Mapping[str, Json], files: dict[str, bytes]) -> Results:
-    """The directory after a decision."""
-    number = len(campaign["records"]) + 1
-    plan, stands = decision.plan, decision.standing
-    done = sum(int(record["samples"]) for record in campaign["records"])
-    energy = sum(float(record["energy"]) for record in campaign["records"])
-    entry: dict[str, Json] = {
-        "samples": done,
-        "energy": energy,
-        "records": [n + 1 for n, record in enumerate(campaign["records"]) if not record["withdrawn"]],
-        "state": decision.state,
-    }
-    assessed = decision.assessed
-    result: dict[str, Json] = {"format": 1, "title": decision.header.title, "timing_s": {}}
+def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], said: Outcome) -> Results:
+    """Return the results of a decision.
+
+    Args:
+        said: notes and findings that come first.
+    """
+    judged, number, header = decision.judged, len(campaign.records), decision.header
     tables: dict[str, Table] = {}
     curves: dict[str, Curves] = {}
-    if assessed is not None:
-        result |= assessed.result
-        tables, curves = dict(assessed.tables), dict(assessed.curves)
-        files[f"model_{number - 1:02d}.yaml"] = assessed.files["model.yaml"]
-    more = dict(campaign)
-    if stands is not None:
-        values = dict(zip(stands.model.names, stands.model.theta.tolist(), strict=True))
-        deviation = np.sqrt(np.diag(np.linalg.inv(stands.information)))
-        entry |= {
-            "estimate": values,
-            "standard_deviation": dict(zip(stands.model.names, deviation.tolist(), strict=True)),
-            "worst_ratio": stands.ratio,
-            "share": stands.share,
-        }
-        if stands.share == 1.0:
-            more["last"] = values
-    if plan is not None and decision.part is not None:
-        files[f"plan_{number:02d}.csv"] = csv_text(decision.part).encode()
-        moved = np.stack(list(decision.part.columns.values())[1:], axis=1) - decision.offsets
-        entry["plan"] = {
-            "file": f"plan_{number:02d}.csv",
-            "samples": plan.take,
-            "planned_samples": len(plan.record),
-            "power": plan.power,
-            "part_power": float(np.sum(np.mean(moved**2, axis=0))),
-            "cost": plan.cost,
-            "part_cost": plan.part_cost,
-            "kind": plan.kind,
-            "capped": plan.capped,
-            "seed": decision.rules.seed_of(len(campaign["rounds"]) + 1),
-            "offset": decision.offsets.tolist(),
-            **({} if plan.claim is None else {"design": plan.claim()}),
-            **({"why": plan.why} if plan.why else {}),
-        }
-        if plan.designed:
-            more.setdefault("first_cost", plan.cost)
-        time, *signals = decision.part.columns.values()
-        names = list(decision.part.columns)[1:]
-        tables["signal"] = decision.part
-        curves["signal"] = SignalCurves(
-            time, {name.split()[0]: x for name, x in zip(names, signals, strict=True)}
-        )
-    more |= {"rounds": [*campaign["rounds"], entry], "state": decision.state}
-    # Those of records stay: one that is withdrawn may not be what it was. Plans may be made anew.
-    kept = {name: digest for name, digest in campaign.get("digests", {}).items() if name.startswith("record")}
-    more["digests"] = digests(more, files) | kept
-    tables["rounds"], progress = history(more["rounds"], decision.rules.end)
-    curves |= progress
-    notes = [*decision.notes, *result.get("notes", [])]
-    result |= {"status": decision.state, "samples": done, "campaign": more}
-    result |= {"notes": notes} if notes else {}
-    return Results(
-        typed(result), decision.header.resolved_spec, decision.header.units.time_unit, tables, curves, files
+    outcome = Outcome(title=header.title, timing_s={})
+    if judged.assessed is not None:
+        assessed = judged.assessed
+        outcome, tables, curves = assessed.outcome, dict(assessed.tables), dict(assessed.curves)
+        files[f"model_{number:02d}.yaml"] = assessed.files["model.yaml"]
+    said = said.saying(judged.findings)
+    entry = Round(
+        samples=campaign.done,
+        energy=sum((record.energy for record in campaign.records), start=0.0),
+        records=tuple(n for n, record in enumerate(campaign.records, 1) if not record.withdrawn),
+        state=decision.judged.state,
     )
+    if judged.standing is not None:
+        entry = _estimated(entry, judged.standing)
+        if judged.standing.share == 1.0:
+            campaign = replace(campaign, last=entry.estimate)
+    plan = decision.plan
+    if plan is not None and decision.part is not None:
+        file = f"plan_{number + 1:02d}.csv"
+        files[file] = csv_text(decision.part).encode()
+        said = said.saying(_of_the_plan(file, plan, decision, campaign.done))
+        entry = replace(entry, plan=_planned(file, plan, decision))
+        if plan.designed and campaign.first_cost is None:
+            campaign = replace(campaign, first_cost=plan.cost)
+        tables["signal"], curves["signal"] = decision.part, _signal(decision.part)
+    campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=judged.state)
+    campaign = replace(campaign, digests=digests(campaign, files))
+    tables["rounds"], progress = history(campaign.rounds, decision.rules.end)
+    notes = tuple(dict.fromkeys([*(said.notes or ()), *(outcome.notes or ())]))
+    findings = (*(said.findings or ()), *(outcome.findings or ()))
+    outcome = replace(
+        outcome,
+        status=judged.state,
+        samples=campaign.done,
+        campaign=campaign,
+        notes=notes or None,
+        findings=findings or None,
+    )
+    time_unit, curves = header.units.time_unit, curves | progress
+    return Results(outcome, header.resolved_spec, time_unit, tables, curves, files)
+
+
+def _estimated(entry: Round, stands: Standing) -> Round:
+    """Return a round with the model that is built on."""
+    names = stands.model.names
+    deviation = np.sqrt(np.diag(np.linalg.inv(stands.information)))
+    return replace(
+        entry,
+        estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
+        standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
+        worst_ratio=stands.ratio,
+        share=stands.share,
+    )
+
+
+def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:
+    return PlannedPart(
+        file=file,
+        samples=plan.take,
+        planned_samples=len(plan.record),
+        power=plan.power,
+        part_power=power_of(plan.applied),
+        cost=plan.cost,
+        part_cost=plan.part_cost,
+        kind=plan.kind,
+        capped=plan.capped,
+        seed=decision.seed,
+        offset=tuple(decision.offsets.tolist()),
+        design=None if plan.claim is None else plan.claim(),
+        why=plan.why or None,
+    )
+
+
+def _of_the_plan(file: str, plan: Planned, decision: Decision, done: int) -> list[Finding]:
+    rules = decision.rules
+    return planned_otherwise(
+        file,
+        why=plan.why,
+        capped=plan.capped,
+        share=plan.share,
+        beyond=plan.beyond,
+        part_cost=plan.part_cost,
+        fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal",
+    )
+
+
+def _signal(part: Table) -> SignalCurves:
+    time, *signals = part.columns.values()
+    names = [name.split()[0] for name in list(part.columns)[1:]]
+    return SignalCurves(time, dict(zip(names, signals, strict=True)))
+
+
+def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]]:
+    """Return rounds.csv, a row for each round with an estimate, and its figures.
+
+    Args:
+        end: samples after which the campaign is over at the latest.
+    """
+    known = [one for one in rounds if one.estimate is not None]
+    samples = np.array([one.samples for one in known], dtype=float)
+    energy = np.array([one.energy for one in known], dtype=float)
+    ratio = np.array([one.worst_ratio for one in known], dtype=float)
+    columns = {"samples": samples, "energy": energy, "worst_ratio": ratio}
+    if not known:
+        return Table(columns), {}
+    estimates = _by_name([one.estimate or {} for one in known])
+    spreads = _by_name([one.standard_deviation or {} for one in known])
+    for name, values in estimates.items():
+        columns |= {name: values, f"sd_{name}": spreads[name]}
+    return Table(columns), {
+        "campaign": CampaignCurves(samples, ratio, energy, end),
+        "estimates": EstimateCurves(samples, estimates, spreads),
+    }
+
+
+def _by_name(rows: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    return {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}

@@ -1,12 +1,12 @@
-"""The directory of a campaign: a run directory that is written whole at every decision.
+"""Read the directory of a campaign, a run directory that is written whole at every decision.
 
     spec.yaml              the campaign as it was begun
     signal.csv             the samples to apply next; gone when the campaign has ended
     plan_01.csv, ..        what was to be applied in every part
     record_01.csv, ..      what was recorded; record_01_as_given.csv is the file of the user
-    model_01.yaml, ..      the estimate after so many records
+    model_01.yaml, ..      the estimate after each record
     .lock                  held by the process that decides
-    result.json            under `campaign` all decisions, and digests of all that they are made by
+    result.json            under `campaign` all decisions, and digests of the files that they rest on
 
 A decision replaces the directory as a run replaces another: whatever kills the writer, it holds the state
 before or after.
@@ -20,14 +20,15 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pydantic import ValidationError
+import numpy as np
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.outcome import OutcomeError, read_plain
+from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC, load_result, unreadable
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
-from inputdesign_cli.questions.campaign.state import Campaign
+from inputdesign_cli.outcome.text_formats import csv_columns
 from inputdesign_cli.questions.campaign.unchanged import check_decisions, check_files
 from inputdesign_cli.regular_file import read_regular
 
@@ -48,48 +49,22 @@ _LOCK = ".lock"
 
 @dataclass(frozen=True)
 class Memory:
-    """What a directory says of its campaign: `campaign` of its result, and the bytes of what is kept."""
+    """The content of a directory: its campaign, and the bytes of plans, records and estimates."""
 
     directory: Path
-    campaign: Mapping[str, Json]
+    campaign: Campaign
     spec: str
-    time_unit: str
     made_from: tuple[str, ...]
     files: Mapping[str, bytes]
 
     @property
-    def state(self) -> str:
-        """`running`, or how it ended."""
-        return str(self.campaign["state"])
-
-    @property
-    def records(self) -> list[dict[str, Json]]:
-        """What was recorded, in order; those that are withdrawn as well."""
-        return [dict(record) for record in self.campaign["records"]]
-
-    @property
-    def counting(self) -> list[Path]:
-        """The files of the records that count."""
-        return [self.directory / record["file"] for record in self.records if not record["withdrawn"]]
-
-    @property
-    def done(self) -> int:
-        """Samples that have been applied."""
-        return sum(int(record["samples"]) for record in self.records)
-
-    @property
-    def plan(self) -> dict[str, Json] | None:
-        """What is to be applied next."""
-        return self.campaign["rounds"][-1].get("plan")
-
-    @property
     def folder(self) -> Path:
-        """What names of files in the spec start from."""
-        return self.directory / self.campaign["folder"]
+        """The folder that names of files in the spec are relative to."""
+        return self.directory / self.campaign.folder
 
 
 def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
-    """What the directory remembers.
+    """Return the campaign in a directory.
 
     Args:
         withdrawing: the number of a record that is about to be left out, whatever has become of it.
@@ -104,7 +79,7 @@ def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
 
 @contextmanager
 def _no_run(directory: Path) -> Iterator[None]:
-    """What a run may do where it is damaged, begin anew, would lose what has been recorded."""
+    """Replace hints to run again, which would lose the records of a campaign."""
     try:
         yield
     except DataError as error:
@@ -127,33 +102,69 @@ def _read(directory: Path, withdrawing: int | None) -> Memory:
     if campaign.get("version") != VERSION:
         raise DataError.because(
             "campaign-version",
-            f"the campaign in {directory} has version {campaign.get('version')}, and this is {VERSION}",
-            hint="go on with the version of idesign that began it, which result.json tells under environment",
+            f"the campaign in {directory} has version {campaign.get('version')}, not {VERSION}",
+            hint="go on with the version of idesign that began it: see environment in result.json",
         )
     names = result.get("files")
+    damaged = unreadable(directory / RESULT, "its campaign is not what idesign writes")
     try:
-        found = Campaign.model_validate(campaign)
-    except ValidationError:
-        found = None
-    if found is None or not isinstance(names, list):
-        raise unreadable(directory / RESULT, "its campaign is not what idesign writes")
+        found = read_plain(Campaign, campaign)
+    except OutcomeError as error:
+        raise damaged from error
+    if not _possible(found) or not isinstance(names, list):
+        raise damaged
     with output_errors(directory):
         kept = [name for name in names if isinstance(name, str) and _KEPT.fullmatch(name)]
         files = {name: read_regular(directory / name) for name in kept}
         applied = [name for name in (SIGNAL,) if name in names]
         others = {name: read_regular(directory / name) for name in (SPEC, *applied)}
     check_files(directory, result, found, files | others, withdrawing)
-    if not found.fits(files):
-        raise unreadable(directory / RESULT, "its campaign does not fit the plans and records beside it")
-    check_decisions(directory, campaign, found)
+    if not _fits(found, files):
+        raise unreadable(directory / RESULT, "its campaign does not fit its plans and records")
+    check_decisions(directory, campaign)
     spec = others[SPEC].decode("utf-8")
     origin = tuple(map(str, result.get("made_from", ())))
-    return Memory(directory, campaign, spec, str(campaign["time_unit"]), origin, files)
+    return Memory(directory, found, spec, origin, files)
+
+
+def _possible(campaign: Campaign) -> bool:
+    """Return whether the numbers are of a kind that idesign writes."""
+    lengths = [record.samples for record in campaign.records] + [plan.samples for plan in campaign.plans]
+    sizes = [*(record.energy for record in campaign.records), *(plan.power for plan in campaign.plans)]
+    cost = campaign.first_cost
+    return (
+        bool(campaign.rounds)
+        and min(lengths, default=1) > 0
+        and min(sizes, default=0.0) >= 0.0
+        and (cost is None or cost > 0.0)
+    )
+
+
+def _fits(campaign: Campaign, files: Mapping[str, bytes]) -> bool:
+    """Return whether all files of the campaign are there, and plans as long as was applied of them."""
+    plans = [(record.plan, record.samples) for record in campaign.records]
+    due = campaign.plan
+    plans += [] if due is None else [(due.file, due.samples)]
+    estimated = [set(one.estimate) for one in campaign.rounds if one.estimate]
+    return (
+        all(record.file in files for record in campaign.records)
+        and all(name in files and _rows(files[name]) >= samples for name, samples in plans)
+        and (campaign.last is None or set(campaign.last) in estimated)
+    )
+
+
+def _rows(content: bytes) -> int:
+    """Return the length of a table of numbers; -1 if it is none."""
+    try:
+        columns = list(csv_columns(content).values())
+    except ValueError:
+        return -1
+    return len(columns[0]) if columns and np.isfinite(columns).all() else -1
 
 
 @contextmanager
 def held(directory: Path) -> Iterator[None]:
-    """Keep other processes from deciding in this directory meanwhile.
+    """Keep other processes from deciding in this directory.
 
     Raises:
         DataError: `run-missing`, `run-unreadable`.

@@ -1,4 +1,4 @@
-"""What `result.json` and the figures say of campaigns that were tried on a simulated true system."""
+"""Results, tables and figures of campaigns that were tried on a simulated true system."""
 
 from __future__ import annotations
 
@@ -9,75 +9,92 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
+from inputdesign_cli.outcome import Simulation
 from inputdesign_cli.outcome.curves import Curves, RatioCurves, TradeCurves
-from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 from inputdesign_cli.questions.campaign.schedule import Oracle
-from inputdesign_cli.questions.campaign.trials import Ended, Ending
+from inputdesign_cli.questions.campaign.trials import Ended, Ending, Reference
 
-_WITHIN = {"true": "within_r_adm_true", "estimate": "within_r_adm_estimate", "design": "within_r_adm"}
 _ENDINGS: tuple[Ending, ...] = ("stopped", "missed", "undecided", "unplanned")
 
 
 def campaigns_entry(
     true: Experiment, ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None, *, runs: int, seed: int
-) -> dict[str, Json]:
-    """`simulation` of `result.json`.
+) -> Simulation:
+    """Return the study.
 
     Args:
-        ways: the runs of the campaign, and of what it is compared with.
-        oracle: what knowing the true plant would cost; None where it cannot be asked.
+        true: the experiment on the true system.
+        ways: the runs of the campaign and of the experiments that it is compared with.
+        oracle: cost of an experiment that knows the true plant; None if there is none.
     """
     model = true.model
-    entry: dict[str, Json] = {
-        "runs": runs,
-        "seed": seed,
-        "samples": true.samples,
-        "true_parameters": dict(zip(model.names, model.theta.tolist(), strict=True)),
-        "true_variance": float(model.covariance[0, 0]) if model.outputs == 1 else model.covariance,
-        "inputs": {name: way_entry(ended, oracle) for name, ended in ways.items()},
-        "numbers": {"way": list(ways), "status": list(_ENDINGS)},
-    }
-    if oracle is not None:
-        entry["oracle_cost"] = oracle.cost / true.samples
-        if oracle.record is not None:
-            entry["oracle_record_cost"] = oracle.record / true.samples
-    return entry
+    record = None if oracle is None else oracle.record
+    return Simulation(
+        runs=runs,
+        seed=seed,
+        samples=true.samples,
+        true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
+        true_variance=float(model.covariance[0, 0])
+        if model.outputs == 1
+        else tuple(map(tuple, model.covariance.tolist())),
+        inputs={name: way_entry(ended, oracle) for name, ended in ways.items()},
+        oracle_cost=None if oracle is None else oracle.cost / true.samples,
+        oracle_record_cost=None if record is None else record / true.samples,
+        others={"numbers": {"way": list(ways), "status": list(_ENDINGS)}},
+    )
 
 
-def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> dict[str, Json]:
-    """What the runs of one way of experimenting gave."""
-    entry: dict[str, Json] = {}
-    for of, name in _WITHIN.items():
-        told = [run.within[of] for run in ended]
-        if any(one is None for one in told):
-            continue
-        kept = sum(map(bool, told))
-        entry[name], entry[f"{name}_limits"] = kept / len(told), list(binomial_limits(kept, len(told)))
+def way_entry(ended: Sequence[Ended], oracle: Oracle | None) -> TriedInput:
+    """Return the results of one way of experimenting."""
+    (true, true_limits), (estimate, estimate_limits), (design, design_limits) = (
+        _within(ended, of) for of in ("true", "estimate", "design")
+    )
     ratios = [run.ratio for run in ended if run.ratio is not None]
-    if ratios:
-        entry["true_ratio"] = _spread(ratios) | {"at_most_one": float(np.mean(np.array(ratios) <= 1.0))}
     energies = np.array([run.energy for run in ended])
-    entry["energy"] = _spread(energies)
-    if oracle is not None and oracle.cost > 0.0:
-        entry["cost_over_oracle"] = _spread(energies / oracle.cost)
-        if oracle.record is not None:
-            entry["cost_over_oracle_record"] = _spread(energies / oracle.record)
-    entry["samples"] = _spread([run.samples for run in ended])
+    known = oracle is not None and oracle.cost > 0.0
     counts = Counter(run.status for run in ended)
-    entry |= {status: counts[status] for status in _ENDINGS}
-    entry["parts"] = {"mean": float(np.mean([run.parts for run in ended]))}
-    entry["shrunk"] = sum(run.shrunk for run in ended)
-    return entry
+    return TriedInput(
+        within_r_adm_true=true,
+        within_r_adm_true_limits=true_limits,
+        within_r_adm_estimate=estimate,
+        within_r_adm_estimate_limits=estimate_limits,
+        within_r_adm=design,
+        within_r_adm_limits=design_limits,
+        true_ratio=_spread(ratios, float(np.mean(np.array(ratios) <= 1.0))) if ratios else None,
+        energy=_spread(energies),
+        cost_over_oracle=_spread(energies / oracle.cost) if oracle is not None and known else None,
+        cost_over_oracle_record=_spread(energies / oracle.record)
+        if oracle is not None and known and oracle.record is not None
+        else None,
+        samples=_spread([run.samples for run in ended]),
+        stopped=counts["stopped"],
+        missed=counts["missed"],
+        undecided=counts["undecided"],
+        unplanned=counts["unplanned"],
+        parts=Spread(float(np.mean([run.parts for run in ended]))),
+        shrunk=sum(run.shrunk for run in ended),
+    )
 
 
-def _spread(values: Sequence[float] | np.ndarray) -> dict[str, Json]:
-    return {"mean": float(np.mean(values)), "quantile_95": float(np.quantile(values, 0.95))}
+def _within(ended: Sequence[Ended], of: Reference) -> tuple[float | None, Limits | None]:
+    """Return the share of runs within r_adm, with its limits; None if some run cannot be judged."""
+    judged = [run.within[of] for run in ended]
+    if None in judged:
+        return None, None
+    kept = sum(map(bool, judged))
+    return kept / len(judged), binomial_limits(kept, len(judged))
+
+
+def _spread(values: Sequence[float] | np.ndarray, at_most_one: float | None = None) -> Spread:
+    return Spread(float(np.mean(values)), float(np.quantile(values, 0.95)), at_most_one)
 
 
 def campaigns_curves(
     ways: Mapping[str, Sequence[Ended]], oracle: Oracle | None
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """campaigns.csv with a row for each run, the true ratios, and cost against coverage."""
+    """Return campaigns.csv with a row for each run, the true ratios, and cost against coverage."""
     ratios = {name: [run.ratio for run in ended if run.ratio is not None] for name, ended in ways.items()}
     curves: dict[str, Curves] = {}
     if any(ratios.values()):
@@ -97,9 +114,9 @@ def campaigns_curves(
 
 
 def _table(ways: Mapping[str, Sequence[Ended]]) -> Table:
-    """A row for each run; ways and endings by their numbers, of which the result has the names.
+    """Return a row for each run; the result has the names of the numbers of ways and endings.
 
-    Without the true ratios where some run has none, as where the true system has another structure.
+    The true ratios are left out if some run has none, for instance if the true system has another structure.
     """
     rows = [(way, run) for way, ended in enumerate(ways.values()) for run in ended]
 

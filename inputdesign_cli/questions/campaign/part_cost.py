@@ -1,4 +1,4 @@
-"""What a part of a campaign costs a sample, at a plant that still moves from the parts before it."""
+"""Evaluate the cost of a part at a plant that still moves from earlier parts."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def within_caps(
     step: float,
     before: Array,
 ) -> Planned:
-    """The plan whose first part costs no more a sample than the cap at each of several plants.
+    """Return the plan with a first part whose samples cost at most the cap at each of several plants.
 
     Args:
-        caps: plants with theirs; the first is that of the plan.
+        caps: plants with their caps; the plan is made for the first plant.
         weights: of the powers; `step`: time between samples in the unit of the experiment's frequencies.
-        before: (m, r), what was applied earlier.
+        before: (m, r), applied earlier.
     """
     costs = [PartCost.of(at, weights, step, before, plan.applied, plan.lead) for at, _ in caps]
     scale = min(cost.within(cap) for cost, (_, cap) in zip(costs, caps, strict=True))
@@ -36,10 +36,11 @@ def within_caps(
 
 @dataclass(frozen=True)
 class PartCost:
-    """left + 2 scale mixed + scale^2 own, where the samples of a part are applied at a scale.
+    """The cost left + 2 scale mixed + scale^2 own of samples that are applied at a scale.
 
     Attributes:
-        own: what the samples cause from rest; `left`: what is there without them; `mixed`: of both.
+        own: cost of the effects of the samples from rest; `left`: of the effects of earlier samples; `mixed`:
+            of their products.
     """
 
     own: float
@@ -56,9 +57,9 @@ class PartCost:
         part: Array,
         fixed: int,
     ) -> PartCost:
-        """That of a part (n, r) after `before` (m, r) from rest; its first `fixed` samples have no scale.
+        """Return the cost of a part (n, r) after `before` (m, r) from rest; `fixed` samples keep scale 1.
 
-        Noise is not counted, as in the cost of a design.
+        Noise does not count, as in the cost of a design.
         """
         whole = np.concatenate([before, part])
         scaled = np.arange(len(whole))[:, None] >= len(before) + fixed
@@ -76,13 +77,13 @@ class PartCost:
         return cls(paid(own, own), paid(own, left), paid(left, left))
 
     def at(self, scale: float) -> float:
-        """A sample at this scale."""
+        """Return the cost of a sample at this scale."""
         return self.left + 2.0 * scale * self.mixed + scale**2 * self.own
 
     def within(self, cap: float) -> float:
-        """The largest scale up to one at which a sample costs no more than `cap`.
+        """Return the largest scale up to one at which a sample costs at most `cap`.
 
-        Where what is left of earlier parts costs more than that by itself, its own samples do not.
+        If effects of earlier parts alone cost more, the own effects of the part keep the cap.
         """
         if self.at(1.0) <= cap:
             return 1.0

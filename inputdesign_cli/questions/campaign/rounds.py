@@ -1,4 +1,4 @@
-"""A round of a real campaign: all records so far in, a decision out: what is applied next, or why no more."""
+"""A round of a real campaign: decide from all records whether to go on, and what to apply next."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.campaign_estimates import campaign_doubted, estimate_not_used, no_estimate_yet
 from inputdesign_cli.identification import information_of_data
+from inputdesign_cli.outcome.campaign import State
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
@@ -26,30 +28,24 @@ from inputdesign_cli.questions.assessment.identify import (
     told,
 )
 from inputdesign_cli.questions.assessment.refutations import contradictions, differences
-from inputdesign_cli.questions.campaign.schedule import Planned, Planner, Rules, Standing, standing
+from inputdesign_cli.questions.campaign.plans import Planner, standing
+from inputdesign_cli.questions.campaign.schedule import Planned, Rules, Standing
 from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 
-State = Literal["running", "stopped", "missed", "undecided"]
-_SPEAK_AGAINST = (
-    "what has been recorded speaks against the model (see the other notes): before more is applied, see "
-    "whether its structure should change; as it stands the campaign would end undecided"
-)
 _ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided": "undecided"}
 # Data that say nothing yet; more of them will.
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
 # Records whose times differ by one sample time, give or take this share of it, are one.
 _CONTINUES = 0.1
-# A part of less than this share of its power is told.
-_NEARLY = 0.9
 
 
 @dataclass(frozen=True)
 class Rounds:
-    """What the rounds of one campaign share.
+    """What all rounds of a campaign need.
 
     Attributes:
-        offsets: (r,) what the excitation varies about.
+        offsets: (r,) the levels that the excitation varies about.
     """
 
     identification: Identification
@@ -60,7 +56,7 @@ class Rounds:
 
 @dataclass(frozen=True)
 class Past:
-    """What has been done.
+    """The campaign so far.
 
     Attributes:
         records: the files that count, each with u and y of a part.
@@ -72,48 +68,60 @@ class Past:
         regardless: whether to go on where tests refute the structure.
     """
 
-    records: Sequence[Path]
-    done: int
-    applied: Array | None
-    last: Array | None
-    first_cost: float | None
-    number: int
+    records: Sequence[Path] = ()
+    done: int = 0
+    applied: Array | None = None
+    last: Array | None = None
+    first_cost: float | None = None
+    number: int = 1
     regardless: bool = False
 
 
 @dataclass(frozen=True)
-class Decision:
-    """What a round comes to.
+class Judgement:
+    """The state of a campaign by its records.
 
     Attributes:
-        standing: what is built on; None while the data say too little.
-        assessed: the estimate and what it says of what is asked; None as long as there is none.
-        plan: the next part; None at the end.
-        part: its samples as they are applied, with their times.
-        offsets: (r,) what they vary about.
-        refuted: whether it ends before its time since tests refute the structure.
+        standing: the model that is built on; None while the data say too little.
+        assessed: the estimate and its accuracy; None as long as there is no estimate.
+        refuted: whether the campaign ends before its time since tests refute the structure.
     """
 
-    header: Header
-    rules: Rules
     state: State
-    standing: Standing | None
-    assessed: Results | None
-    plan: Planned | None
-    part: Table | None
-    offsets: Array
-    notes: tuple[str, ...]
+    standing: Standing | None = None
+    assessed: Results | None = None
+    findings: tuple[Finding, ...] = ()
     refuted: bool = False
 
 
 @dataclass(frozen=True)
-class Part:
-    """What was recorded of a part.
+class Decision:
+    """The outcome of a round.
 
     Attributes:
-        table: times, inputs, outputs and, in a loop, the reference as they are kept.
-        excitation: (n, r), what was applied; None where the file does not tell it.
-        rows: (n,), the numbers of the samples from the first one on; those without values are left out.
+        plan: the next part; None at the end.
+        part: its samples and their times for signal.csv.
+        seed: of its record.
+        offsets: (r,) the levels that they vary about.
+    """
+
+    header: Header
+    rules: Rules
+    judged: Judgement
+    offsets: Array
+    seed: int
+    plan: Planned | None = None
+    part: Table | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """A record of a part.
+
+    Attributes:
+        table: times, inputs, outputs and, in a loop, the reference.
+        excitation: (n, r), u or the reference; None if the file has no column of it.
+        rows: (n,), the numbers of the samples from the first one on; samples without values are left out.
         of_loop: whether the excitation is the reference of a loop.
     """
 
@@ -125,66 +133,62 @@ class Part:
 
     @property
     def samples(self) -> int:
-        """How many were applied, to the last that is known."""
+        """Number of samples that were applied, up to the last known one."""
         return int(self.rows[-1]) + 1
 
 
 def decide(task: Rounds, past: Past) -> Decision:
-    """Estimate all records jointly, judge, and plan what is left.
+    """Estimate all records jointly, judge, and plan the next part.
 
     Raises:
         DataError: a record cannot be used.
         IdesignError: nothing can be planned.
     """
-    header = task.identification.header
-    notes: list[str] = []
-    assessed, stands, state, refuted = None, None, _running(task, past), False
-    if past.records:
-        started = time.perf_counter()
-        try:
-            found = _found(task, past.records)
-        except DataError as error:
-            if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
-                raise
-            notes.append(f"no estimate yet: {told(error)}")
-        else:
-            assessment = judge(task.identification, found, started, first=past.last is None)
-            assessed, stands = assessment.results, _standing(task, found, past)
-            notes += _shrunk(found, stands)
-            looks = task.rules.schedule.looks
-            other = [
-                *differences(found.estimate, [name for name, _ in found.data.files], looks),
-                *contradictions(found.estimate, looks),
-            ]
-            met = stands is not None and stands.met
-            if other:
-                state = "undecided"
-            elif task.rules.over(past.done, met=met):
-                state = _ENDED[assessment.verdict]
-            elif _refuted(task, found, past):
-                state, refuted = "undecided", True
-            elif assessment.verdict == "undecided":
-                notes.append(_SPEAK_AGAINST)
-    if state != "running":
-        return Decision(
-            header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes), refuted
-        )
+    judged, seed = _judged(task, past), task.rules.seed_of(past.number)
+    decision = Decision(task.identification.header, task.rules, judged, task.offsets, seed)
+    if judged.state != "running":
+        return decision
     before = None if past.applied is None else past.applied - task.offsets
-    seed = task.rules.seed_of(past.number)
-    plan = task.planner.plan(task.rules, stands, past.done, seed, past.first_cost, before)
-    part = _part(task, plan, past.done)
-    more = _of_the_plan(plan, task, past)
-    return Decision(header, task.rules, state, stands, assessed, plan, part, task.offsets, (*notes, *more))
+    plan = task.planner.plan(task.rules, judged.standing, past.done, seed, past.first_cost, before)
+    return replace(decision, plan=plan, part=_part(task, plan, past.done))
+
+
+def _judged(task: Rounds, past: Past) -> Judgement:
+    state: State = "missed" if past.done >= task.rules.end else "running"
+    if not past.records:
+        return Judgement(state)
+    started = time.perf_counter()
+    try:
+        found = _found(task, past.records)
+    except DataError as error:
+        if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
+            raise
+        return Judgement(state, findings=tuple(no_estimate_yet(told(error))))
+    assessment = judge(task.identification, found, started, first=past.last is None)
+    stands = _standing(task, found, past)
+    findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
+    refuted, looks = False, task.rules.schedule.looks
+    if differences(found.estimate, [name for name, _ in found.data.files], looks) or contradictions(
+        found.estimate, looks
+    ):
+        state = "undecided"
+    elif task.rules.over(past.done, met=stands is not None and stands.met):
+        state = _ENDED[assessment.verdict]
+    elif _refuted(task, found, past):
+        state, refuted = "undecided", True
+    elif assessment.verdict == "undecided":
+        findings += campaign_doubted()
+    return Judgement(state, stands, assessment.results, tuple(findings), refuted)
 
 
 def _refuted(task: Rounds, found: Identified, past: Past) -> bool:
-    """Whether tests refute the structure, and nobody wants to go on; faults of measurement can be mended."""
+    """Return whether tests refute the structure; faulty measurements can be mended, and users may go on."""
     asked = not past.regardless and task.rules.refuted(found.estimate)
     return asked and not mismeasured(task.identification, found)
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
-    """A record of the user's, as it is kept.
+    """Read a record of the user.
 
     Raises:
         DataError: the file cannot be used.
@@ -203,24 +207,19 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
 
 
 def _numbered(time: Array) -> NDArray[np.int64]:
-    """(n,): the times (n,) counted in samples from the first."""
+    """Return times (n,) as numbers of samples from the first."""
     if time.size < 2:
         return np.zeros(time.size, dtype=np.int64)
     return np.rint((time - time[0]) / np.median(np.diff(time))).astype(np.int64)
 
 
 def _part(task: Rounds, plan: Planned, done: int) -> Table:
-    """signal.csv of a part: its times go on where those of the last part end."""
+    """Return signal.csv of a part; its times continue the times of the last part."""
     units = task.identification.header.units
     applied = plan.applied + task.offsets
     time_of = units.sample_time * np.arange(done, done + len(applied), dtype=np.float64)
     columns = {units.header(name): values for name, values in zip(units.excitations, applied.T, strict=True)}
     return Table({units.time_header: time_of, **columns})
-
-
-def _running(task: Rounds, past: Past) -> State:
-    """Before the data are looked at: whether anything more may be applied."""
-    return "missed" if past.done >= task.rules.end else "running"
 
 
 def _found(task: Rounds, records: Sequence[Path]) -> Identified:
@@ -232,7 +231,7 @@ def _found(task: Rounds, records: Sequence[Path]) -> Identified:
 
 
 def continued(data: Data, step: float) -> Data:
-    """The same, files whose times go on where those of the file before end taken as one record.
+    """Join files whose times continue the times of the file before into one record.
 
     Args:
         step: the sample time.
@@ -264,45 +263,3 @@ def _standing(task: Rounds, found: Identified, past: Past) -> Standing | None:
     return standing(
         task.planner, found.model, informed, nominal if past.last is None else nominal.at(past.last)
     )
-
-
-def _shrunk(found: Identified, stands: Standing | None) -> list[str]:
-    """A note where the estimate is not built on as it is."""
-    if stands is None:
-        return ["nothing can be asked of this estimate, nor of any on the way from the last one"]
-    if stands.share == 1.0:
-        return []
-    why = found.unasked or "its poles are too near to the unit circle, or outside"
-    return [
-        f"the estimate is not built on as it is ({why}): the plan is made at {100 * stands.share:.0f} % of "
-        "the way to it from the last one, and the data decide nothing yet"
-    ]
-
-
-def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
-    notes = []
-    if plan.why:
-        notes.append(
-            f"there is no design at this estimate ({plan.why}): the next part is white noise at the cost of "
-            "the first plan, or of the pilot, and the estimate after it decides"
-        )
-    if plan.capped:
-        notes.append(
-            "the plan falls short of what is asked: campaign.power_cap (10 times the cost of a sample of the "
-            "first plan, if it is not stated) or limits leave no more until campaign.max_samples"
-        )
-    if plan.share < _NEARLY:
-        share = f"the part has {100 * plan.share:.0f} % of its power"
-        notes.append(
-            f"{share}: it would cost more than campaign.power_cap, at the estimate or the plant of the spec"
-        )
-    if plan.beyond:
-        told = f"a sample of the next part costs {plan.part_cost:.4g}, more than campaign.power_cap allows"
-        notes.append(f"{told}, by what the parts before it have left in the plant")
-    wanted = task.rules.robust_last and task.rules.schedule.last(past.done)
-    if wanted and plan.kind == "nominal":
-        notes.append(
-            "this part is planned for the estimate alone: some plant that the data leave open asks for more "
-            "than campaign.power_cap and limits allow"
-        )
-    return notes

@@ -1,42 +1,35 @@
-"""An experiment in parts: after each part all data are estimated jointly, and what is left is planned anew.
+"""Divide an experiment into parts: after each part the model is estimated again and the rest is planned anew.
 
-A part is an ordinary experiment whose prior is what the data tell by their own samples at the new estimate.
-It stops where that information meets what is asked. Such a rule needs no correction for looking often: what
-it looks at is the information, not the error ([anscombe-1952], [chow-robbins-1965]).
+A part is an ordinary experiment. Its prior is the information of the data by their own samples at the new
+estimate. The experiment stops as soon as that information suffices. This rule needs no correction for
+repeated looks: it looks at the information, not at the error ([anscombe-1952], [chow-robbins-1965]).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
-from typing import Literal, Protocol
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.identify import ModelQuestion
 
-Kind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 REACHED = 1.0 + 1e-9
 """A ratio no larger than this meets what is asked."""
-# What is left of a part is one of its own where it has more than this share of its samples.
+# The rest of a part is a part of its own if it has more than this share of its samples.
 _REMAINDER = 0.1
-# Of the way from the last estimate that could be built on to one that cannot.
-_SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """How an experiment is divided.
+    """The lengths of the parts.
 
     Attributes:
-        parts: samples of the first parts; those that follow have `block`.
+        parts: samples of the first parts; later parts have `block`.
         samples: of the whole experiment as it is planned; `most`: where it ends at the latest.
     """
 
@@ -46,9 +39,9 @@ class Schedule:
     most: int
 
     def take(self, done: int) -> int:
-        """Samples of the part that begins after so many; 0 at the end.
+        """Return the samples of the part that begins after `done` samples; 0 at the end.
 
-        Where a record was shorter than its plan, a remainder that is no part of its own goes with the next.
+        If a record was shorter than its plan, a short remainder goes with the next part.
         """
         ends = zip(accumulate(self.parts), self.parts, strict=True)
         left = [end - done for end, part in ends if end - done > _REMAINDER * part]
@@ -57,12 +50,12 @@ class Schedule:
         return max(min(part, self.most - done), 0)
 
     def rest(self, done: int) -> int:
-        """Samples that the plan of that part is for: those of the whole experiment that are left."""
+        """Return the samples that the plan of that part is for: the rest of the whole experiment."""
         return max(min(self.samples, self.most) - done, self.take(done))
 
     @property
     def looks(self) -> int:
-        """Into how many parts it is divided at most."""
+        """The largest number of parts."""
         done = parts = 0
         while done < self.most:
             done += self.take(done)
@@ -70,13 +63,13 @@ class Schedule:
         return max(parts, 1)
 
     def last(self, done: int) -> bool:
-        """Whether the plan ends with that part."""
+        """Return whether the plan ends with that part."""
         return self.rest(done) <= self.take(done)
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What a campaign may do; see `campaign` of the spec."""
+    """The rules of a campaign; see `campaign` of the spec."""
 
     schedule: Schedule
     pilot_power: float | None = None
@@ -85,16 +78,16 @@ class Rules:
     stops: bool = True
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
-    seed: int = 0  # that the spec states for its signal
+    seed: int = 0  # of the signal, as the spec states it
 
     def seed_of(self, number: int) -> int:
-        """Of the record of the round with this number; each has its own."""
+        """Return the seed of the record of the round with this number; each has its own."""
         if not self.seed:
             return number
         return int(np.random.SeedSequence([self.seed, number]).generate_state(1)[0])
 
     def cap(self, first: float | None) -> float:
-        """Largest cost of a sample, where one of the first plan costs so much; infinite without either."""
+        """Return the largest cost of a sample; `first` is that of the first plan. Infinite without a cap."""
         return np.inf if self.power_cap is None or first is None else self.power_cap * first
 
     @property
@@ -104,31 +97,31 @@ class Rules:
 
     @property
     def learns_first(self) -> bool:
-        """Whether the first plan is made by a record and costs are bounded, so that another must bound it."""
+        """Whether the first plan follows a pilot and costs are bounded, so that a design must bound it."""
         return self.pilot_power is not None and self.power_cap is not None
 
     def over(self, done: int, *, met: bool) -> bool:
-        """Whether nothing more is applied after so many samples."""
+        """Return whether nothing more is applied after `done` samples."""
         return done >= self.end or (met and self.stops)
 
     def refuted(self, estimate: Estimate) -> bool:
-        """Whether it ends since tests refute the structure: what it lacks it would lack for ever.
+        """Return whether the campaign ends since tests refute the structure, which more samples do not mend.
 
-        They are asked after every part, and the parts share their level.
+        The tests are repeated after every part, and the parts share their level.
         """
         return self.stops and bool(estimate.failed_within(self.schedule.looks))
 
 
 @dataclass(frozen=True)
 class Standing:
-    """What is known after some data.
+    """The model that plans are built on, and its accuracy.
 
     Attributes:
-        model: the estimate that is built on.
-        information: (k, k) of the data by their own samples at that estimate, raw parameters.
-        ratio: the largest r_u / r_adm, or of another requirement, there.
-        share: of the way from the last estimate to the new one: below 1 where the new one has no stable loop,
-            or nothing can be asked of it.
+        model: the estimate, or a model on the way to it.
+        information: (k, k) of the data by their own samples at the model, raw parameters.
+        ratio: the largest r_u / r_adm, or of another requirement, at the model.
+        share: of the way from the last estimate to the new one. Below 1 if the new one has no stable loop, or
+            the accuracy cannot be evaluated at it.
     """
 
     model: Model
@@ -138,35 +131,35 @@ class Standing:
 
     @property
     def met(self) -> bool:
-        """Whether the data meet what is asked."""
+        """Whether the data suffice."""
         return self.share == 1.0 and self.ratio <= REACHED
 
 
 @dataclass(frozen=True)
 class Planned:
-    """The experiment for what is left.
+    """A plan for the rest of the experiment.
 
     Attributes:
         record: (rest, r) about the operating point, of which `take` samples are applied.
-        power: of the record, and the `cost` of the design, per sample at the estimate.
-        kind: what it was made for; a `stopgap` is white noise where there is no design.
-        capped: whether it falls short of what is asked, by the cap or by limits.
-        claim: gives what is proved of the design, as in a result; None of white noise.
-        why: there is no design.
-        share: of its power that the next part has, which else would cost more than the cap.
-        lead: samples of the part, the first ones, that only lead from the end of the last one to its start.
-        part_cost: of a sample of the next part, at the plant that it is planned for, with what earlier parts
-            have left in it.
-        beyond: whether that is more than the cap, whatever is applied.
+        power: of the record; `cost`: of a sample of the design at the estimate.
+        kind: the purpose; a `stopgap` is white noise if there is no design.
+        capped: whether the cap or limits make it miss the accuracy that is asked.
+        claim: returns what is proved of the design; None for white noise.
+        why: the reason why there is no design.
+        share: of its power that the next part has, which would cost more than the cap otherwise.
+        lead: first samples of the part, which lead from the end of the last part to the start of the plan.
+        part_cost: of a sample of the next part at the plant that it is planned for, with the effects of
+            earlier parts.
+        beyond: whether `part_cost` exceeds the cap, whatever is applied.
     """
 
     record: Array
     take: int
     power: float
     cost: float
-    kind: Kind
+    kind: PlanKind
     capped: bool = False
-    claim: Callable[[], Mapping[str, Json]] | None = field(default=None, compare=False, repr=False)
+    claim: Callable[[], PlanClaim] | None = field(default=None, compare=False, repr=False)
     why: str = ""
     share: float = 1.0
     lead: int = 0
@@ -184,11 +177,11 @@ class Planned:
         return self.record[: self.take]
 
     def cut(self, take: int) -> Planned:
-        """The same, of which so many samples are applied."""
+        """Return the plan with `take` samples to be applied."""
         return replace(self, take=take)
 
     def following(self, last: Array, rate: Sequence[float] | None) -> Planned:
-        """The same after a part that ended at `last` (r,), with moves of at most `rate` back to its start.
+        """Return the plan after a part that ended at `last` (r,), led back by moves of at most `rate`.
 
         A record starts within one move of zero.
         """
@@ -200,7 +193,7 @@ class Planned:
         return replace(self, record=np.concatenate([ramp, self.record]), lead=len(ramp))
 
     def at_most(self, cost: float) -> Planned:
-        """The same at a smaller power, where a sample would cost more."""
+        """Return the plan at a smaller power if a sample would cost more."""
         if self.cost <= cost * REACHED:
             return self
         share = cost / self.cost
@@ -208,7 +201,7 @@ class Planned:
         return replace(self, record=record, power=self.power * share, cost=cost, capped=True)
 
     def weaker(self, share: float) -> Planned:
-        """The same, whose next part has this share of its power."""
+        """Return the plan with this share of the power of its next part."""
         record = self.record.copy()
         record[self.lead : self.take] *= np.sqrt(share)
         return replace(self, record=record, share=share)
@@ -216,99 +209,16 @@ class Planned:
 
 @dataclass(frozen=True)
 class Oracle:
-    """What an experiment costs whose design knows the true plant, summed over its samples.
+    """The cost of an experiment whose design knows the true plant, summed over its samples.
 
     Attributes:
-        cost: of the spectrum; `record`: of the record that is delivered, on the true plant, None without one.
+        cost: of the spectrum; `record`: of the delivered record on the true plant, None without one.
     """
 
     cost: float
     record: float | None = None
 
 
-class Planner(Protocol):
-    """Asks and plans at any estimate."""
-
-    @property
-    def nominal(self) -> Experiment:
-        """The experiment on the plant of the spec, in raw parameters."""
-
-    def radius(self, model: Model) -> float:
-        """Of the farthest pole of the plant, or of its loop; infinite where there is no stable loop."""
-
-    @property
-    def farthest(self) -> float:
-        """The radius beyond which an estimate is not built on."""
-
-    def question(self, model: Model, information: Array) -> ModelQuestion:
-        """What is asked, at a model and in coordinates where the information (k, k) of the data is I.
-
-        Raises:
-            IdesignError: nothing can be asked of this model.
-            LinAlgError: the information is singular.
-        """
-
-    def plan(
-        self,
-        rules: Rules,
-        known: Standing | None,
-        done: int,
-        seed: int,
-        first: float | None,
-        before: Array | None = None,
-    ) -> Planned:
-        """The experiment after so many samples.
-
-        Args:
-            known: None before any data.
-            seed: of the record.
-            first: cost of a sample of the first plan, which the cap is relative to.
-            before: (n, r), what was applied about the operating point and still tells; None for nothing.
-
-        Raises:
-            IdesignError: there is no first one.
-        """
-
-    def cheapest(self, model: Model) -> float:
-        """Cost, summed over the samples, of the spectrum of the design that knows the plant.
-
-        Raises:
-            IdesignError: there is none.
-        """
-
-    def knowing(self, model: Model) -> tuple[float, Array | None]:
-        """That cost, and the record (samples, r) of that design; None where none fits.
-
-        Raises:
-            IdesignError: there is none.
-        """
-
-
-def ratio_of(question: ModelQuestion, information: Array) -> float:
-    """The largest ratio of what is asked at an information (k, k) in its coordinates."""
-    return max(requirement.worst(information).ratio for requirement in question.requirements)
-
-
-def standing(
-    planner: Planner, estimate: Model, informed: Callable[[Model], Array], last: Model
-) -> Standing | None:
-    """What can be built on: the estimate, or the nearest to it on the way from the `last` one.
-
-    None where not even that can be told from the data.
-
-    Args:
-        informed: information (k, k) of the data at a model.
-    """
-    for share in _SHARES:
-        model = estimate if share == 1.0 else estimate.at(last.theta + share * (estimate.theta - last.theta))
-        if not planner.radius(model) <= planner.farthest:
-            continue
-        try:
-            information = informed(model)
-            question = planner.question(model, information)
-            ratio = ratio_of(question, question.information)
-        except (IdesignError, np.linalg.LinAlgError):
-            continue
-        if np.isfinite(ratio):
-            return Standing(model, information, ratio, share)
-    return None
+def power_of(record: Array) -> float:
+    """Return the mean square of all channels (n, r) together."""
+    return float(np.sum(np.mean(record**2, axis=0)))

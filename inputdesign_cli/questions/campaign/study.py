@@ -1,4 +1,4 @@
-"""Whole campaigns tried many times on the true system, beside experiments in one shot."""
+"""Try whole campaigns many times on the true system, and experiments in one shot."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
-from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions.campaign.outcome import campaigns_curves, campaigns_entry
-from inputdesign_cli.questions.campaign.schedule import Oracle, Planner, Rules, Schedule
+from inputdesign_cli.questions.campaign.plans import Planner
+from inputdesign_cli.questions.campaign.schedule import Oracle, Rules, Schedule
 from inputdesign_cli.questions.campaign.trials import CampaignJob, Ended, energy_of, run_campaigns
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 
 
 @dataclass(frozen=True)
 class CampaignStudy:
-    """How whole campaigns are tried.
+    """A study of whole campaigns.
 
     Attributes:
         true: the experiment on the true system, of the planned length.
         step: time between samples in the unit of the experiment's frequencies.
         cost: weights of the powers.
         white: whether to compare with white excitation that suffices at the estimate.
-        uncertain: whether anything says how far the first estimate may be off.
+        uncertain: whether the spec or a pilot bounds the error of the first estimate.
         has_prior: whether the spec states information that runs would have to draw.
     """
 
@@ -53,11 +54,11 @@ class CampaignTask:
     study: CampaignStudy
 
     def solve(self) -> Results:
-        """The design of the whole experiment at the plant of the spec, see `ConvexTask.solve`."""
+        """Design the whole experiment at the plant of the spec, see `ConvexTask.solve`."""
         return self.design.solve()
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """That design, with whole campaigns and experiments in one shot tried on the true system.
+        """Design, and try whole campaigns and experiments in one shot on the true system.
 
         Raises:
             SpecError: `not-supported` for prior information without data.
@@ -76,7 +77,7 @@ class CampaignTask:
 
 
 def studied(study: CampaignStudy, results: Results, executor: Executor | None) -> Results:
-    """The results with the study added.
+    """Return the results with the study added.
 
     Args:
         executor: where the runs are computed (default: in this process); the result does not depend on it.
@@ -84,20 +85,19 @@ def studied(study: CampaignStudy, results: Results, executor: Executor | None) -
     started = time.perf_counter()
     oracle = oracle_of(study)
     ways = {name: tried(study, rules, executor) for name, rules in ways_of(study).items()}
-    result = dict(results.result)
-    result["simulation"] = campaigns_entry(study.true, ways, oracle, runs=study.runs, seed=study.seed)
-    result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
+    simulation = campaigns_entry(study.true, ways, oracle, runs=study.runs, seed=study.seed)
+    timing = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - started}
     tables, curves = campaigns_curves(ways, oracle)
     return replace(
         results,
-        outcome=typed(result),
+        outcome=replace(results.outcome, simulation=simulation, timing_s=timing),
         tables={**results.tables, **tables},
         curves={**results.curves, **curves},
     )
 
 
 def oracle_of(study: CampaignStudy) -> Oracle | None:
-    """What knowing the plant would cost; None where the true system cannot be asked what the spec asks."""
+    """Return the cost of an experiment that knows the plant; None if the true plant has no design."""
     try:
         cost, record = study.planner.knowing(study.true.model)
     except IdesignError:
@@ -107,7 +107,7 @@ def oracle_of(study: CampaignStudy) -> Oracle | None:
 
 
 def ways_of(study: CampaignStudy) -> dict[str, Rules]:
-    """The campaign, and the same length in one shot after the pilot, if that is white noise."""
+    """Return the rules of the campaign, and of the same length in one shot after a pilot of white noise."""
     rules = study.rules
     whole = rules.schedule.samples
     pilot = rules.schedule.parts[:1] if rules.pilot_power is not None else ()
@@ -122,7 +122,7 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
 
 
 def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
-    """The runs of one way of experimenting."""
+    """Return the runs of one way of experimenting."""
     job = CampaignJob(study.planner, rules, study.true, study.step, study.cost)
     # One run a batch: all ways meet the same noise in the same run.
     parts = run_batches(run_campaigns, job, runs=study.runs, size=1, seed=study.seed, executor=executor)

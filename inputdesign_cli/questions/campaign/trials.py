@@ -1,4 +1,4 @@
-"""Whole campaigns on a simulated true system: each run estimates, plans, and stops as a real one would."""
+"""Run whole campaigns on a simulated true system: each run estimates, plans and stops as a real one does."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ from inputdesign_cli.identification import Estimate, fit_batch, identify, inform
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.neglected import mattering, neglected
-from inputdesign_cli.questions.campaign.schedule import Planner, Rules, Standing, ratio_of, standing
+from inputdesign_cli.questions.campaign.plans import Planner, ratio_of, standing
+from inputdesign_cli.questions.campaign.schedule import Rules, Standing
 
 Ending = Literal["stopped", "missed", "undecided", "unplanned"]
+Reference = Literal["true", "estimate", "design"]
+_REFERENCES: tuple[Reference, ...] = ("true", "estimate", "design")
 _SEEDS = 2**31
 
 
 @dataclass(frozen=True)
 class CampaignJob:
-    """What all runs of one way of experimenting share.
+    """What all runs of one way of experimenting need.
 
     Attributes:
         true: the experiment on the true system.
@@ -43,16 +46,16 @@ class CampaignJob:
 
 @dataclass(frozen=True)
 class Ended:
-    """How one run ended.
+    """The end of one run.
 
     Attributes:
-        status: `stopped` where the data met what is asked; `unplanned` where there was no experiment to do.
-        ratio: the largest r_u / r_adm of the true plant under the experiment done; None where the true system
-            has other parameters than the model.
+        status: `stopped` if the data met what is asked; `unplanned` if no experiment could be planned.
+        ratio: the largest r_u / r_adm of the true plant by the samples applied; None if the true system has
+            other parameters than the model.
         energy: cost per sample times samples, on the true plant.
-        within: whether the estimate is off by no more than r_adm of the truth, of itself, of the plant of the
-            spec; None where it cannot be asked.
-        parts: that were applied; `shrunk`: those after which the estimate was not built on as it is.
+        within: whether the error of the estimate is within r_adm of the truth, of the estimate and of the
+            plant of the spec; None if r_adm cannot be evaluated.
+        parts: number of applied parts; `shrunk`: number of parts after which the estimate was not used.
     """
 
     status: Ending
@@ -60,19 +63,19 @@ class Ended:
     energy: float
     theta: Array
     ratio: float | None
-    within: Mapping[str, bool | None]
+    within: Mapping[Reference, bool | None]
     parts: int
     shrunk: int
 
 
 def run_campaigns(job: CampaignJob, runs: int, rng: np.random.Generator) -> list[Ended]:
-    """Several campaigns from rest, one after the other."""
+    """Return several campaigns from rest, one after the other."""
     return [_Run(job, rng).end() for _ in range(runs)]
 
 
 @dataclass
 class _Run:
-    """One campaign; the noise of all its samples is drawn first, so that others meet the same."""
+    """One campaign. The noise of all samples is drawn first, so that other ways meet the same noise."""
 
     job: CampaignJob
     rng: np.random.Generator
@@ -89,7 +92,7 @@ class _Run:
         self.sound = self.last = self.job.planner.nominal.model
 
     def end(self) -> Ended:
-        """The campaign from its first plan to its end."""
+        """Run the campaign from its first plan to its end."""
         rules = self.job.rules
         while True:
             try:
@@ -125,7 +128,7 @@ class _Run:
         return u[0], y[0]
 
     def _estimate(self, u: Array, y: Array) -> None:
-        """Estimate from the last estimate on; from several starts while there is none."""
+        """Estimate from the last estimate, or from several starts if there is none."""
         model, step = self.last, self.job.step
         if self.known is not None:
             found = fit_batch(model, u[None], y[None], step, start=model.theta)
@@ -135,14 +138,14 @@ class _Run:
         self._anew(u, y)
 
     def _doubted(self, u: Array, y: Array) -> bool:
-        """Whether tests at the estimate as it is refute the structure."""
+        """Return whether tests at the present estimate refute the structure."""
         if self.known is None or not self.job.rules.stops:
             return False
         full = self._identified(u, y, near=True)
         return full is not None and self.job.rules.refuted(full)
 
     def _anew(self, u: Array, y: Array) -> Estimate | None:
-        """The estimate from several starts, which is then built on; None where there is none."""
+        """Return the estimate from several starts, which is built on from now on; None if there is none."""
         full = self._identified(u, y)
         if full is not None:
             self._stand(self.last.at(full.theta, full.noise), u, y)
@@ -156,7 +159,7 @@ class _Run:
             return None
 
     def _speaks_against(self, full: Estimate) -> bool:
-        """Whether the estimate speaks against the structure at the end."""
+        """Return whether the estimate contradicts the structure at the end."""
         if full.failed or not full.converged:
             return True
         known = self.known
@@ -190,13 +193,13 @@ class _Run:
             energy_of(self.r, self.job.true, self.job.step, self.job.cost) if samples else 0.0,
             self.last.theta,
             self._true_ratio() if samples else None,
-            {of: within(self.job, self.last, of) for of in ("true", "estimate", "design")},
+            {of: within(self.job, self.last, of) for of in _REFERENCES},
             self.parts,
             len(self.shrunk),
         )
 
     def _true_ratio(self) -> float | None:
-        """That of the true plant, by the samples applied."""
+        """Return the ratio of the true plant by the samples applied."""
         true = replace(self.job.true, samples=len(self.r))
         if true.model.names != self.last.names:
             return None
@@ -209,7 +212,7 @@ class _Run:
 
 
 def energy_of(r: Array, true: Experiment, step: float, cost: Mapping[PowerKind, Weight]) -> float:
-    """Cost on the true plant of a record (n, r), summed over its samples; see `CampaignJob`."""
+    """Return the cost of a record (n, r) on the true plant, summed over its samples; see `CampaignJob`."""
     at = FiniteRecord(true, len(r), step)
     powers: dict[PowerKind, list[float]] = {
         kind: np.mean(at.signals(kind, r) ** 2, axis=0).tolist() for kind in POWER_KINDS
@@ -217,9 +220,13 @@ def energy_of(r: Array, true: Experiment, step: float, cost: Mapping[PowerKind, 
     return len(r) * weighted_sum(cost, powers)
 
 
-def within(job: CampaignJob, estimate: Model, of: str) -> bool | None:
-    """Whether |G_hat - G_0| <= r_adm at all frequencies, that of the truth, the estimate, or the spec."""
-    models = {"true": job.true.model, "estimate": estimate, "design": job.planner.nominal.model}
+def within(job: CampaignJob, estimate: Model, of: Reference) -> bool | None:
+    """Return whether |G_hat - G_0| <= r_adm of the truth, the estimate or the spec at all frequencies."""
+    models: dict[Reference, Model] = {
+        "true": job.true.model,
+        "estimate": estimate,
+        "design": job.planner.nominal.model,
+    }
     try:
         errors = model_errors(job.planner.question(models[of], np.eye(len(models[of].names))).requirements)
     except IdesignError:

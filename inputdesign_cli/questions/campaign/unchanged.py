@@ -1,4 +1,4 @@
-"""Whether all that a campaign decides by is as it was kept: spec, plans, records, signal, decisions."""
+"""Check that spec, plans, records, signal and decisions of a campaign are as they were kept."""
 
 from __future__ import annotations
 
@@ -9,34 +9,36 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome import write_plain
+from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.text_formats import plain
-from inputdesign_cli.questions.campaign.state import Campaign
 
-# Of the files of a campaign, what decisions are made by; those of a run have digests of their own.
+# Files that decisions rest on; spec and signal of a run have digests of their own.
 _READ = re.compile(r"(plan|record)_\d\d+\.csv")
 _DIGESTS = "digests"
 
 
-def digests(campaign: Mapping[str, Json], files: Mapping[str, bytes]) -> dict[str, str]:
-    """SHA-256 of each file that decisions are made by, and of the decisions themselves."""
-    return {name: _sha256(content) for name, content in files.items() if _READ.fullmatch(name)} | {
-        RESULT: _decisions(campaign)
-    }
+def digests(campaign: Campaign, files: Mapping[str, bytes]) -> dict[str, str]:
+    """Return SHA-256 of each file that decisions rest on, and of the decisions themselves.
+
+    A record keeps its digest: one that was withdrawn may have changed since. Plans may be made anew.
+    """
+    found = {name: _sha256(content) for name, content in files.items() if _READ.fullmatch(name)}
+    records = {name: digest for name, digest in (campaign.digests or {}).items() if name.startswith("record")}
+    return {**found, RESULT: _decisions(write_plain(campaign)), **records}
 
 
 def check_files(
     directory: Path,
-    result: Mapping[str, Json],
+    result: Mapping[str, object],
     found: Campaign,
     files: Mapping[str, bytes],
     withdrawing: int | None,
 ) -> None:
     """Raise `DataError` (`campaign-changed`) for files that are not as they were kept.
 
-    Records that are left out may be anything, and directories of before digests were kept have none to
-    compare.
+    Records that do not count may be anything. Directories of older versions have no digests.
 
     Args:
         result: `result.json`, in which `found` is what the campaign says.
@@ -45,9 +47,8 @@ def check_files(
     """
     numbers = {record.file: n for n, record in enumerate(found.records, 1)}
     out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
-    known = found.digests | {SPEC: result.get("spec_sha256"), SIGNAL: result.get("signal_sha256")}
-    plan = found.rounds[-1].plan
-    due = None if plan is None else plan.file
+    known = {**(found.digests or {})} | {SPEC: result.get("spec_sha256"), SIGNAL: result.get("signal_sha256")}
+    due = None if found.plan is None else found.plan.file
     for name, content in files.items():
         digest = known.get(name)
         if name in out or digest is None or digest == _sha256(content):
@@ -60,9 +61,9 @@ def check_files(
                 f"(what you gave is in {given})"
             )
         elif name == due:
-            hint += f": {SIGNAL} beside it holds the same samples"
+            hint += f": {SIGNAL} in the same directory holds the same samples"
         elif name == SIGNAL:
-            hint += f": {due} beside it holds the same samples"
+            hint += f": {due} in the same directory holds the same samples"
         elif name == SPEC:
             hint += (
                 ". What a campaign asks stays as it was begun: for another question begin another campaign, "
@@ -71,9 +72,10 @@ def check_files(
         raise _changed(directory / name, hint)
 
 
-def check_decisions(directory: Path, campaign: Mapping[str, Json], found: Campaign) -> None:
-    """Raise `DataError` (`campaign-changed`) where the decisions are not those that were made."""
-    if found.digests.get(RESULT, "") not in ("", _decisions(campaign)):
+def check_decisions(directory: Path, campaign: Mapping[str, object]) -> None:
+    """Raise `DataError` (`campaign-changed`) for a campaign, as plain data, that was edited."""
+    kept = campaign.get(_DIGESTS)
+    if isinstance(kept, Mapping) and kept.get(RESULT, "") not in ("", _decisions(campaign)):
         raise _changed(directory / RESULT, "put it back from a copy of the directory")
 
 
@@ -82,8 +84,8 @@ def _changed(path: Path, hint: str) -> DataError:
     return DataError.because("campaign-changed", message, hint)
 
 
-def _decisions(campaign: Mapping[str, Json]) -> str:
-    """The digest of all but the digests, whatever the order of the keys."""
+def _decisions(campaign: Mapping[str, object]) -> str:
+    """Return the digest of all but the digests, whatever the order of the keys."""
     kept = {key: value for key, value in campaign.items() if key != _DIGESTS}
     return _sha256(json.dumps(plain(kept), sort_keys=True).encode())
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.support.campaigns import found
 from tests.support.commands import caller
 
 TWO = """
@@ -116,7 +117,8 @@ def test_the_input_of_a_loop_is_not_its_reference(run, tmp_path):
     assert (code, "record-unlike" in err, "r1 has a correlation" in err) == (2, True, True)
     code, out, _ = run("next", "c", saved(tmp_path / "n.csv", "time_s,u,y", table[:, :3]), "--json")
     assert code == 0
-    assert any("n.csv has no column r" in note for note in json.loads(out)["notes"])
+    (silent,) = found(json.loads(out), "record-without-excitation")
+    assert (silent["where"], silent["figures"]) == ("n.csv", {"plan": "plan_01.csv"})
 
 
 def test_exchanged_channels_are_named(run, tmp_path):
@@ -168,7 +170,8 @@ def test_a_record_that_ends_early_says_so(run, tmp_path):
     header, table = recorded(tmp_path / "c", "two")
     code, out, _ = run("next", "c", saved(tmp_path / "s.csv", header, table[:45]), "--json", "--no-figures")
     assert code == 0
-    assert any("s.csv ends after 45 of the 60 samples" in note for note in json.loads(out)["notes"])
+    (shorter,) = found(json.loads(out), "record-shorter")
+    assert shorter["figures"] == {"plan": "plan_01.csv", "samples": 45, "planned": 60}
 
 
 def test_what_is_wrong_with_a_record_is_said_of_the_file_that_was_given(run, tmp_path):

@@ -36,9 +36,11 @@ def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
     assert code == 5
     assert result["status"] == "undecided"
     assert result["samples"] < 0.5 * result["campaign"]["max_samples"]
-    told = result["notes"][0]
-    assert f"ends after {result['samples']} of at most 600 samples" in told
-    assert "idesign explore c/record_??.csv" in told
+    first = result["findings"][0]
+    assert (first["code"], first["severity"], first["where"]) == ("campaign-refuted", "refuted", "c")
+    assert (first["figures"]["samples"], first["figures"]["end"]) == (result["samples"], 600)
+    assert first["figures"]["records"] == [record["file"] for record in result["campaign"]["records"]]
+    assert "idesign explore c/record_??.csv" in first["message"]  # a command to be copied
     assert not (begun / "signal.csv").exists()
     # More records are not taken, unless it is said that it goes on.
     code, _, err = run("next", "c", tmp_path / "r0.csv")
@@ -56,8 +58,10 @@ def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
 def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
     until_it_ends(run, begun, tmp_path)
     assert run("next", "c", "--withdraw", 1, "--no-figures")[0] in (0, 5)
-    notes = json.loads((begun / "result.json").read_text())["notes"]
-    assert not any("record_01.csv" in note or "record_??" in note for note in notes)
+    result = json.loads((begun / "result.json").read_text())
+    listed = [one["figures"]["records"] for one in result["findings"] if "records" in one["figures"]]
+    assert all("record_01.csv" not in records for records in listed)
+    assert not any("record_01.csv" in note or "record_??" in note for note in result["notes"])
 
 
 def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
