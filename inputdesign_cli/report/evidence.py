@@ -10,6 +10,8 @@ from inputdesign_cli.report.numbers import BREAK, Fact, Rows, listed, shown, spo
 _SPREAD = "{:.4g} ± {:.2g}"
 # Below this share of its standard deviation the digits of an estimate say nothing, not even its order.
 _NOTHING = 1e-3
+# What a record that is rounded to a file may be off.
+_REACHED = 1e-6
 _NORMAL = 1.96  # standard deviations to either side of 95 %
 
 
@@ -135,8 +137,8 @@ def verdict(result: Result) -> Iterator[str]:
         return
     yield f"these data miss the accuracy: {_reached(worst)} times what is admitted"
     right = f"{_RIGHT}{_from_rest(result)}"
-    if "experiments" in assessment:
-        number = assessment["experiments"]
+    number = assessment.get("experiments")
+    if number is not None or assessment.get("left", 0.0) > 1.0 + _REACHED:  # more than can be counted
         repeat = "" if number is None else f"apply it {number} times, "
         yield (
             "the experiment below is the best within the limits for the model of these data, and after it "

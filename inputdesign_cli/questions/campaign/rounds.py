@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.identification import information_of_data
+from inputdesign_cli.outcome.assessment import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.assess import Verdict, judge
+from inputdesign_cli.questions.assessment.assess import judge
 from inputdesign_cli.questions.assessment.identify import (
     Identification,
     Identified,
@@ -25,7 +27,6 @@ from inputdesign_cli.questions.assessment.identify import (
     mismeasured,
     told,
 )
-from inputdesign_cli.questions.assessment.refutations import contradictions, differences
 from inputdesign_cli.questions.campaign.schedule import Planned, Planner, Rules, Standing, standing
 from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
