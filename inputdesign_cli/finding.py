@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 
+CAUSES = ("unsettled", "contradicted", "unasked", "undetermined")
+"""Why nothing is decided: the search, the data, the question at the estimate, other explanations."""
+
 
 class Severity(StrEnum):
     """How much a finding weighs, from a remark to a contradiction."""
@@ -56,6 +59,7 @@ class FindingKind:
         title: a phrase of a few words.
         text: what it means and how it is found.
         remedy: what to do about it.
+        cause: why nothing is decided where a finding is `undecided`; what refutes, contradicts.
     """
 
     code: str
@@ -63,6 +67,7 @@ class FindingKind:
     title: str
     text: str
     remedy: str
+    cause: str = "undetermined"
 
     def __post_init__(self) -> None:
         if self.code in KINDS:
@@ -81,6 +86,20 @@ class FindingKind:
             figures: its numbers and names.
         """
         return Finding(self.code, severity or self.severity, message, where, figures)
+
+
+def cause_of(finding: Finding) -> str:
+    """Return why a finding leaves nothing decided; empty where it does not."""
+    if finding.severity is Severity.REFUTED:
+        return "contradicted"
+    return KINDS[finding.code].cause if finding.severity is Severity.UNDECIDED else ""
+
+
+def reasons(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
+    """Return the findings that forbid the verdicts "met" and "missed", by their cause."""
+    found = list(findings)
+    listed = {cause: [one for one in found if cause_of(one) == cause] for cause in CAUSES}
+    return {cause: those for cause, those in listed.items() if those}
 
 
 def undecided(findings: Iterable[Finding]) -> bool:

@@ -48,6 +48,6 @@ class Identification:
     ruled_out: tuple[Rival, ...] | None = None
     prior: PriorAgreement | None = None
     records: tuple[int, ...] | None = None
-    operating_point: Mapping[str, float] | None = None
     means_removed: bool | None = None
+    operating_point: Mapping[str, float] | None = None
     fit_percent: float | tuple[float | None, ...] | None = None

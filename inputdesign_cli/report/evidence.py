@@ -218,7 +218,7 @@ def campaign_facts(outcome: Outcome) -> Iterator[tuple[str, str]]:
     if plan is not None:
         whole = plan.planned_samples
         first = f", the first of {whole} that are planned with {plan.power:.4g}"
-        of = first if whole > plan.samples else ""
+        of = first if whole is not None and whole > plan.samples else ""
         yield "next", f"apply {plan.samples} samples of power {plan.part_power:.4g} (signal.csv{of})"
 
 

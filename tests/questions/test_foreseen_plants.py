@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.questions.building.foreseen import build_foreseen
+from inputdesign_cli.questions.building.knowledge import build_foreseen
 from inputdesign_cli.questions.building.system import build_model
 
 SPEC = """
@@ -40,7 +40,8 @@ def test_estimates_within_the_stated_uncertainty_are_foreseen(stated, theta, wit
     values = dict(zip(nominal.names, nominal.theta.tolist(), strict=True)) | theta
     foreseen = build_foreseen(spec, nominal)
     assert foreseen is not None
-    assert foreseen(np.array([values[name] for name in nominal.names]), 1e-4 * np.eye(len(values))) == within
+    theta = np.array([values[name] for name in nominal.names])
+    assert foreseen.admits(theta, 1e-4 * np.eye(len(values))) == within
 
 
 def test_without_uncertainty_nothing_is_foreseen():

@@ -41,10 +41,11 @@ def narrow(tmp_path_factory):
 def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow):
     found = assess(parse_spec(NARROW), narrow(seed, 0.5))
     assert found.verdict == "undecided"
-    reasons = found.results.result["assessment"]["undecided"]
-    assert "one more " in reasons[-1]
-    assert set(reasons) <= set(found.results.result["notes"])
-    assert "(f2)" in " ".join(found.results.result["notes"])
+    outcome = found.results.outcome
+    against = [one for one in outcome.findings if one.severity == "refuted"]
+    assert {one.code for one in against} <= {"neglected-parameter", "parameter-missing"}
+    assert outcome.assessment.undecided == tuple(one.message for one in against)
+    assert "(f2)" in " ".join(outcome.notes)
 
 
 @pytest.mark.parametrize(("seed", "of_the_pole"), [(1, 0.05), (3, 0.84)])
@@ -78,7 +79,8 @@ def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
     entries = {e["parameter"]: e for e in found.results.result["assessment"]["neglected"]}
     worst = max(entries.values(), key=lambda e: e["may_move"])
     assert worst["may_move"] > max(1.0, worst["moves"])
-    assert "rests on the structure" in " ".join(found.results.result["notes"])
+    (rests,) = [one for one in found.results.outcome.findings if one.code == "verdict-rests-on-structure"]
+    assert (rests.where, rests.figures["may_move"]) == (worst["parameter"], worst["may_move"])
     fine = np.linspace(0.005, 0.2, 2000)
 
     def plant(overrides):

@@ -10,8 +10,8 @@ from inputdesign_cli import identify as estimated, parse_spec, simulate, solve
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.identification import identify
 from inputdesign_cli.information import Experiment
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions import assess
-from inputdesign_cli.questions.assessment.blocks import blocks_of
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.task import build_task
 from inputdesign_cli.specification import Spec

@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from inputdesign_cli.findings.other_systems import contradictions, differences, repetitions
 from inputdesign_cli.identification.repeated import Repetition
-from inputdesign_cli.questions.assessment.refutations import chance, contradictions, differences, repetitions
+from inputdesign_cli.outcome.shares import chance
 
 
 @pytest.mark.parametrize(
@@ -18,8 +19,14 @@ def test_no_probability_is_told_as_zero(probability, told):
 
 def test_samples_that_come_again_in_a_record_without_a_file_are_told():
     estimate = SimpleNamespace(repeated=Repetition(162, 473, 76))
-    (note,) = repetitions(estimate, ())
-    assert note.startswith("the residuals of about 76 samples of the record follow others there")
+    (found,) = repetitions(estimate, ())
+    assert (found.code, found.where) == ("samples-repeated", "the record")
+    assert found.figures == {"samples": 76, "of": "the record"}
+
+
+def test_files_with_rows_in_common_are_found_beside_no_repetition():
+    (found,) = repetitions(SimpleNamespace(repeated=None), (), ["a.csv and b.csv have rows in common"])
+    assert (found.code, found.severity) == ("samples-repeated", "refuted")
 
 
 def test_looks_share_the_level_of_what_they_may_end():

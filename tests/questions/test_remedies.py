@@ -8,9 +8,9 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.findings.refuted_structure import OF_MANY
+from inputdesign_cli.findings.remedies import quantities, remedies_of
 from inputdesign_cli.questions.assessment.build import build_identification
-from inputdesign_cli.questions.assessment.refutations import FOUND
-from inputdesign_cli.questions.assessment.remedies import remedies_of, vague_notes
 from inputdesign_cli.questions.least_cost.build import build_convex
 
 SPEC = """
@@ -58,7 +58,7 @@ def test_remedies_are_in_the_words_of_the_plant(kind):
 def test_remedies_fit_into_the_sentences_that_hold_them(kind):
     _, found = remedies(PLANTS[kind])
     for fault, remedy in found.items():
-        note = FOUND[fault].format(p="0.1", lag=3, where="", remedy=remedy)
+        note = OF_MANY[fault][1].format(p="0.1", lag=3, where="", remedy=remedy)
         assert not re.search(r"[,;:.]\s*[,;.]|\s[,;.](?!\.)|  ", note.replace(", ..]", "]")), note
 
 
@@ -68,15 +68,8 @@ def test_only_coefficients_have_orders(kind):
     spec = parse_spec(f"plant: {PLANTS[kind]}\n{SPEC}", overrides=["noise={C: [1, -0.2], variance: 0.04}"])
     model = build_identification(spec).nominal
     orders = {"s": ("b0", "a0", "c1"), "q": ("b1", "f1", "c1")}.get(kind, ("c1",))
-    told = {
-        tuple(sorted(names.split(", "))): "order" in advice
-        for names, advice in (
-            re.fullmatch(r"zero lies within a standard deviation of (.*?): (.*)", note).groups()
-            for note in vague_notes(model, model.names)
-        )
-    }
-    physical = tuple(sorted(set(model.names) - set(orders)))
-    assert told == {**({physical: False} if physical else {}), tuple(sorted(orders)): True}
+    found = dict(zip(model.names, quantities(model).tolist(), strict=True))
+    assert found == {name: name not in orders for name in model.names}
 
 
 ORDERS = {

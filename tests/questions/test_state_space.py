@@ -5,7 +5,7 @@ import pytest
 
 from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.system import build_experiment, build_model
 from tests.support.words import largest_errors
 

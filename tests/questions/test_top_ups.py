@@ -2,7 +2,6 @@
 
 import html
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
-from inputdesign_cli.questions.assessment.levels import level_notes
+from inputdesign_cli.findings.top_up_levels import level_notes
 from tests.support.heater import HEATER, STRUCTURE, said
 
 
@@ -146,16 +145,24 @@ def test_the_level_of_the_data_is_told_where_the_spec_does_not_know_it(heater_re
 @pytest.mark.parametrize(
     ("levels", "point", "means", "expected"),
     [
-        ({}, None, [7.0, 0.1], "about u1 = 7 .* write signal.offset: \\[7, 0\\]"),
-        ({"u1": 7.0}, [7.0, 0.0], [7.0, -30.0], "u1 = 7, u2 = 0.*about u2 = -30 .*: \\[7, -30\\]"),
-        ({}, [7.0, 1.0], [7.0, -30.0], "^$"),
-        ({}, None, [0.3, -0.3], "^$"),
-        ({}, None, None, "^$"),
+        ({}, None, [7.0, 0.1], {"record-about-zero": {"offset": [7.0, 0.0]}}),
+        (
+            {"u1": 7.0},
+            [7.0, 0.0],
+            [7.0, -30.0],
+            {
+                "about-an-operating-point": {"levels": [7.0, 0.0]},
+                "record-about-zero": {"offset": [7.0, -30.0]},
+            },
+        ),
+        ({}, [7.0, 1.0], [7.0, -30.0], {}),
+        ({}, None, [0.3, -0.3], {}),
+        ({}, None, None, {}),
     ],
 )
 def test_each_input_has_its_level(levels, point, means, expected):
     found = level_notes(levels, point, None if means is None else np.array(means), np.ones(2))
-    assert re.search(expected, "; ".join(found))
+    assert {one.code: one.figures for one in found} == expected
 
 
 def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):

@@ -6,8 +6,8 @@ import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.identification import identify as estimate
+from inputdesign_cli.identification.response_chance import driven_by_nothing
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.questions.assessment.unrelated import driven_by_nothing
 
 SPEC = """
 plant: {A: [1, -0.7], B: [0, 3.6]}

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, parse_spec
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.far_from_nominal import far_from_nominal, from_nominal
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.assessment.nominal import from_nominal
 from inputdesign_cli.questions.building.system import build_model
 from tests.support.heater import HEATER, LAG, SLOW, covariance_of, heater, said
 
@@ -33,7 +33,9 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
     assert "recent_inputs" in result["identification"]["failed"]
     # b6, b7 stand for the delay; what the lag adds comes after them.
     assert result["identification"]["tests"]["recent_inputs"]["lag"] in (7, 8, 9)
-    assert "raise the orders of B and F" in " ".join(result["notes"])
+    listed = {one["code"]: one for one in result["findings"]}
+    assert listed["plant-structure"]["severity"] == "refuted"
+    assert "raise the orders of B and F" in listed["plant-structure"]["message"]
     assert "signal" not in found.results.tables
     assert result["assessment"]["verdict"] == "undecided"
     assert result["assessment"]["causes"] == ["contradicted"]
@@ -52,9 +54,9 @@ def test_records_of_two_plants_are_named(heater_record, tmp_path):
     np.savetxt(other, table, delimiter=",", header="time_s,u,y", comments="")
     found = assess(spec, [first, other])
     assert found.verdict == "undecided"
-    (said,) = [r for r in found.results.result["assessment"]["undecided"] if "one system" in r]
-    assert {"a.csv", "other.csv"} < set(said.split())
-    assert said in found.results.result["notes"]
+    (differs,) = [one for one in found.results.outcome.findings if one.code == "records-differ"]
+    assert {differs.where, differs.figures["against"]} == {"a.csv", "other.csv"}
+    assert differs.message in found.results.outcome.assessment.undecided
 
 
 @pytest.mark.parametrize("rows", [720, 500])
@@ -80,7 +82,8 @@ def test_a_drift_is_told_from_noise(heater_record):
     found = assess(spec, heater_record("a.csv", 720, 1, drift=2.0)).results.result
     assert "trend" in found["identification"]["failed"]
     first = found["assessment"]["undecided"][0]
-    assert "let the noise drift (noise: {drift: true}), remove the trend" in first
+    (drift,) = [one for one in found["findings"] if one["code"] == "drift"]
+    assert (drift["where"], drift["severity"], drift["message"]) == ("trend", "refuted", first)
 
 
 def test_undecided_has_its_own_exit_code(heater_record, tmp_path):
@@ -142,7 +145,8 @@ def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp
         path.write_text(",".join(named) + "\n" + rows + "\n")
         result = assess(parse_spec(HEATER, overrides=loop), path).results.result
         assert result["assessment"]["frequency_response"]["excitation"] == by
-        assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")
+        codes = {one["code"] for one in result["findings"]}
+        assert ("response-biased-by-loop" in codes) == (by == "u")
 
 
 @pytest.mark.parametrize(
@@ -153,9 +157,10 @@ def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, he
     B = [0, 0, 0, 0, 0, 0, *(factor * 2.35 * (1 - SLOW) * share for share in (0.4, 0.6))]
     found = assess(parse_spec(HEATER, overrides=[f"plant={{B: {B}, F: [1, {-SLOW}]}}"]), path)
     result = found.results.result
-    nominal, notes = result["assessment"]["nominal"], " ".join(result.get("notes", []))
+    nominal = result["assessment"]["nominal"]
+    listed = {one["code"]: one for one in result.get("findings", [])}
     assert found.verdict == "met"
-    assert ("contradicts the plant of the spec" in notes) == contradicts
+    assert ("another-plant" in listed) == contradicts
     assert nominal["opposite_sign"] == (factor < 0)
     assert nominal["degrees_of_freedom"] == 3
     names = ["b6", "b7", "f1"]
@@ -163,11 +168,11 @@ def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, he
     away = np.array([*B[6:], -SLOW]) - [result["identification"]["theta"][name] for name in names]
     assert nominal["statistic"] == pytest.approx(away @ np.linalg.solve(P, away), rel=1e-6)
     far = nominal["statistic"] > chi2.isf(2 * norm.sf(5.0), 3)
-    assert (f"lies {np.sqrt(nominal['statistic']):.3g} standard dev" in notes) == (far and not contradicts)
+    assert ("far-from-the-spec" in listed) == (far and not contradicts)
     if contradicts:
         share = abs(factor - 1.0) / max(abs(factor), 1.0)
         assert nominal["worst_difference"] == pytest.approx(share, rel=0.15)
-        assert "b7 is" in notes or "b6 is" in notes
+        assert listed["another-plant"]["figures"]["deviations"] == np.sqrt(nominal["statistic"])
 
 
 @pytest.mark.parametrize(
@@ -182,10 +187,10 @@ def test_a_far_estimate_contradicts_the_spec_by_its_statistic_alone(deviations, 
     error = SimpleNamespace(
         grid=np.array([0.1]), entry=None, error_bound=lambda information, w: np.zeros(w.shape)
     )
-    told, notes = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2))
-    assert told["probability"] == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
-    assert ("contradicts the plant" in notes[0]) == contradicts
-    assert ("does not contradict" in notes[0]) != contradicts
+    distance = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2))
+    assert distance.nominal.probability == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
+    (found,) = far_from_nominal(UNITS, distance)
+    assert found.code == ("another-plant" if contradicts else "far-but-uncertain")
 
 
 @pytest.mark.parametrize(("admitted", "contradicts"), [(0.5, True), (30.0, False)])
@@ -200,5 +205,6 @@ def test_a_difference_that_nothing_is_asked_of_contradicts_nothing(admitted, con
         error_bound=lambda information, w: np.zeros(w.shape),
         admissible=SimpleNamespace(at=lambda w: np.full(w.shape, admitted)),
     )
-    _, notes = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2), asked=True)
-    assert ("contradicts the plant" in notes[0]) == contradicts
+    distance = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2), asked=True)
+    (found,) = far_from_nominal(UNITS, distance)
+    assert found.code == ("another-plant" if contradicts else "far-from-the-spec")

@@ -12,13 +12,16 @@ from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification import Earlier
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.blocks import blocks_of
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
-from inputdesign_cli.questions.building.foreseen import build_foreseen, build_nominal_covariance
-from inputdesign_cli.questions.building.knowledge import build_knowledge
+from inputdesign_cli.questions.building.knowledge import (
+    build_foreseen,
+    build_knowledge,
+    build_nominal_covariance,
+)
 from inputdesign_cli.questions.building.model_error import (
     build_calibration,
     model_error_alpha,

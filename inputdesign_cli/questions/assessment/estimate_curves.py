@@ -1,24 +1,28 @@
-"""Tables and curves of an estimate: how it fits, what it leaves unexplained, and what it is worth."""
+"""Tables and curves of an estimate: its fit, its residuals, and its error bound."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
+from inputdesign_cli.accuracy import worst
+from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate
+from inputdesign_cli.outcome import ModelError as Bound, read_plain
 from inputdesign_cli.outcome.curves import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves
-from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound import bound_curves
+from inputdesign_cli.questions.common.confidence import Confidence
 
 
 def data_curves(
     units: Units, u: Array, y: Array, estimate: Estimate
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """fit.csv and residuals.csv with their figures.
+    """Return fit.csv and residuals.csv with their figures.
 
     Args:
         u, y: the records, (samples, r) and (samples, p).
@@ -59,23 +63,25 @@ def data_curves(
 
 
 def bound_of_data(
-    units: Units, requirements: Sequence[Requirement], entries: Sequence[ModelError], information: Array
-) -> tuple[Table, BoundCurves, dict[str, Json]]:
-    """bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
+    units: Units, confidence: Confidence, errors: Sequence[OnModelError], *, asked: bool, information: Array
+) -> tuple[Table, BoundCurves, Bound]:
+    """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
 
     Args:
-        entries: what has r_u of every entry of G where no requirement bounds it.
+        errors: what has r_u; `asked` says whether requirements state r_adm.
         information: (k, k) of the data.
     """
-    entry: dict[str, Json] = {}
-    errors = model_errors(requirements)
-    if errors:
+    bound = read_plain(Bound, {"alpha": confidence.alpha, **confidence.entry})
+    if asked:
         violation = worst([error.worst(information) for error in errors])
-        entry["worst_ratio"] = violation.ratio
-        if violation.frequency is not None:
-            entry["worst_frequency"] = violation.frequency / units.frequency
-    table, curves = bound_curves(units, errors or entries, information, stated=bool(errors), label="data")
-    return table, curves, entry
+        frequency = violation.frequency
+        bound = replace(
+            bound,
+            worst_ratio=violation.ratio,
+            worst_frequency=None if frequency is None else frequency / units.frequency,
+        )
+    table, curves = bound_curves(units, errors, information, stated=asked, label="data")
+    return table, curves, bound
 
 
 def _number(units: Units, channel: int) -> str:

@@ -1,4 +1,4 @@
-"""Records -> an estimate of `plant` and `noise`, ready to paste, and what the data buy."""
+"""Records -> an estimate of `plant` and `noise`, ready to paste, and the accuracy that the data give."""
 
 from __future__ import annotations
 
@@ -11,32 +11,28 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
+from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, IdesignError
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.estimates import band_limited, near_zero, on_the_circle, started, unasked
+from inputdesign_cli.findings.faults import faults, loop_faults
+from inputdesign_cli.findings.level_shifts import shifted_levels
+from inputdesign_cli.findings.other_systems import differences, prior_notes, repetitions
+from inputdesign_cli.findings.refuted_structure import refutations
+from inputdesign_cli.findings.rivals import other_minima, ruled_out
+from inputdesign_cli.findings.search import stopped_at_ends, unsettled
+from inputdesign_cli.findings.unrelated_inputs import answering, hardly_explained, idle
 from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model, TransferMatrix
 from inputdesign_cli.questions.assessment.estimate_curves import bound_of_data, data_curves
-from inputdesign_cli.questions.assessment.estimates import (
-    estimate_result,
-    identification_notes,
-    model_text,
-    prior_notes,
-)
-from inputdesign_cli.questions.assessment.faults import faults, loop_faults
-from inputdesign_cli.questions.assessment.level_shifts import shifted_levels
-from inputdesign_cli.questions.assessment.refutations import (
-    differences,
-    refutations,
-    repetitions,
-    stopped_at_ends,
-)
-from inputdesign_cli.questions.assessment.unrelated import answering, hardly_explained, idle
+from inputdesign_cli.questions.assessment.estimates import identification_entry, information_entry, model_text
 from inputdesign_cli.questions.common.confidence import Confidence
-from inputdesign_cli.questions.common.knowledge import Knowledge, that_agrees
-from inputdesign_cli.questions.common.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
+from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge, that_agrees
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 
@@ -65,6 +61,16 @@ class ModelQuestion:
         """(k, k): that of the data."""
         return np.eye(self.experiment.size)
 
+    @property
+    def asked(self) -> Sequence[OnModelError]:
+        """What is asked of the model error."""
+        return model_errors(self.requirements)
+
+    @property
+    def errors(self) -> Sequence[OnModelError]:
+        """What has r_u: what is asked of the model error, or else every entry of G."""
+        return self.asked or self.entries
+
 
 @dataclass(frozen=True)
 class Identification:
@@ -79,8 +85,7 @@ class Identification:
         has_prior: whether it states prior information.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
         knowledge: what else it says of the parameters; None where it says nothing.
-        foreseen: whether the design was made for a plant of these parameters (k,), known with this covariance
-            (k, k), as well; None where it was made for that of the spec.
+        foreseen: the plants that the design was made for; None where it was made for the plant of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
     """
@@ -94,7 +99,7 @@ class Identification:
     has_prior: bool
     controller: TransferMatrix | None
     knowledge: Knowledge | None
-    foreseen: Callable[[Array, Array], bool] | None
+    foreseen: Foreseen | None
     at: Callable[[Model, int, Array, str], ModelQuestion]
 
 
@@ -102,8 +107,8 @@ class Identification:
 class Identified:
     """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate.
 
-    `ruled_out` are other minima, which what is known of the plant rules out; `loop_told` is whether a note
-    says already that inputs answer the outputs.
+    `ruled_out` are other minima, which knowledge of the plant rules out; `loop_told` is whether a note says
+    already that inputs answer the outputs.
     """
 
     estimate: Estimate
@@ -177,61 +182,76 @@ def told(error: IdesignError) -> str:
     return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
 
-def speaking_against(task: Identification, found: Identified) -> list[str]:
-    """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
-    data, estimate = found.data, found.estimate
-    units = task.header.units
+def findings_of(task: Identification, found: Identified) -> list[Finding]:
+    """Return everything that speaks for or against data and estimate."""
+    units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
+    rivals: list[Finding] = []
+    if question is not None:
+        rivals = other_minima(units, model, estimate, question.asked, question.entries, question.information)
+    return [
+        *unsettled(model, estimate),
+        *started(estimate),
+        *on_the_circle(model, estimate),
+        *speaking_against(task, found),
+        *hardly_explained(units, model, estimate),
+        *near_zero(model, estimate),
+        *band_limited(model, estimate),
+        *differences(estimate, [name for name, _ in found.data.files]),
+        *prior_notes(estimate, stated=task.has_prior),
+        *ruled_out(estimate, found.ruled_out),
+        *unasked(found.unasked),
+        *rivals,
+    ]
+
+
+def speaking_against(task: Identification, found: Identified) -> list[Finding]:
+    """Return what speaks against the model; faults of measurement alone, since they upset the other tests."""
+    data, estimate, units = found.data, found.estimate, task.header.units
     return mismeasured(task, found) or [
         # Where an expression ends G may vanish, whatever the inputs do.
         *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
         *shifted_levels(estimate, data, units.time_unit),
         *refutations(found.model, estimate),
         *([] if found.loop_told else answering(units, estimate, data)),
-        *(repetitions(estimate, data.files) or data.repeated),
+        *repetitions(estimate, data.files, data.repeated),
     ]
 
 
-def mismeasured(task: Identification, found: Identified) -> list[str]:
-    """What a record says against itself: faults of measurement."""
+def mismeasured(task: Identification, found: Identified) -> list[Finding]:
+    """Return faults of measurement."""
     data = found.data
     return [*faults(task.header.units, found.estimate, data), *loop_faults(task.controller, data)]
 
 
-def identification_results(task: Identification, found: Identified, started: float) -> Results:
-    """What `idesign identify` writes.
+def identification_results(task: Identification, found: Identified, began: float) -> Results:
+    """Return what `idesign identify` writes.
 
     Args:
-        started: `time.perf_counter()` when the work began.
+        began: `time.perf_counter()` when the work began.
     """
     header, question, estimate = task.header, found.question, found.estimate
-    result = estimate_result(header.title, estimate)
-    if found.preparation.detrend == "constant":
-        result["identification"]["means_removed"] = True
-    elif found.preparation.levels:
-        result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
-    against = [*speaking_against(task, found), *hardly_explained(header.units, found.model, estimate)]
-    notes = identification_notes(found.data.notes, found.model, estimate, against)
-    notes += differences(estimate, [name for name, _ in found.data.files])
-    notes += prior_notes(estimate, stated=task.has_prior)
-    if found.ruled_out:
-        result["identification"]["ruled_out"] = rival_entries(estimate, found.ruled_out)
-        notes += ruled_out_notes(estimate, found.ruled_out)
-    if question is None:
-        notes.append(f"there is no r_u for this estimate: {found.unasked}")
-    else:
-        errors = model_errors(question.requirements) or question.entries
-        apart = beyond_errors(found.model, estimate, errors, question.information)
-        notes += rival_notes(header.units, estimate, apart)
-        tables["bound"], curves["bound"], worst = bound_of_data(
-            header.units, question.requirements, question.entries, question.information
+    bound = None
+    if question is not None:
+        tables["bound"], curves["bound"], bound = bound_of_data(
+            header.units,
+            question.confidence,
+            question.errors,
+            asked=bool(question.asked),
+            information=question.information,
         )
-        result["model_error"] = {"alpha": question.confidence.alpha, **question.confidence.entry, **worst}
-    if notes:
-        result["notes"] = notes
-    result["timing_s"] = {"identification": time.perf_counter() - started}
+    outcome = Outcome(
+        title=header.title,
+        status="identified" if estimate.converged else "not_converged",
+        samples=len(estimate.errors),
+        identification=identification_entry(estimate, found.preparation, found.ruled_out),
+        information=information_entry(estimate),
+        model_error=bound,
+        notes=found.data.notes or None,
+    ).saying(findings_of(task, found))
+    outcome = replace(outcome, timing_s={"identification": time.perf_counter() - began})
     files = {"model.yaml": model_text(header.units, found.model, estimate).encode()}
-    return Results(typed(result), header.resolved_spec, header.units.time_unit, tables, curves, files)
+    return Results(outcome, header.resolved_spec, header.units.time_unit, tables, curves, files)
 
 
 def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:
@@ -240,5 +260,5 @@ def identify(task: Identification, paths: Sequence[Path], preparation: Preparati
     Raises:
         DataError: see `identified`.
     """
-    started = time.perf_counter()
-    return identification_results(task, identified(task, paths, preparation), started)
+    began = time.perf_counter()
+    return identification_results(task, identified(task, paths, preparation), began)

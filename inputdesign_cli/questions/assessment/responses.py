@@ -1,4 +1,4 @@
-"""frequency_response.csv: what the data say of G without a model, beside what the model says."""
+"""frequency_response.csv: G of the data without a model, beside G of the model."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.findings.measured_response import BY_U
 from inputdesign_cli.identification import FrequencyResponse
+from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import ResponseCurves, ResponsePanel
-from inputdesign_cli.outcome.results import Array, Json, Table
+from inputdesign_cli.outcome.results import Array, Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
 
-_BY_U = (
-    "the frequency response without a model is from u to y in a loop: where the noise is strong it is drawn "
-    "towards -1/C; record the reference as column r, and it is estimated from r"
-)
-# Beyond a disc by more than this share of G, and at how many of the frequencies no model is right any more.
-_FAR, _MOST_FAR = 0.2, 0.1
+# Beyond a disc by more than this share of G.
+_FAR = 0.2
 
 
 def response_of_data(
@@ -29,14 +27,14 @@ def response_of_data(
     by_reference: bool,
     inputs: Sequence[int] | None = None,
     loop: bool = False,
-) -> tuple[Table, ResponseCurves, dict[str, Json]]:
-    """The table, its figure, and what `frequency_response` of the result says of it.
+) -> tuple[Table, ResponseCurves, MeasuredLines]:
+    """Return the table, its figure, and `frequency_response` of the result.
 
     Args:
         model: the estimate that it stands beside.
         by_reference: whether a reference from outside was used.
-        inputs: those (from zero) that `found` has; None: all.
-        loop: whether the data come from one, of which the spec need not tell.
+        inputs: the inputs (from zero) of `found`; None: all.
+        loop: whether the data come from a loop, which the spec need not state.
     """
     w = found.frequency / units.sample_time
     G = model.plant_at(w * units.frequency)
@@ -55,39 +53,13 @@ def response_of_data(
             far.append(apart > radius + _FAR * size)
         number = "" if units.single else f"_{i + 1}"
         columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}
-    told: dict[str, Json] = {
-        "method": found.method,
-        "excitation": "r" if by_reference else "u",
-        "frequencies": int(w.size),
-        "entries": len(panels),
-        "model_outside": float(np.mean(outside)),
-        "model_far_outside": float(np.mean(far)),
-    }
-    if (units.closed_loop or loop) and not by_reference:
-        told["caveat"] = _BY_U
+    told = MeasuredLines(
+        method=found.method,
+        excitation="r" if by_reference else "u",
+        frequencies=int(w.size),
+        entries=len(panels),
+        model_outside=float(np.mean(outside)),
+        model_far_outside=float(np.mean(far)),
+        caveat=BY_U if (units.closed_loop or loop) and not by_reference else None,
+    )
     return Table(columns), ResponseCurves(tuple(panels)), told
-
-
-def contradicted(told: dict[str, Json]) -> tuple[str, ...]:
-    """That the data alone say otherwise of G than a model does, where both are of one plant: in open loop."""
-    if "caveat" in told or told["model_far_outside"] < _MOST_FAR:
-        return ()
-    return (
-        "what the data say of G without a model contradicts it: the model is farther off than the discs of "
-        f"95 %, and by a fifth of |G| besides, at {100 * told['model_far_outside']:.0f} % of the frequencies "
-        "(frequency_response.png): the data may come from a loop that was not seen, the plant may not be "
-        "linear, or something else moves it along with the inputs",
-    )
-
-
-def response_note(told: dict[str, Json]) -> list[str]:
-    """What a user should know of it, in sentences."""
-    share = told["model_outside"]
-    usual = "" if "caveat" in told else " (a right model: at about 5 %)"
-    entries = "" if told["entries"] == 1 else f", counted over {told['entries']} entries of G"
-    sentence = (
-        "frequency_response.csv has what the data say of G without a model"
-        f"{', by the reference' if told['excitation'] == 'r' else ''}, with discs of 95 %: the model is "
-        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies{entries}{usual}"
-    )
-    return [sentence, *([told["caveat"]] if "caveat" in told else [])]

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.assessment.build import ask, build_identification
 from inputdesign_cli.questions.assessment.identify import ModelQuestion
 from inputdesign_cli.questions.building.rebuild import Rebuild

@@ -14,12 +14,14 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.campaign_estimates import campaign_doubted, estimate_not_used, no_estimate_yet
+from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.identification import information_of_data
+from inputdesign_cli.outcome.assessment import Verdict
 from inputdesign_cli.outcome.campaign import State
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.assess import Verdict, judge
+from inputdesign_cli.questions.assessment.assess import judge
 from inputdesign_cli.questions.assessment.identify import (
     Identification,
     Identified,
@@ -27,7 +29,6 @@ from inputdesign_cli.questions.assessment.identify import (
     mismeasured,
     told,
 )
-from inputdesign_cli.questions.assessment.refutations import contradictions, differences
 from inputdesign_cli.questions.campaign.plans import Planner, standing
 from inputdesign_cli.questions.campaign.schedule import Planned, Rules, Standing
 from inputdesign_cli.tasks.build.data import Data, read_data

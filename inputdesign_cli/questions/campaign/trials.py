@@ -14,10 +14,10 @@ from inputdesign_cli.accuracy import OnModelError, model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError
+from inputdesign_cli.findings.neglected import mattering, neglected
 from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.neglected import mattering, neglected
 from inputdesign_cli.questions.campaign.plans import Planner, ratio_of, standing
 from inputdesign_cli.questions.campaign.schedule import Rules, Standing
 

@@ -1,4 +1,4 @@
-"""What data of a design may leave undecided, before they are taken: minima of the likelihood far apart.
+"""Minima of the likelihood far apart may leave data of a design undecided: looked for before they are taken.
 
 The local covariance knows of one minimum. A dead time that few frequencies excite has others, whole periods
 away. A record of the design is simulated on the nominal plant and estimated with the search of `identify`.
@@ -16,19 +16,22 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, what_ended
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.identification import Earlier, Estimate
-from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.monte_carlo.searched_runs import searched_run
-from inputdesign_cli.outcome.results import Json, Result
-from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.knowledge import Knowledge
-from inputdesign_cli.questions.common.rivals import (
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.rivals import (
     Apart,
     beyond_admissible,
     beyond_errors,
     foreseen_entries,
-    foreseen_note,
+    foreseen_rivals,
+    not_foreseen,
 )
+from inputdesign_cli.identification import Earlier, Estimate
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.monte_carlo.searched_runs import searched_run
+from inputdesign_cli.outcome.design import Foreseen as Entry
+from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.knowledge import Knowledge
 
 _SEED = 0
 # Seconds of a search for each sample, channel, channel and parameter, measured; the longest that is begun.
@@ -41,10 +44,10 @@ _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
 
 @dataclass(frozen=True)
 class Foreseen:
-    """What `foreseen` of the result says, and notes."""
+    """`foreseen` of the result, None where it is not known, and findings."""
 
-    entry: dict[str, Json] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    entry: Entry | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,21 +78,15 @@ class Foresight:
         """The rivals that a record (n, r) of a design would leave, and what to do about them."""
         reason = self._not_now(len(record))
         if reason:
-            return Foreseen(
-                notes=(
-                    f"{reason}: whether other dead times would explain such a record nearly as well was not "
-                    "looked at",
-                )
-            )
+            return Foreseen(findings=(not_foreseen(reason),))
         try:
             estimate, _ = self._searched(record, np.random.default_rng(_SEED))
             found = self._beyond(record, estimate, requirements)
         except _ENDS:
             return Foreseen()
-        entry: dict[str, Json] = {"rivals": foreseen_entries(self.units, estimate, found)}
-        if not found:
-            return Foreseen(entry)
-        return Foreseen(entry, (foreseen_note(self.units, estimate, found, self._remedy(design)),))
+        entry = Entry(foreseen_entries(self.units, estimate, found))
+        remedy = self._remedy(design) if found else ""
+        return Foreseen(entry, tuple(foreseen_rivals(self.units, estimate, found, remedy)))
 
     def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> dict[str, int]:
         """Of some records how many end `elsewhere`, and how many leave such `rivals`; empty if untold."""

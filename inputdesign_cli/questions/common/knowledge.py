@@ -1,6 +1,6 @@
-"""What a spec says of the parameters besides the data: which of several minima may be that of the plant.
+"""Knowledge of the parameters besides the data decides which of several minima may be that of the plant.
 
-A signal that repeats tells a dead time only up to whole periods, and other minima explain a record nearly as
+A signal that repeats shows a dead time only up to whole periods, and other minima explain a record nearly as
 well. Who says that it is 25 s within 30 % has said that it is not ten minutes.
 """
 
@@ -10,12 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate, Rival
 
-# People are surer than they should be: parameters count as possible to so many times the stated distance.
+# People are surer than they should be: parameters count as possible to this many times the stated distance.
 _ROOM = 3.0
+# Of its own deviations, by which an estimate may be off.
+_OFF = 3.0
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,27 @@ class Knowledge:
         z = np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0]
         size = np.max(np.abs(z), initial=0.0) if self.box else np.linalg.norm(z)
         return bool(size <= _ROOM)
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """The plants that a design was made for: a region of the parameters `of_plant` (indices)."""
+
+    region: Knowledge
+    of_plant: NDArray[np.int64]
+
+    def admits(self, theta: Array, covariance: Array) -> bool:
+        """Return whether an estimate (k,) with its covariance (k, k) is one of these plants.
+
+        A parameter of G that is not drawn must be that of the spec, as far as the estimate shows.
+        """
+        of_plant, centre = self.of_plant, self.region.centre
+        away = (theta[: centre.size] - centre)[of_plant]
+        own = _OFF**2 * covariance[np.ix_(of_plant, of_plant)]
+        wide = self.region.columns[of_plant]
+        if self.region.box:
+            return bool(np.all(np.abs(away) <= np.abs(wide).sum(axis=1) + np.sqrt(np.diag(own))))
+        return bool(away @ np.linalg.solve(wide @ wide.T + own, away) <= 1.0)
 
 
 def that_agrees(

@@ -13,9 +13,9 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
 from inputdesign_cli.identification.explore import Found, output_error_form
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.blocks import blocks_of
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.assessment.identify import Identification
 from inputdesign_cli.questions.building.system import build_model

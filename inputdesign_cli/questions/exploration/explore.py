@@ -11,24 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
+from inputdesign_cli.findings.faults import biasing
+from inputdesign_cli.findings.level_shifts import shifted_levels
+from inputdesign_cli.findings.measured_response import contradicted, response_note
+from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.explore import Fits, Found, answers_output, fits
 from inputdesign_cli.identification.silent_lines import SilentLines
+from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import ResponseCurves
 from inputdesign_cli.outcome.results import Json, Results, Table, typed
+from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.faults import biasing
 from inputdesign_cli.questions.assessment.identify import (
     Identification,
     Identified,
     identification_results,
     told,
 )
-from inputdesign_cli.questions.assessment.level_shifts import shifted_levels
-from inputdesign_cli.questions.assessment.refutations import chance, refutations
-from inputdesign_cli.questions.assessment.responses import contradicted, response_note, response_of_data
+from inputdesign_cli.questions.assessment.responses import response_of_data
 from inputdesign_cli.questions.exploration.beside_shifts import explored_beside_shifts
 from inputdesign_cli.questions.exploration.build import build_explored, spec_text, warned
 from inputdesign_cli.questions.exploration.no_trust import DRIVE, HALF, LEAST_FIT, distrusted, undriven_inputs
@@ -96,7 +99,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         *biasing(task.header.units, found.estimate, data, found.validation.simulation),
         *(() if response is None else contradicted(response.told)),
     )
-    reasons = distrusted(measured, found, undriven, doubts, loop=bool(loops))
+    doubtful = [one.message for one in doubts]
+    reasons = distrusted(measured, found, undriven, doubtful, loop=bool(loops))
     heard = exploration_notes(log, found, loops)
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
@@ -118,9 +122,12 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         resolved_spec=warned(text, reasons, loop=bool(loops)),
         curves={**results.curves, **structure_curves(found)},
     )
-    against = (
-        *shifted_levels(found.estimate, data, log.time_unit),
-        *refutations(found.model, found.estimate),
+    against = tuple(
+        one.message
+        for one in (
+            *shifted_levels(found.estimate, data, log.time_unit),
+            *refutations(found.model, found.estimate),
+        )
     )
     return Exploration(complete if response is None else response.beside(complete), reasons, against)
 
@@ -131,7 +138,7 @@ class _Response:
 
     table: Table
     curves: ResponseCurves
-    told: dict[str, Json]
+    told: MeasuredLines
     silent: dict[str, SilentLines]
 
     def beside(self, explored: Results) -> Results:
@@ -149,7 +156,7 @@ class _Response:
                     },
                     "notes": [
                         *result.get("notes", []),
-                        *response_note(self.told),
+                        *(one.message for one in response_note(self.told)),
                         *silent_notes(self.silent),
                     ],
                 }

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from inputdesign_cli.findings.unrelated_inputs import late_inputs
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.explore import (
     Found,
@@ -16,8 +17,8 @@ from inputdesign_cli.identification.explore import (
     unhelpful,
     unstable_pole,
 )
-from inputdesign_cli.questions.assessment.refutations import chance
-from inputdesign_cli.questions.assessment.unrelated import driven_by_nothing, late_inputs
+from inputdesign_cli.identification.response_chance import driven_by_nothing
+from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.questions.exploration.at_once import like_inverses
 from inputdesign_cli.questions.exploration.integrating import CONTROLLER, clock_of, like_integrators
 from inputdesign_cli.questions.exploration.unidentified import rivalled, unidentified
@@ -69,7 +70,7 @@ def distrusted(
         *rivalled(found),
         *(() if found.steady or rising or unseen else (_UNSTEADY,)),
         *(f"{told}: {DRIVE}" for told in undriven),
-        *late_inputs(log.parts),
+        *(one.message for one in late_inputs(log.parts)),
         *(f"{told}: {DRIVE}" for told in inverses),
         *doubts,
     )

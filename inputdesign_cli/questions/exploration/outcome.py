@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.identification.explore import Candidate, Chosen, Fits, Found, levelled
+from inputdesign_cli.identification.response_chance import driving_nothing
 from inputdesign_cli.outcome.curves import Curves, FitCurves, FitPanel, OrderCurves
 from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.assessment.refutations import chance
-from inputdesign_cli.questions.assessment.unrelated import driving_nothing
 from inputdesign_cli.questions.exploration.unidentified import untold_parameters
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.build.log import Log

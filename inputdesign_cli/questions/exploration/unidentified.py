@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.findings.rivals import most_apart
 from inputdesign_cli.identification.explore import Found, left_of_inputs, one_line, order_of_excitation
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.explore.processes import LONGER
-from inputdesign_cli.questions.assessment.unrelated import chance_of_response, driving_nothing
-from inputdesign_cli.questions.common.rivals import most_apart
+from inputdesign_cli.identification.response_chance import chance_of_response, driving_nothing
 
 # A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
 # not at all beyond the other.

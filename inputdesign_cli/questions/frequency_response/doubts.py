@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.findings.places import places
 from inputdesign_cli.identification.period_drift import PeriodDrift
 from inputdesign_cli.identification.spikes import Spikes
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.assessment.faults import places
 from inputdesign_cli.questions.frequency_response.silent_lines import MATTERS, Distorted
 from inputdesign_cli.tasks.build.data import Data
 

@@ -13,6 +13,7 @@ from inputdesign_cli.design.response import ResponseLines
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.silent_lines import SilentLines
+from inputdesign_cli.outcome import MeasuredLines, write_plain
 from inputdesign_cli.outcome.curves import Curves, DeviationCurves, DeviationPanel, ResponseCurves
 from inputdesign_cli.outcome.results import Array, Json, Results, Table, typed
 from inputdesign_cli.outcome.units import Header
@@ -86,7 +87,7 @@ class Judged:
 def measured_results(
     header: Header,
     found: FrequencyResponse,
-    shown: tuple[Table, ResponseCurves, dict[str, Json]],
+    shown: tuple[Table, ResponseCurves, MeasuredLines],
     judged: Judged | None,
     silent: Mapping[str, SilentLines],
     data: Data,
@@ -101,7 +102,7 @@ def measured_results(
         assess: whether the result is a verdict.
     """
     units, (table, curves, told) = header.units, shown
-    entry: dict[str, Json] = {**told, "blocks": 1}
+    entry: dict[str, Json] = {**write_plain(told), "blocks": 1}
     notes = list(data.notes)
     tables: dict[str, Table] = {"frequency_response": table}
     drawn: dict[str, Curves] = {"frequency_response": curves}

@@ -27,7 +27,7 @@ from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.bound import bound_curves
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.ellipses import Pairs, experiment_ellipses
-from inputdesign_cli.questions.common.foresight import Foresight
+from inputdesign_cli.questions.common.foresight import Foreseen, Foresight
 from inputdesign_cli.questions.common.nyquist import nyquist_curves
 from inputdesign_cli.questions.common.of_length import curves_of_length
 from inputdesign_cli.questions.common.record import (
@@ -207,10 +207,10 @@ class GivenTask:
             start = begun_anywhere(experiment, record.samples, self.record.step, requirements)
             result["signal"] |= start.entry
             notes += start.notes
+        foreseen = Foreseen()
         if record is not None and self.foresight is not None:
             foreseen = self.foresight.foreseen(record.samples, requirements, result)
             result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
-            notes += foreseen.notes
         if notes:
             result["notes"] = notes
         result["timing_s"] = {"analysis": time.perf_counter() - started}
@@ -218,7 +218,7 @@ class GivenTask:
         broken = limits_not_kept(
             self.limits, experiment.samples, read_plain(Powers, excitation.power), outcome.signal
         )
-        outcome = outcome.saying(broken)
+        outcome = outcome.saying([*broken, *foreseen.findings])
         results = Results(outcome, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, confidence.alpha)

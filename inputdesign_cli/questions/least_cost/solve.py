@@ -23,7 +23,7 @@ from inputdesign_cli.outcome.results import Json, Results, typed
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.confidence import Confidence, covered, missed
 from inputdesign_cli.questions.common.ellipses import Pairs
-from inputdesign_cli.questions.common.foresight import Foresight
+from inputdesign_cli.questions.common.foresight import Foreseen, Foresight
 from inputdesign_cli.questions.common.reach import Reach
 from inputdesign_cli.questions.common.record import Made, RecordRequest, designed_spectrum, peak_at, redrawn
 from inputdesign_cli.questions.common.record_notes import record_notes, shortfall
@@ -152,6 +152,7 @@ class ConvexTask:
             tables, curves = tables | robust.tables, curves | robust.curves
             result |= {"notes": [*result.get("notes", []), *robust.notes]} if robust.notes else {}
         files: dict[str, bytes] = {}
+        foreseen = Foreseen()
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record, known)
             drawn = signal_curves(made.request, self.header.units, done.experiment, record)
@@ -171,7 +172,6 @@ class ConvexTask:
             if record is not None and self.foresight is not None:
                 foreseen = self.foresight.foreseen(record.samples, done.problem.requirements, result)
                 result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
-                notes += foreseen.notes
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,
@@ -179,7 +179,8 @@ class ConvexTask:
             "signal": time.perf_counter() - checked,
         }
         units = self.header.units
-        results = Results(typed(result), self.header.resolved_spec, units.time_unit, tables, curves, files)
+        outcome = typed(result).saying(foreseen.findings)
+        results = Results(outcome, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, done.confidence.alpha)
         samples, inputs = record.samples.shape

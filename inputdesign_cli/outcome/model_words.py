@@ -5,9 +5,9 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from functools import singledispatch
+from typing import Any
 
 from inputdesign_cli.arrays import Array, Rows
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -19,7 +19,9 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.plant.reparametrised import Place
 
-Blocks = dict[str, dict[str, Json]]
+Plain = Any
+"""A value as YAML has it: a number, a text, a list or a mapping."""
+Blocks = dict[str, dict[str, Plain]]
 
 
 @singledispatch
@@ -35,7 +37,7 @@ def blocks_of(model: Model) -> Blocks:
 @blocks_of.register
 def _(model: PolynomialModel) -> Blocks:
     single = model.outputs == model.inputs == 1
-    everything: dict[str, tuple[Json, bool]] = {
+    everything: dict[str, tuple[Plain, bool]] = {
         "A": (_rows(model.A), _matter(model.A)),
         "B": (model.B[0][0].tolist() if single else _matrix(model.B), True),
         "F": (model.F[0][0].tolist() if single else _matrix(model.F), any(map(_matter, model.F))),
@@ -51,7 +53,7 @@ def _(model: PolynomialModel) -> Blocks:
 def _(model: ContinuousModel) -> Blocks:
     below = _matrix(model.denominator, descending=True)
     i, j = model.active[0]
-    matrix: dict[str, Json] = {
+    matrix: dict[str, Plain] = {
         "numerator": _matrix(model.numerator, descending=True),
         "denominator": below[i][j] if model.common else below,
     }
@@ -75,7 +77,7 @@ def _(model: StateSpaceModel) -> Blocks:
 @blocks_of.register
 def _(model: Coloured) -> Blocks:
     blocks = blocks_of(model.plant)
-    own: dict[str, Json] = {
+    own: dict[str, Plain] = {
         name: _rows(rows) for name, rows in (("C", model.C), ("D", model.D)) if _matter(rows)
     }
     inside = blocks["noise"].get("D")
@@ -102,7 +104,7 @@ def _(model: Reparametrised) -> Blocks:
     return blocks
 
 
-def _put(block: Json, place: Place, value: float) -> None:
+def _put(block: Plain, place: Place, value: float) -> None:
     """The value at its place in nested mappings and lists."""
     *steps, last = place
     for step in steps:
@@ -132,7 +134,7 @@ def _(model: Reparametrised) -> dict[str, list[Array]]:
     return predictor_of(model.coefficients)
 
 
-def _variance(model: Model) -> dict[str, Json]:
+def _variance(model: Model) -> dict[str, Plain]:
     covariance = model.covariance
     return {"variance": float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()}
 
@@ -141,7 +143,7 @@ def _matter(polynomials: Sequence[Array]) -> bool:
     return any(p.size > 1 for p in polynomials)
 
 
-def _rows(polynomials: Sequence[Array]) -> list[Json]:
+def _rows(polynomials: Sequence[Array]) -> list[Plain]:
     """One polynomial common to all outputs as it is; a list of those of each output."""
     return polynomials[0].tolist() if len(polynomials) == 1 else [p.tolist() for p in polynomials]
 

@@ -1,19 +1,21 @@
-"""What mends a structure that data refute, in the words in which its spec states it."""
+"""Remedies for a structure that data refute, in the words in which its spec states it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from inputdesign_cli.outcome.results import Json
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.outcome.model_words import Plain, blocks_of
 from inputdesign_cli.plant import Model
-from inputdesign_cli.questions.assessment.blocks import blocks_of
 
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
 _LAG = "one more lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
 def remedies_of(model: Model) -> dict[str, str]:
-    """By what the tests find, `plant`, `noise` or `drift`, the keys to change."""
+    """Return the keys to change, by what the tests find: `plant`, `noise` or `drift`."""
     blocks = blocks_of(model)
     plant, known = _of_plant(blocks["plant"]), blocks["plant"].get("known")
     if known:
@@ -22,24 +24,14 @@ def remedies_of(model: Model) -> dict[str, str]:
     return {"plant": plant, **_of_noise(model, blocks)}
 
 
-def vague_notes(model: Model, vague: Sequence[str]) -> list[str]:
-    """Notes on parameters that data may take for zero: coefficients have orders, quantities do not."""
+def quantities(model: Model) -> NDArray[np.bool_]:
+    """(k,): whether each parameter is a physical quantity, of which no order can be too high."""
     plant = blocks_of(model)["plant"]
     named = "parameters" in plant or "gain" in plant.get("continuous", {})
-    quantity = (model.in_plant & named) | model.dead_times
-    of_kind = dict(zip(model.names, quantity, strict=True))
-    notes = []
-    for physical, advice in (
-        (True, "the data hardly tell of it; take more of them, or list what is known in plant.known"),
-        (False, "an order may be too high"),
-    ):
-        listed = ", ".join(name for name in vague if of_kind[name] == physical)
-        if listed:
-            notes.append(f"zero lies within a standard deviation of {listed}: {advice}")
-    return notes
+    return np.asarray((model.in_plant & named) | model.dead_times)
 
 
-def _of_plant(plant: Mapping[str, Json]) -> str:
+def _of_plant(plant: Mapping[str, Plain]) -> str:
     stated = plant.get("continuous", {})
     if "gain" in stated:
         return _lag_more(stated)
@@ -54,7 +46,7 @@ def _of_plant(plant: Mapping[str, Json]) -> str:
     return "give B or F (or A) one more coefficient, by a name in parameters"
 
 
-def _lag_more(stated: Mapping[str, Json]) -> str:
+def _lag_more(stated: Mapping[str, Plain]) -> str:
     """What engineers write of a plant by names, and one more lag, to begin the search with."""
     kept = ", ".join(stated)
     if not all(isinstance(value, (int, float)) for value in stated.values()):
@@ -75,7 +67,7 @@ def _lag_more(stated: Mapping[str, Json]) -> str:
     )
 
 
-def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Json]]) -> dict[str, str]:
+def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[str, str]:
     plant, noise = blocks["plant"], blocks["noise"]
     if model.continuous:
         sampled = "sample the plant (plant.sample: zoh), so that noise may have"

@@ -1,0 +1,208 @@
+"""The estimate is far from the plant of the spec, on which the design rested."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.identification import Estimate
+from inputdesign_cli.outcome import Nominal
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.plant import Model
+
+# Farther apart than this share of the larger of the two, and than so many r_u, G is that of another plant.
+_ANOTHER, _BEYOND_ERROR = 0.5, 2.0
+# A statistic that chance exceeds more often than this contradicts nothing.
+_CHANCE = 1e-3
+# The probability that a normal variable is farther than five standard deviations from its mean.
+_FIVE_DEVIATIONS = 5.733e-7
+_AWAY = 4.0
+_LISTED = 4
+
+ANOTHER = FindingKind(
+    "another-plant",
+    Severity.DOUBT,
+    "the estimate contradicts the plant of the spec",
+    "G of the estimate and of the spec differ by more than half of the larger one and by more than their "
+    "uncertainty. The design rested on another plant.",
+    "Check signs and units of the record. If they are right, put the estimate into the spec.",
+)
+UNCERTAIN = FindingKind(
+    "far-but-uncertain",
+    Severity.NOTE,
+    "the estimate is far from the plant of the spec, and uncertain",
+    "G of the estimate and of the spec differ by more than half of the larger one, but chance explains it.",
+    "Take a longer record.",
+)
+FAR = FindingKind(
+    "far-from-the-spec",
+    Severity.DOUBT,
+    "the estimate lies many deviations from the plant of the spec",
+    "All parameters of G together lie farther from the spec than five standard deviations. It may be another "
+    "plant, have other units, or the numbers of the spec were poor.",
+    "The verdict holds for the estimate. Put it into the spec before the next design.",
+)
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """Where an entry of G is farthest from that of the spec, as a share of the larger of the two."""
+
+    share: float
+    frequency: float
+    entry: str
+    opposite: bool
+
+
+@dataclass(frozen=True)
+class Distance:
+    """How far an estimate lies from the plant of the spec.
+
+    Attributes:
+        listed: the parameters that are farthest, with their values and deviations.
+        worst: where G differs most; None where nothing has r_u.
+    """
+
+    nominal: Nominal
+    listed: tuple[str, ...]
+    worst: _Apart | None
+
+
+def from_nominal(
+    units: Units,
+    nominal: Model,
+    estimated: Model,
+    estimate: Estimate,
+    errors: Sequence[OnModelError],
+    information: Array,
+    *,
+    asked: bool = False,
+    nominal_covariance: Array | None = None,
+) -> Distance:
+    """Return how far an estimate lies from the plant of the spec.
+
+    Args:
+        nominal, estimated: of one structure.
+        errors: what has r_u and a band, entry by entry.
+        information: (k, k) in their coordinates, the inverse covariance of the difference of the two.
+        asked: whether they have an r_adm, below which a difference of G matters to nothing.
+        nominal_covariance: (k, k), how uncertain the plant of the spec is; None if it counts as known.
+    """
+    of_plant = np.flatnonzero(estimated.in_plant)
+    away = (nominal.theta - estimate.theta)[of_plant]
+    covariance = estimate.covariance + (0.0 if nominal_covariance is None else nominal_covariance)
+    scale = np.sqrt(np.diag(covariance))[of_plant]
+    correlation = covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
+    statistic = float((away / scale) @ np.linalg.lstsq(correlation, away / scale, rcond=None)[0])
+    places = [
+        place for error in errors for place in _apart(units, nominal, estimated, error, information, asked)
+    ]
+    worst = max(places, key=lambda one: one.share, default=None)
+    deviations = np.abs(away) / scale
+    listed = tuple(
+        f"{estimate.names[of_plant[k]]} is {estimate.theta[of_plant[k]]:.4g}, not "
+        f"{nominal.theta[of_plant[k]]:.4g} ({deviations[k]:.3g} standard deviations)"
+        for k in np.argsort(-deviations)[:_LISTED]
+        if deviations[k] > _AWAY
+    )
+    found = Nominal(
+        deviations=float(np.sqrt(statistic)),
+        statistic=statistic,
+        degrees_of_freedom=of_plant.size,
+        probability=float(scipy.special.chdtrc(of_plant.size, statistic)),
+        worst_difference=None if worst is None else worst.share,
+        opposite_sign=None if worst is None else any(one.opposite for one in places),
+    )
+    return Distance(found, listed, worst)
+
+
+def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
+    """Return a finding where the two are different plants, or parameters lie far apart."""
+    found, worst = distance.nominal, distance.worst
+    listed = f"{'; ' * bool(distance.listed)}{', '.join(distance.listed)}"
+    figures: dict[str, Any] = {"deviations": found.deviations, "probability": found.probability}
+    chi_squared = f"chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom"
+    if worst is None or worst.share <= _ANOTHER:
+        if found.probability > _FIVE_DEVIATIONS:
+            return []
+        return [
+            FAR.found(
+                f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec "
+                f"(all parameters of G together, {chi_squared}{listed}): it is another plant, its units are "
+                "others, or the numbers of the spec, on which the design rested, were poor. The verdict "
+                "holds for the estimate: r_u and r_adm are those at its parameters",
+                where="plant",
+                **figures,
+            )
+        ]
+    figures["worst_difference"] = worst.share
+    sign = "of the opposite sign at low frequency, and " if found.opposite_sign else ""
+    apart = (
+        f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
+        f"{worst.frequency:.4g} {units.per_time} ({chi_squared}"
+    )
+    if found.probability > _CHANCE:
+        return [
+            UNCERTAIN.found(
+                "the estimate is far from the plant of the spec, but so uncertain that it does not "
+                f"contradict it: {apart}, probability {found.probability:.2g}). A longer record would tell",
+                where="plant",
+                **figures,
+            )
+        ]
+    return [
+        ANOTHER.found(
+            f"the estimate contradicts the plant of the spec: {apart}{listed}). "
+            "The design rested on the plant of the spec; what is admitted here is that of the estimate. "
+            "Check signs and units of the record; if they are right, put the estimate into the spec",
+            where="plant",
+            **figures,
+        )
+    ]
+
+
+def of_first_part(distance: Distance) -> list[Finding]:
+    """Return the same where an experiment in parts begins: a poor first estimate is why it goes in parts."""
+    found = distance.nominal
+    if found.probability > _CHANCE:
+        return []
+    sign = " and G has the opposite sign at low frequency: check the signs of the record"
+    return [
+        FAR.found(
+            f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec"
+            f"{sign if found.opposite_sign else ''}. From now on plans rest on the estimates",
+            where="plant",
+            severity=Severity.NOTE,
+            deviations=found.deviations,
+            probability=found.probability,
+        )
+    ]
+
+
+def _apart(
+    units: Units, nominal: Model, estimated: Model, error: OnModelError, information: Array, asked: bool
+) -> list[_Apart]:
+    """Return where the entries of G of a model error differ by more than r_u and r_adm."""
+    w = error.grid
+    with np.errstate(divide="ignore", invalid="ignore"):  # the nominal plant may have a pole on the grid
+        before, now = nominal.plant_at(w), estimated.plant_at(w)
+    beyond = _BEYOND_ERROR * error.error_bound(information, w)
+    if asked:
+        beyond = np.maximum(beyond, error.admissible.at(w))
+    found = []
+    for i, j in [error.entry] if error.entry is not None else np.ndindex(units.outputs, units.inputs):
+        old, new = before[:, i, j], now[:, i, j]
+        apart = np.where(np.isfinite(old), np.abs(new - old), 0.0)
+        size = np.maximum(np.maximum(np.abs(new), np.nan_to_num(np.abs(old))), 1e-300)
+        share = np.where(apart > beyond, apart / size, 0.0)
+        at = int(np.argmax(share))
+        opposite = bool(share[0] > 1.0 and (old[0].conj() * new[0]).real < 0.0)
+        found.append(_Apart(float(share[at]), float(w[at]) / units.frequency, units.entry(i, j), opposite))
+    return found

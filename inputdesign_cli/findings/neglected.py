@@ -1,0 +1,137 @@
+"""How far G would move if the model had one parameter more, in units of the admissible error.
+
+r_u is the error of a right model. That of a wrong one shows only as far as the record excites it. So beside
+a verdict stands how far one more parameter would move G, to first order, and how far it may with these data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.findings.refuted_structure import REMEDY
+from inputdesign_cli.identification import Directed, Estimate, Moves, that_matter
+from inputdesign_cli.outcome import Neglected as Entry
+from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.plant import Model
+
+# Two-sided 95 % of the normal distribution.
+_ALLOWED = 1.959963984540054
+
+MATTERS = FindingKind(
+    "neglected-parameter",
+    Severity.DOUBT,
+    "a neglected parameter would move G too far",
+    "No test refutes the model. But one more parameter is likely, and it would move G by more than the "
+    "admissible error allows beside the error of the estimate.",
+    "Estimate the parameter along, or excite the frequencies where G would move.",
+)
+RESTS_ON_STRUCTURE = FindingKind(
+    "verdict-rests-on-structure",
+    Severity.NOTE,
+    "the verdict rests on the structure",
+    "The data do not rule out one more parameter that would move G by more than is admitted. With 95 % "
+    "confidence it moves G by no more than the message says.",
+    "Excite the frequencies where G would move, if the structure is not known from physics.",
+)
+
+
+@dataclass(frozen=True)
+class Neglected:
+    """A parameter that the model does without.
+
+    Attributes:
+        moves: what it does to G, at the frequencies of the requirement.
+        may_move: how far it may move G at most, with 95 %, over what is admitted.
+        frequency: where, in the unit of the experiment.
+    """
+
+    directed: Directed
+    moves: Moves
+    may_move: float
+    frequency: float
+
+    def entry(self, units: Units) -> Entry:
+        """Return its entry of `assessment.neglected` or `assessment.variations`."""
+        test = self.directed.test
+        frequency = self.frequency / units.frequency
+        return Entry(test.name, test.probability, self.moves.largest, self.may_move, frequency)
+
+
+def neglected(
+    model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array
+) -> list[Neglected]:
+    """Return the parameters that were tried and do not refute `model`; none where no error of G is admitted.
+
+    Args:
+        information: (k, k), by which r_u is judged.
+    """
+    refuted = {test.name for test in estimate.failed}
+    tried = [directed for directed in estimate.directed if directed.test.name not in refuted]
+    return [
+        max((_largest(model, directed, error, information) for error in errors), key=lambda one: one.may_move)
+        for directed in (tried if errors else [])
+    ]
+
+
+def _largest(model: Model, directed: Directed, error: OnModelError, information: Array) -> Neglected:
+    w = error.grid
+    moves, slope = (
+        np.max([np.linalg.norm(error.concerned(G), axis=1) for G in states], axis=0) / error.admissible.at(w)
+        for states in (directed.moves(model, w), directed.slope(model, w))
+    )
+    deviation = directed.deviation * slope
+    # A record that misses what is asked is judged as one that would just meet it.
+    known = np.minimum(error.error_bound(information, w) / error.admissible.at(w), 1.0) / error.alpha
+    may_move = moves + _ALLOWED * deviation
+    at = int(np.argmax(may_move))
+    return Neglected(directed, Moves(moves, deviation, known), float(may_move[at]), float(w[at]))
+
+
+def mattering(found: Sequence[Neglected]) -> list[Neglected]:
+    """Return the parameters that speak against a verdict."""
+    return [found[i] for i in that_matter([one.directed for one in found], [one.moves for one in found])]
+
+
+def objections(units: Units, found: Sequence[Neglected], *, met: bool) -> list[Finding]:
+    """Return a finding for each parameter that matters, which contradicts a verdict of `met`."""
+    severity = Severity.REFUTED if met else Severity.DOUBT  # more parameters miss it all the more
+    return [
+        MATTERS.found(
+            f"{one.directed.alternatives[0].phrase} would move G by "
+            f"{one.moves.largest:.3g} times the admissible error about {units.named(one.frequency)}"
+            f"{'' if one.moves.largest > 1.0 else ', beyond it with the error of the estimate,'} "
+            f"(probability {chance(one.directed.test.probability)} without it): "
+            f"{REMEDY[one.directed.test.fault]}",
+            where=one.directed.test.name,
+            severity=severity,
+            moves=one.moves.largest,
+            may_move=one.may_move,
+            probability=one.directed.test.probability,
+        )
+        for one in mattering(found)
+    ]
+
+
+def unseen(units: Units, found: Sequence[Neglected]) -> list[Finding]:
+    """Return a finding where the record leaves more of the structure open than is admitted."""
+    worst = max(
+        (one for one in found if one.directed.of_structure), key=lambda one: one.may_move, default=None
+    )
+    if worst is None or worst.may_move <= 1.0:
+        return []
+    return [
+        RESTS_ON_STRUCTURE.found(
+            f"the verdict rests on the structure of the model: {worst.directed.alternatives[0].phrase} that "
+            f"these data do not rule out would move G by up to {worst.may_move:.3g} times the admissible "
+            f"error, at {units.named(worst.frequency)} (95 %)",
+            where=worst.directed.test.name,
+            may_move=worst.may_move,
+        )
+    ]

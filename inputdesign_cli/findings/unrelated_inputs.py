@@ -1,0 +1,142 @@
+"""Inputs that did not move the plant: they answer the outputs, or explain nothing of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.findings.places import Samples
+from inputdesign_cli.identification import Estimate
+from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.explore import answers_output, early_answers
+from inputdesign_cli.identification.response_chance import driven_by_nothing, like_nothing_elsewhere
+from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.plant import Model
+
+# G of the spec is ruled out where chance alone makes such an estimate more seldom.
+_OTHERWISE = 1e-6
+
+ANSWERING = FindingKind(
+    "input-answers-output",
+    Severity.REFUTED,
+    "an input answers the outputs",
+    "Prediction errors help to predict an input. In open loop no input answers the noise.",
+    "See whether the input was logged late or columns are swapped. If the data come from a loop, state it as "
+    "`experiment.controller`.",
+)
+LATE = FindingKind(
+    "input-logged-late",
+    Severity.REFUTED,
+    "an output moves before the input",
+    "An output moves some samples before the input that moves it. The input was logged late, or the columns "
+    "are not of one clock.",
+    "See when the plant really gets its input, and write both at the same times.",
+)
+IDLE = FindingKind(
+    "input-without-effect",
+    Severity.REFUTED,
+    "an input explains nothing",
+    "G of an input cannot be distinguished from zero, though the plant of the spec would answer it clearly.",
+    "See whether the columns are of one experiment. If the plant does not answer, correct the spec.",
+)
+UNEXPLAINED = FindingKind(
+    "output-unexplained",
+    Severity.DOUBT,
+    "the inputs explain nothing of an output",
+    "The model, simulated from the inputs alone, is farther from the output than the mean of the output. No "
+    "effect of the inputs can be distinguished from zero.",
+    "See whether the columns are those of the plant, in their order and their units.",
+)
+NOISE_PREVAILS = FindingKind(
+    "noise-prevails",
+    Severity.NOTE,
+    "noise moves an output more than the inputs",
+    "The effect of the inputs on an output is seen, but noise and drift move it more.",
+    "Apply more power, or compare models by their prediction instead of their simulation.",
+)
+
+
+def answering(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
+    """Return a finding for each input that answers outputs, or comes after their answer; none in a loop."""
+    if units.closed_loop:
+        return []
+    ends = np.cumsum(data.lengths)[:-1]
+    parts = list(zip(np.split(data.u, ends), np.split(data.y, ends), strict=True))
+    errors = np.split(estimate.errors, ends)
+    answers = [
+        ANSWERING.found(
+            f"prediction errors help to tell {signal_name('u', j, units.inputs)} (probability "
+            f"{chance(probability)}), and no input in open loop answers the noise: it was logged late, "
+            "columns are swapped, or the data come from a loop; mend the columns, or state the loop as "
+            "experiment.controller",
+            where=signal_name("u", j, units.inputs),
+            probability=probability,
+        )
+        for j, probability in answers_output(parts, errors)
+    ]
+    return answers or late_inputs(parts)
+
+
+def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
+    """Return a finding for each input before which an output moves: u (n, r), y (n, p) of an open loop."""
+    inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
+    return [
+        LATE.found(
+            f"{signal_name('y', one.output, outputs)} answers {signal_name('u', one.input, inputs)} up to "
+            f"{one.samples} {'sample' if one.samples == 1 else 'samples'} before that moves (probability "
+            f"{chance(one.probability)} by chance): the input was logged late, or the columns are not of one "
+            "clock. See when the plant really gets its input, and write both at the same times",
+            where=signal_name("u", one.input, inputs),
+            samples=one.samples,
+            probability=one.probability,
+        )
+        for one in early_answers(parts)
+    ]
+
+
+def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> list[Finding]:
+    """Return a finding for each input that explains nothing, though at the plant of the spec it would.
+
+    Args:
+        nominal, estimated: of one structure.
+    """
+    return [
+        IDLE.found(
+            f"{signal_name('u', j, units.inputs)} explains nothing of what was measured: G cannot be told "
+            f"from zero (probability {chance(zero)}), and the plant of the spec can: see whether the columns "
+            "are those of one experiment; if the plant does not answer, correct the spec",
+            where=signal_name("u", j, units.inputs),
+            probability=zero,
+        )
+        for j, zero, expected in like_nothing_elsewhere(nominal, estimated, estimate, units.step)
+        if expected < _OTHERWISE
+    ]
+
+
+def hardly_explained(units: Units, model: Model, estimate: Estimate) -> list[Finding]:
+    """Return a finding for outputs that are farther from the simulation than from their mean."""
+    far = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
+    unrelated = driven_by_nothing(model, estimate, units.step) if far else []
+    found = []
+    for kind, sentence, listed in (
+        (
+            UNEXPLAINED,
+            "the inputs explain nothing of {} in this model: see whether the columns are those of the plant, "
+            "in their order and their units, before anything is built on it",
+            [i for i in far if i in unrelated],
+        ),
+        (
+            NOISE_PREVAILS,
+            "what the inputs cause in {} is seen, but noise and drift move it more: simulated from the "
+            "inputs alone, the model is farther off than the mean",
+            [i for i in far if i not in unrelated],
+        ),
+    ):
+        if listed:
+            outputs = " and ".join("y" if len(estimate.noise) == 1 else f"y{i + 1}" for i in listed)
+            found.append(kind.found(sentence.format(outputs), where=outputs))
+    return found
