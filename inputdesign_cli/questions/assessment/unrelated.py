@@ -8,9 +8,9 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.explore import answers_output, early_answers
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.explore import answers_output, early_answers
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.refutations import chance

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.explore import Found, explore_records
+from inputdesign_cli.explore import Found, explore_records
 from inputdesign_cli.questions.assessment.level_shifts import left_out
 from inputdesign_cli.tasks.build.log import Log
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.explore import (
+from inputdesign_cli.explore import (
     Found,
     by_chance,
     interpolated_outputs,
@@ -16,6 +15,7 @@ from inputdesign_cli.identification.explore import (
     unhelpful,
     unstable_pole,
 )
+from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.questions.assessment.refutations import chance
 from inputdesign_cli.questions.assessment.unrelated import driven_by_nothing, late_inputs
 from inputdesign_cli.questions.exploration.at_once import like_inverses

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.explore import Found, left_of_inputs, one_line, order_of_excitation
-from inputdesign_cli.identification.explore.fits import Parts
-from inputdesign_cli.identification.explore.processes import LONGER
+from inputdesign_cli.explore import Found, left_of_inputs, one_line, order_of_excitation
+from inputdesign_cli.explore.fits import Parts
+from inputdesign_cli.explore.processes import LONGER
 from inputdesign_cli.questions.assessment.unrelated import chance_of_response, driving_nothing
 from inputdesign_cli.questions.common.rivals import most_apart
 
