@@ -31,8 +31,8 @@ import scipy.special
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.explore import answers_output
 from inputdesign_cli.identification import Estimate, Moves, identify, that_matter
-from inputdesign_cli.identification.explore import answers_output
 from inputdesign_cli.plant import PolynomialModel
 
 FAULTS = ("lag", "delay", "drift", "noise", "change", "nonlinear")

@@ -16,6 +16,7 @@ ORDER = [
     {"specification", "plant"},
     {"spectrum", "information", "accuracy"},
     {"design", "signal", "identification"},
+    {"explore"},
     {"outcome"},
     {"monte_carlo"},
     {"findings"},
@@ -27,7 +28,16 @@ ORDER = [
     {"cli", "__main__"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
-MATHEMATICS = {"plant", "spectrum", "information", "accuracy", "design", "signal", "identification"}
+MATHEMATICS = {
+    "plant",
+    "spectrum",
+    "information",
+    "accuracy",
+    "design",
+    "signal",
+    "identification",
+    "explore",
+}
 FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("specification", "outcome")} | {
     ("specification", "plant"),
     ("monte_carlo", "specification"),

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.explore import answers_output, early_answers
 from inputdesign_cli.finding import Finding, FindingKind, Severity
 from inputdesign_cli.findings.places import Samples
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.explore import answers_output, early_answers
 from inputdesign_cli.identification.response_chance import driven_by_nothing, like_nothing_elsewhere
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units

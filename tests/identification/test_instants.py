@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from inputdesign_cli.explore.processes import Process, process_models
 from inputdesign_cli.identification import identify
-from inputdesign_cli.identification.explore.processes import Process, process_models
 
 
 def answer(u, lag, late):

@@ -10,7 +10,7 @@ import pytest
 import inputdesign_cli
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.questions.assessment.blocks import blocks_of
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.rebuild import Change, Rebuild
 from inputdesign_cli.questions.building.system import build_experiment, build_model
 from tests.support.campaigns import SPEC

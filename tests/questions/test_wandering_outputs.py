@@ -7,7 +7,7 @@ from inputdesign_cli.questions import explore, solve
 from inputdesign_cli.questions.exploration.build import _inside
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.preparation import Preparation
-from tests.identification.explore.test_integrated import GAIN, LAG, LATE, lagged, steps, walk
+from tests.explore.test_integrated import GAIN, LAG, LATE, lagged, steps, walk
 
 
 @pytest.mark.slow

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from inputdesign_cli.explore import Found, set_apart, together_at_once
+from inputdesign_cli.explore.fits import Parts
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.explore import Found, set_apart, together_at_once
-from inputdesign_cli.identification.explore.fits import Parts
 
 # The static gain is as good as none below this share of the largest one; what falls to this share of its peak
 # has a resonance.

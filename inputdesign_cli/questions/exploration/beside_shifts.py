@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.explore import Found, explore_records
 from inputdesign_cli.findings.level_shifts import left_out
-from inputdesign_cli.identification.explore import Found, explore_records
 from inputdesign_cli.tasks.build.log import Log
 
 # Where more appear, once these are left out so often, the plant is another than any that is looked for.

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
-from inputdesign_cli.identification.explore import Found, output_error_form
+from inputdesign_cli.explore import Found, output_error_form
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.plant import Model

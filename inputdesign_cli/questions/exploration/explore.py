@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
+from inputdesign_cli.explore import Fits, Found, answers_output, fits
 from inputdesign_cli.findings.faults import biasing
 from inputdesign_cli.findings.level_shifts import shifted_levels
 from inputdesign_cli.findings.measured_response import contradicted, response_note
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
-from inputdesign_cli.identification.explore import Fits, Found, answers_output, fits
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import ResponseCurves

@@ -6,9 +6,9 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.explore import Found
+from inputdesign_cli.explore.fits import NOT_COMPUTED
 from inputdesign_cli.identification.estimators import identify
-from inputdesign_cli.identification.explore import Found
-from inputdesign_cli.identification.explore.fits import NOT_COMPUTED
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import parse_spec
 

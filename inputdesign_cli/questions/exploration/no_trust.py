@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.findings.unrelated_inputs import late_inputs
-from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.explore import (
+from inputdesign_cli.explore import (
     Found,
     by_chance,
     interpolated_outputs,
@@ -17,6 +15,8 @@ from inputdesign_cli.identification.explore import (
     unhelpful,
     unstable_pole,
 )
+from inputdesign_cli.findings.unrelated_inputs import late_inputs
+from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driven_by_nothing
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.questions.exploration.at_once import like_inverses

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Candidate, Chosen, Fits, Found, levelled
+from inputdesign_cli.explore import Candidate, Chosen, Fits, Found, levelled
 from inputdesign_cli.identification.response_chance import driving_nothing
 from inputdesign_cli.outcome.curves import Curves, FitCurves, FitPanel, OrderCurves
 from inputdesign_cli.outcome.results import Json, Table

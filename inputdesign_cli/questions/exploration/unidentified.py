@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.explore import Found, left_of_inputs, one_line, order_of_excitation
+from inputdesign_cli.explore.fits import Parts
+from inputdesign_cli.explore.processes import LONGER
 from inputdesign_cli.findings.rivals import most_apart
-from inputdesign_cli.identification.explore import Found, left_of_inputs, one_line, order_of_excitation
-from inputdesign_cli.identification.explore.fits import Parts
-from inputdesign_cli.identification.explore.processes import LONGER
 from inputdesign_cli.identification.response_chance import chance_of_response, driving_nothing
 
 # A parameter of a plant in s is told to no digit where it deviates by more than this share of its value, and
