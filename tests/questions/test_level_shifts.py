@@ -9,9 +9,10 @@ import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.findings import level_shifts
 from inputdesign_cli.identification import LevelShift
 from inputdesign_cli.identification.adequacy import ScoreTest
-from inputdesign_cli.questions import explore, level_shifts
+from inputdesign_cli.questions import explore
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 
