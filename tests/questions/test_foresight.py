@@ -7,7 +7,7 @@ import scipy.signal
 
 from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.questions import foresight, simulation
+from inputdesign_cli.questions.common import foresight, simulation
 from inputdesign_cli.questions.least_cost.build import build_convex
 from tests.support.heater import said
 
@@ -87,7 +87,7 @@ def test_where_a_plain_scan_finds_none_none_is_told(spectrum):
     result, u = solved(f"spectrum={spectrum}")
     assert valleys(u) == []
     assert result["foreseen"] == {"rivals": []}
-    assert not any("nearly as well" in note for note in result.get("notes", []))
+    assert "other-minimum-foreseen" not in {one["code"] for one in result.get("findings", [])}
 
 
 def test_what_is_known_leaves_nothing_to_look_for():
@@ -103,15 +103,18 @@ def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
     monkeypatch.setattr(foresight, "_LONGEST", longest)
     result, _ = solved(override)
     assert "foreseen" not in result
-    assert any(reason in note and "was not looked at" in note for note in result["notes"])
+    (found,) = [one for one in result["findings"] if one["code"] == "other-minima-not-looked-at"]
+    assert reason in found["message"]
 
 
 def test_without_time_nothing_is_begun():
     asked = build_convex(load_spec("specs/heater.yaml"))
     with time_limit(0.01):
         foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), (), {})
-    assert foreseen.entry == {}
-    assert "solver.time_limit left no time" in foreseen.notes[0]
+    assert foreseen.entry is None
+    (found,) = foreseen.findings
+    assert found.code == "other-minima-not-looked-at"
+    assert "solver.time_limit left no time" in found.message
 
 
 @pytest.mark.slow

@@ -11,7 +11,8 @@ from inputdesign_cli import assess, identify, parse_spec
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import LevelShift
 from inputdesign_cli.identification.adequacy import ScoreTest
-from inputdesign_cli.questions import explore, level_shifts
+from inputdesign_cli.questions import explore
+from inputdesign_cli.questions.exploration import beside_shifts
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 
@@ -143,8 +144,8 @@ def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths):
             raise answer
         return answer
 
-    monkeypatch.setattr(level_shifts, "explore_records", explored)
-    rest, found = level_shifts.explored_beside_shifts(log, loop=False)
+    monkeypatch.setattr(beside_shifts, "explore_records", explored)
+    rest, found = beside_shifts.explored_beside_shifts(log, loop=False)
     assert rest.lengths == lengths
     assert found is answers[-1]
     told = " ".join(rest.steps)
