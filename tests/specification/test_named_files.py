@@ -17,8 +17,8 @@ MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\naccuracy: {stan
 TABLE = "frequency,r_adm\n0,1\n3.2,1\n"
 NAMING = {
     "accuracy.model_error.table": "%s",
-    "accuracy.frequency_response": "{table: %s, lines: 9}",
-    "accuracy.frequency_response.noise": "%s",
+    "accuracy": "{frequency_response: {table: %s, band: [0.1, 1], lines: 9}}",
+    "accuracy.frequency_response": "{relative: 0.1, band: [0.1, 1], lines: 9, noise: %s}",
     "limits.spectrum": "{max: {table: %s}}",
     "limits.spectrum.min": "{table: %s}",
     "spectrum": "{given: {type: table, file: %s}}",

@@ -18,24 +18,24 @@ from inputdesign_cli.questions.common.robust import MET, Batch, Kept, Plants, Se
 from inputdesign_cli.questions.least_cost.floor import floor_at
 from inputdesign_cli.questions.least_cost.robust_outcome import (
     RobustResult,
+    floors_and_search,
     fresh_entry,
     plants_entry,
     scenario_table,
-    told_of_plants,
 )
 from inputdesign_cli.questions.least_cost.worst_case import worst_plant
 
 
 @dataclass(frozen=True)
 class AtPlants:
-    """An excitation of so much `power` and so many `samples`, and its information in any coordinates."""
+    """An excitation of this `power` over these `samples`; `information` gives M in any coordinates."""
 
     information: Callable[[Experiment], Array]
     power: float
     samples: int
 
     def on(self, plant: Alternative) -> Tried:
-        """Return how near a plant comes to being missed: infinitely where its parameters are not told."""
+        """Return how near a plant comes to being missed: infinitely if its parameters are undetermined."""
         seconds_left()
         own = replace(plant.experiment, samples=self.samples)
         asked = tuple(make(own) for make in (*plant.requirements, *plant.side))
@@ -64,13 +64,13 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
 
     Args:
         at: the excitation.
-        plants: beside that of the spec; so many as may be discarded are left out, the worst.
+        plants: all but the plant of the spec. The worst are left out, as many as may be discarded.
         nominal: what it keeps at the plant of the spec, whose parameters are `centre` (k,).
         centre: see there.
         units: of the spec.
 
     Raises:
-        SpecError: `not-exciting` where parameters of a plant are not told.
+        SpecError: `not-exciting` if parameters of a plant are undetermined.
     """
     batch = plants.batch
     tried = at.on_each(batch)
@@ -94,7 +94,7 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
     binding = [int(np.argmax([one.share for one in at_each]))]
     missed = sum(one.share > MET for one in looked_at)
     entry = plants_entry(units, plants, numbers, at_each, binding) | {"missed": missed}
-    more, notes = told_of_plants(units, plants, kept, [floor_at(tried[place].asked) for place in kept])
+    more, notes = floors_and_search(units, plants, kept, [floor_at(tried[place].asked) for place in kept])
     entry |= more
     if plants.afresh is not None:
         fresh, fewer = fresh_entry(plants, plants.afresh(), at.on_each)

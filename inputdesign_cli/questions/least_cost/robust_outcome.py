@@ -77,7 +77,7 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
         dearest = int(np.argmax(costs))
         entry["dearest"] = {"scenario": numbers[dearest], "cost": costs[dearest]}
     floors = [floor_at((*one.requirements, *one.side)) for one in done.problem.scenarios[1:]]
-    found, notes = told_of_plants(units, plants, kept, floors)
+    found, notes = floors_and_search(units, plants, kept, floors)
     entry |= found
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
@@ -119,7 +119,7 @@ def plants_entry(
     }
 
 
-def told_of_plants(
+def floors_and_search(
     units: Units, plants: Plants, kept: Sequence[int], floors: Sequence[Floor]
 ) -> tuple[dict[str, Json], tuple[str, ...]]:
     """Return `floor` and `searched`, and the notes on floors and on plants that are none.
@@ -206,7 +206,7 @@ def fresh_entry(
     Args:
         plants: those that count.
         afresh: the others.
-        try_on: what they keep; a share up to the number may be told as 0.
+        try_on: what they keep; a share up to the number may be returned as 0.
         peak: see `robust_result`.
         promised: the cost that a design promises at every plant.
     """
