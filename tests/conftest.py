@@ -31,6 +31,12 @@ def pytest_collection_finish():
     gc.set_threshold(_NEW_OBJECTS, 10, 10)
 
 
+@pytest.fixture(autouse=True)
+def _time_for_hints(monkeypatch):
+    """Hints do not depend on how busy the machine is that runs the tests."""
+    monkeypatch.setattr("inputdesign_cli.compute.time_limit.HINT_SECONDS", 600.0)
+
+
 @pytest.fixture
 def flexible():
     """The flexible transmission in its (reconstructed) loop, N = 500."""

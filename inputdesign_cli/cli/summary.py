@@ -65,6 +65,8 @@ def _asked(outcome: Outcome) -> Iterator[Line]:
     asked = objective(None if found is None else found.kind).asked
     if status in GIVEN and outcome.identification is None:
         asked = f"what the given excitation buys{GIVEN[status]}"
+    if asked and outcome.solver is not None and outcome.solver.method == "lmi":
+        asked += f" on a grid of {outcome.solver.details['grid']} frequencies"
     if asked:
         yield "asked", asked
 

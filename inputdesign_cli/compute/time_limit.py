@@ -11,6 +11,9 @@ from threading import Event
 
 from inputdesign_cli.errors import InaccurateError
 
+# The longest search for what to do instead of what is infeasible. No design depends on it, only a hint.
+HINT_SECONDS = 5.0
+
 
 class OutOfTimeError(InaccurateError):
     """The time limit has passed, or somebody asked for the end."""
@@ -22,7 +25,7 @@ _stopped: ContextVar[Event | None] = ContextVar("stopped", default=None)
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """What is computed inside ends after so many seconds, at the next `seconds_left`."""
+    """End what is computed inside after `seconds`, at the next `seconds_left`."""
     token = _end.set(time.monotonic() + seconds)
     try:
         yield
@@ -31,8 +34,15 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 @contextmanager
+def time_for_hints() -> Iterator[None]:
+    """End what is computed inside after `HINT_SECONDS`, or earlier with the time limit around it."""
+    with time_limit(min(HINT_SECONDS, _end.get() - time.monotonic())):
+        yield
+
+
+@contextmanager
 def finishing() -> Iterator[None]:
-    """What is computed inside has the time that it takes: a few last steps of what ran out of it."""
+    """Let what is computed inside take its time: the last steps after the time limit has passed."""
     tokens = _end.set(inf), _stopped.set(None)
     try:
         yield
@@ -70,7 +80,7 @@ def time_is_over() -> bool:
 
 
 def was_stopped() -> bool:
-    """Whether somebody asked for the end of what is being computed."""
+    """Return whether somebody asked the computation to end."""
     stopped = _stopped.get()
     return stopped is not None and stopped.is_set()
 

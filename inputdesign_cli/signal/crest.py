@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
 POWERS = (4, 8, 16, 32, 64, 128, 256, 512)
@@ -35,6 +36,9 @@ def optimise_phases(
             reach; the record itself when there are none.
         powers: the p, even numbers; with 4 alone the modulus comes out as even as can be.
         steps: of the quasi-Newton method, for each p.
+
+    Raises:
+        OutOfTimeError: see `seconds_left`.
     """
     signals: list[ComplexArray | None] = list(gains) or [None]
     phases, best = start, np.inf
@@ -61,16 +65,20 @@ def joint_peak(lines: Sinusoids, phases: Array, signals: Sequence[ComplexArray |
 
 
 def crest_factor(record: Array) -> float:
-    """Largest modulus over root mean square."""
-    return float(np.abs(record).max() / np.sqrt(np.mean(record**2)))
+    """Largest modulus over root mean square; one for a record that is zero."""
+    peak = float(np.abs(record).max())
+    return peak / float(np.sqrt(np.mean(record**2))) if peak > 0.0 else 1.0
 
 
 def _log_norm(
     phases: Array, lines: Sinusoids, signals: Sequence[ComplexArray | None], p: int
 ) -> tuple[float, Array]:
     """log of the p-norm (a mean) of all the signals, and its gradient with respect to the phases."""
+    seconds_left()
     records = [lines.record(phases, gains) for gains in signals]
     peak = max(np.abs(record).max() for record in records)
+    if peak == 0.0:  # so few samples that all of them are zeros of the sinusoids: no phase is better
+        return 0.0, np.zeros(phases.size)
     count = sum(record.size for record in records)
     # Without those that do not matter: powers that underflow are slow.
     least = _NEGLIGIBLE ** (1.0 / p)

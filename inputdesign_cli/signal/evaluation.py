@@ -83,10 +83,11 @@ class Evaluator:
     def costs_more(self, samples: Array, cost: float) -> bool:
         """Whether multiples of the samples miss what is asked as long as they cost no more than that."""
         least = self.target.least_ratio
-        if least is None or cost <= 0.0:
+        own = self.cost(samples)
+        if least is None or cost <= 0.0 or own <= 0.0:
             return False
         known = self.plant.known
-        square = cost / self.cost(samples)
+        square = cost / own
         try:
             return least(known + square * (self.plant.information(samples) - known)) > MET
         except np.linalg.LinAlgError:

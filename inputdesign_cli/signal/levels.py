@@ -36,7 +36,7 @@ def few_levels(
 ) -> Array:
     """(samples, r): `lines.inputs` blocks of a period each, every input of two or three levels of its own.
 
-    The powers of the inputs are those of the lines. What remains beyond the last period continues it.
+    The inputs have the powers of the lines. What remains beyond the last period continues it.
     """
     assert lines.period is not None
     period, r = lines.period, lines.inputs
@@ -51,7 +51,8 @@ def few_levels(
     def restored(levels: Array) -> tuple[Array, float]:
         transform = np.fft.rfft(levels.reshape(r, period, r), axis=1).transpose(1, 2, 0)
         wanted = _restored(roots, transform, period)
-        fit = float(np.vdot(transform, wanted).real / np.vdot(transform, transform).real)
+        size = float(np.vdot(transform, transform).real)
+        fit = float(np.vdot(transform, wanted).real) / size if size > 0.0 else 0.0
         blocks = np.fft.irfft(wanted.transpose(2, 0, 1), period, axis=1)
         return blocks.reshape(r * period, r), float(np.sum(np.abs(wanted - fit * transform) ** 2))
 
@@ -88,7 +89,7 @@ def _alternate(
 
 
 def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> ComplexArray:
-    """(L, r, r): the matrices of the wanted powers nearest to those of the blocks (columns)."""
+    """(L, r, r): the matrices of the wanted powers nearest to the transforms of the blocks (columns)."""
     line = np.full(len(roots), np.sqrt(0.5))
     line[0] = 1.0
     if period % 2 == 0:

@@ -14,6 +14,7 @@ from inputdesign_cli.signal.settings import LEVELLED, SignalSettings
 
 _INSIDE = 1.0 - 1e-12
 _TRIES = 8
+_SILENT = 1e-300  # what signals that are zero use of their bounds, so that any factor will do
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Limiter:
         """Few levels stay so: the limits bound their height, that of all inputs by one factor."""
         factor = min(limits.factor(column) for limits, column in zip(self.inputs, goal.T, strict=True))
         if self.constraints:
-            factor = min(factor, _INSIDE / peak_ratio(goal, self.constraints))
+            factor = min(factor, _INSIDE / max(peak_ratio(goal, self.constraints), _SILENT))
         rounded = factor >= 1.0
 
         def fit(limits: InputLimits, column: Array) -> Array:

@@ -12,6 +12,9 @@ from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.multisine import block_vectors
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
+# A frequency this near to a harmonic, in harmonics, is that one.
+_ON_GRID = 1e-9
+
 # From the lines (L, r) to a signal, and the largest modulus that it may have.
 LimitedResponse = tuple[ComplexArray, float]
 
@@ -54,7 +57,19 @@ def low_peak_phases(
 
 def _common(lines: Lines, samples: int, powers: Array) -> Sinusoids:
     """One period of sinusoids of these powers at the frequencies of the lines."""
-    period = samples // lines.inputs
-    on_grid = lines.period == period
-    harmonics = np.rint(lines.frequencies * period / (2 * np.pi)).astype(np.int_) if on_grid else None
-    return Sinusoids(lines.frequencies, powers, period, harmonics)
+    period, w = samples // lines.inputs, lines.frequencies
+    repeats = period if lines.period == period else _repeats(w)
+    if repeats is None or repeats > period:
+        return Sinusoids(w, powers, period)
+    return Sinusoids(w, powers, repeats, np.rint(w * repeats / (2 * np.pi)).astype(np.int_))
+
+
+def _repeats(frequencies: Array) -> int | None:
+    """Return the samples after which sinusoids repeat that are evenly spaced harmonics, otherwise None."""
+    steps = np.diff(np.unique(frequencies), prepend=0.0)
+    repeats = 2.0 * np.pi / np.min(steps[steps > 0.0], initial=np.inf)
+    if not 1.0 <= repeats < np.inf:
+        return None
+    whole = int(np.rint(repeats))
+    harmonics = frequencies * whole / (2.0 * np.pi)
+    return whole if np.all(np.abs(harmonics - np.rint(harmonics)) < _ON_GRID) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,11 @@ _CLIPPED = (1.0, 1.4, 2.0, 3.0)
 _FAR = 40.0
 # So often at most the times of switching of ramps between two levels are changed.
 _SWITCHINGS = 600
+# Beyond this length the search for better times of switching makes fewer tries, so that it takes no longer.
+_LONG = 2000
+# Other phases hardly change the ratio of a record. Luck does not make up for a larger miss than this if the
+# record has enough samples, nor for one of more than some times what a few candidates differ by.
+_HOPELESS, _SAMPLES, _TRIES, _SPREADS = 1.15, 100, 3, 2.0
 # A record that costs more than the design by this share is worth more candidates.
 _LITTLE = 0.05
 
@@ -61,9 +67,9 @@ def best_record(
     """The best of several records of a designed spectrum, each from its own stream of the seed.
 
     Args:
-        plant: for records of the length of the generator's.
+        plant: for records as long as the generator's.
         first: whether the first that meets the target is enough.
-        limiting: the plants at which limits on single samples hold (default: those of `plant`).
+        limiting: the plants at which limits on single samples hold (default: all in `plant`).
 
     Raises:
         OutOfTimeError: the time limit passed before the first was made.
@@ -72,15 +78,28 @@ def best_record(
     limiter = limiter_of(limiting or plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
     best = candidates.record(_stream(settings.seed, 0))
+    missed = [best.worst_ratio]
     for number in range(1, max(settings.candidates, settings.most_candidates)):
         if (first and best.met) or (number >= settings.candidates and candidates.suffices(best)):
+            break
+        if bounds.hard and candidates.free_level and not best.met and _hopeless(missed, len(best.samples)):
             break
         try:
             other = candidates.record(_stream(settings.seed, number), best)
         except OutOfTimeError:
             break
+        missed.append(other.worst_ratio)
         best = min((best, other), key=candidates.rank)
     return best
+
+
+def _hopeless(ratios: Sequence[float], samples: int) -> bool:
+    """Return whether the worst ratios of candidates that all miss show that others will miss as well."""
+    least, largest = min(ratios), max(ratios)
+    if not np.isfinite(largest):
+        return False
+    far = samples >= _SAMPLES and least > _HOPELESS
+    return far or (len(ratios) >= _TRIES and least - MET > _SPREADS * (largest - least))
 
 
 def _stream(seed: int, number: int) -> np.random.Generator:
@@ -95,7 +114,7 @@ class _Candidates:
     evaluator: Evaluator
 
     def rank(self, record: Record) -> tuple[bool, float]:
-        """Those that meet the target by their cost, before the others by their ratio."""
+        """Rank records that meet the target by their cost, before all others by their ratio."""
         meets = self.evaluator.target.meets
         return (False, record.extra_power) if meets and record.met else (meets, record.worst_ratio)
 
@@ -107,7 +126,9 @@ class _Candidates:
         """One candidate at its level, or the best so far where it is seen early to be no better."""
         seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
-        values = values * np.sqrt(power / _power(values))
+        drawn = _power(values)
+        if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
+            values = values * np.sqrt(power / drawn)
         if self.generator.method == "slewed":
             values = self._switched(values, self._strongest, rng)
         factor, evaluator = self.generator.factor, self.evaluator
@@ -127,10 +148,14 @@ class _Candidates:
         )
 
     @property
+    def free_level(self) -> bool:
+        """Whether the level of a record is the one that it needs."""
+        return self.evaluator.target.meets and self.limiter.settings.level is None
+
+    @property
     def _free(self) -> bool:
         """Whether a record is its values at the level that it needs, and nothing else."""
-        stated = self.limiter.settings.level is not None
-        return self.evaluator.target.meets and self.limiter.plain and not stated
+        return self.free_level and self.limiter.plain
 
     @property
     def _strongest(self) -> float:
@@ -151,8 +176,10 @@ class _Candidates:
             return evaluator.figure(limiter.record(np.tile(period, (settings.periods, 1)), level))
 
         period = values[: len(values) // settings.periods]
-        enough = 1.0 if evaluator.target.meets else None
-        return np.tile(better_switching(period, figure, rng, _SWITCHINGS, enough), (settings.periods, 1))
+        meets = evaluator.target.meets
+        tries = _SWITCHINGS * _LONG // max(len(values) * settings.hold, _LONG) if meets else _SWITCHINGS
+        better = better_switching(period, figure, rng, tries, 1.0 if meets else None)
+        return np.tile(better, (settings.periods, 1))
 
     def _levelled(self, values: Array, rng: np.random.Generator, *, switched: bool) -> tuple[Array, bool]:
         """The record at its level, and whether it does what is asked.
@@ -188,7 +215,7 @@ class _Candidates:
         return self._affordable(values, level), False
 
     def _best_within(self, values: Array) -> Array:
-        """The most telling record between the highest that fits as it is and that of the designed power.
+        """Return the most informative record between the highest that fits and one of the designed power.
 
         What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
@@ -205,7 +232,7 @@ class _Candidates:
         limiter = self.limiter
         factors = [limits.factor(column) for limits, column in zip(limiter.inputs, values.T, strict=True)]
         if limiter.constraints:
-            factors.append(1.0 / peak_ratio(values, limiter.constraints))
+            factors.append(1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
         return min(min(factors), 1.0)
 
     def _of_designed_power(self, values: Array) -> Array:
@@ -219,7 +246,7 @@ class _Candidates:
         return self._affordable(values, level)
 
     def _lowered(self, values: Array, level: float) -> Array:
-        """The values with their peak lowered towards what the limits leave, if that keeps their kind."""
+        """Lower the peak of the values towards what the limits admit, if that keeps their kind."""
         settings, reach = self.limiter.settings, self.limiter.inputs[0].reach
         fixed = settings.method in FROM_LEVELS or settings.phases == "optimised" or settings.ramp
         # Phases of several inputs that give way one by one would spoil the cross-spectra.

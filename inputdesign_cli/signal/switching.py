@@ -15,8 +15,8 @@ from inputdesign_cli.compute.time_limit import time_is_over
 
 _MOST_CHANGES = 3
 _SHIFTED = 0.6  # the share of the changes that shift a switch; the others add or remove one
-# After each so many tries: would as much gained again and again be enough?
-_STRETCH = 100
+# After each so many tries, or sixth of them: would as much gained again and again be enough?
+_STRETCH, _STRETCHES = 100, 6
 
 
 def better_switching(
@@ -29,14 +29,15 @@ def better_switching(
     """The best of the signals of two levels (n, r) that are met from `values` on; out of time, that so far.
 
     Args:
-        figure: of such a signal, to be small.
+        figure: of a signal of two levels, to be small.
         tries: at most.
         enough: ends the search; so does a pace that would not lead there. None: as small as it gets.
     """
     best, least = values, float(figure(values))
-    for left in range(tries, 0, -_STRETCH):
+    stretch = max(min(_STRETCH, tries // _STRETCHES), 1)
+    for left in range(tries, 0, -stretch):
         before = least
-        for _ in range(min(left, _STRETCH)):
+        for _ in range(min(left, stretch)):
             if time_is_over() or (enough is not None and least <= enough):
                 return best
             tried = best
@@ -45,7 +46,7 @@ def better_switching(
             reached = float(figure(tried))
             if reached < least:
                 best, least = tried, reached
-        if enough is not None and (before - least) * (left / _STRETCH - 1.0) < least - enough:
+        if enough is not None and (before - least) * (left / stretch - 1.0) < least - enough:
             return best
     return best
 

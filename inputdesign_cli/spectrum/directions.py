@@ -18,6 +18,7 @@ _SINGULAR = 1e-13
 _NOTHING = 1e-140
 _ROUNDING = 1e-15
 _LEVEL = 1e-10  # ratios this near to each other, relative, are the same
+_BETWEEN = 200  # frequencies between two of a grid
 
 WeightedSums = Callable[[NDArray, NDArray, Array], NDArray]
 
@@ -116,14 +117,35 @@ def directed_scale(price: Functional, value: Functional, grid: Array) -> tuple[f
 
     over_grid = ratio(grid)
     peaks, heights = local_maxima(ratio, grid, over_grid)
-    if over_grid[0] == -np.inf:
-        # Near a frequency that costs nothing the ratio hardly changes, but the price loses its size: as far
-        # off as the ratio is the same.
-        changed = np.abs(over_grid[1:] - over_grid[1]) > _LEVEL * np.abs(over_grid[1])
-        peaks = np.maximum(peaks, grid[max(int(np.argmax(changed)), 1)])
+    if over_grid[0] == -np.inf and peaks.size:
+        peaks = np.maximum(peaks, _beside_free(ratio, grid, over_grid, peaks[0], heights[0]))
     if value.concentrated:
         return 0.0, peaks
     return inverse_of(heights), peaks
+
+
+def _beside_free(
+    ratio: Callable[[Array], Array], grid: Array, over_grid: Array, first: float, top: float
+) -> float:
+    """Return the largest frequency at which a `ratio` is as large as beside grid[0], which costs nothing.
+
+    Towards that frequency the ratio hardly changes, but the price loses its size: a sinusoid there would have
+    no unit. The grid may be coarse there, so that the interval in which the ratio falls is searched.
+
+    Args:
+        over_grid: the ratios on the grid.
+        first, top: the first local maximum and its ratio.
+    """
+
+    def same(ratios: Array) -> NDArray[np.bool_]:
+        return np.abs(ratios - top) <= _LEVEL * np.abs(top)
+
+    beyond = int(np.searchsorted(grid, first, side="right"))
+    fallen = np.flatnonzero(~same(over_grid[beyond:]))
+    if not np.all(same(over_grid[1 : beyond - 1])):
+        return first
+    between = np.geomspace(first, grid[beyond + fallen[0]] if fallen.size else grid[-1], _BETWEEN)
+    return float(between[same(ratio(between))].max(initial=first))
 
 
 def inverse_of(heights: Array) -> float:

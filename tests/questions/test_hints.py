@@ -139,3 +139,23 @@ def test_no_record_is_handed_over_that_costs_a_thousand_times_the_design(late, h
         assert late < 57
         assert found["signal"]["extra_power"] < 1e3
         assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_what_would_do_is_looked_for_within_seconds(monkeypatch):
+    """That nothing meets the accuracy is proved before, with the same numbers."""
+    text = PLANTS["open"] + LIMITS["peaks"] % 0.3 + COMMON % 0.05
+
+    def refused():
+        with pytest.raises(InfeasibleError) as error:
+            solve(parse_spec(text))
+        (told,) = error.value.diagnostics
+        return told
+
+    whole = refused()
+    monkeypatch.setattr("inputdesign_cli.compute.time_limit.HINT_SECONDS", 0.0)
+    short = refused()
+    assert whole.code == short.code == "infeasible"
+    assert whole.details == short.details
+    assert "a record can" in whole.hint
+    assert "a record can" not in short.hint
+    assert "not looked for further" in short.hint

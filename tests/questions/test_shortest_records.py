@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from unittest.mock import Mock
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -13,9 +13,10 @@ from scipy.signal import lfilter
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.questions.common.record import Made
+from inputdesign_cli.questions.common.record import Made, make_record
 from inputdesign_cli.questions.least_cost.shortest_record import ShortestRecord, Way
-from inputdesign_cli.signal import Record
+from inputdesign_cli.questions.task import build_task
+from inputdesign_cli.signal import Record, SignalGenerator
 
 # A lag whose spectrum alone would take five samples, and two inputs whose designs of stated length differ.
 LAG = """
@@ -104,7 +105,7 @@ class Ways:
         return Record(np.zeros((samples, 1)), "binary", ratio, met=samples >= enough)
 
     def way(self, number: int) -> Way:
-        def made(samples: int) -> Made:
+        def made(samples: int, spectrum_of: int | None = None) -> Made:
             if len(self.tried) >= self.until:
                 raise OutOfTimeError([])
             self.tried.append((number, samples))
@@ -138,6 +139,74 @@ def test_the_length_is_that_of_the_best_way_to_one_per_cent(enough, start, block
     lengths = {samples for _, samples in ways.tried}
     assert len(lengths) <= 24
     assert len(ways.tried) <= len(lengths) * len(enough)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    enough=st.lists(st.integers(3_000, 300_000), min_size=2, max_size=6),
+    share=st.floats(0.3, 0.99),
+    inputs=st.sampled_from([1, 2, 3]),
+)
+def test_few_long_records_are_made(enough, share, inputs):
+    """What a record needs follows from a short one: long ones are made in the best way, and few of them."""
+    ways = Ways(enough)
+    start = max(int(share * min(enough)), 2_001)
+    if start >= min(enough):
+        return
+    search = ShortestRecord([ways.way(n) for n in range(len(enough))], 1, 10**6, inputs=inputs)
+    found = search.search([ways.record(0, start)])
+    assert found is not None
+    assert found.record is not None
+    assert min(enough) <= len(found.record.samples) <= 1.011 * min(enough)
+    long = [(number, samples) for number, samples in ways.tried if samples >= start]
+    assert len(long) <= 4
+    assert max(enough[number] for number, _ in long) <= 1.02 * min(enough)
+    assert len(ways.tried) - len(long) <= len(enough)
+
+
+LONG = """
+plant: {B: [0, 1.0], F: [1, -0.9]}
+noise: {variance: 1.0}
+accuracy: {model_error: {relative: 0.012}}
+spectrum: {type: fir, order: 4}
+limits: {amplitude: 1}
+solver: {any_spectrum: false}
+"""
+
+
+def test_a_long_shortest_record_takes_few_records_of_its_length():
+    """The work is counted in samples of records that are made, in lengths of the one that is found."""
+    made, plain = [], SignalGenerator.values
+
+    def values(self, rng):
+        made.append(self.samples)
+        return plain(self, rng)
+
+    with patch.object(SignalGenerator, "values", values):
+        found = solve(parse_spec(LONG + SHORTEST)).result["signal"]
+    assert found["samples"] > 4000
+    assert found["worst_ratio"] <= 1.0 + 1e-9
+    assert sum(made) <= 15 * found["samples"]
+
+
+@pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
+def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):
+    """No phases make up for a third less accuracy than asked."""
+    made, plain = [], SignalGenerator.values
+
+    def values(self, rng):
+        made.append(self.samples)
+        return plain(self, rng)
+
+    short = f"experiment: {{samples: 1500}}\nobjective: best_accuracy\nsignal: {{type: {method}}}\n"
+    task = build_task(parse_spec(LONG + short))
+    design = task.designed()[0].design
+    design = replace(design, problem=replace(design.problem, goal="cost"))
+    with patch.object(SignalGenerator, "values", values):
+        record = make_record(task.record, design, 1500)
+    assert record is not None
+    assert not record.met
+    assert len(made) == 1
 
 
 def test_a_search_ends_at_the_longest_record_and_with_its_time():

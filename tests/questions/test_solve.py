@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome.golden import compare
 from inputdesign_cli.outcome.golden_file import load_golden
+from inputdesign_cli.questions.least_cost.grid_method import GridMethod
 from inputdesign_cli.sweeps.verbs import execute
 
 ROOT = Path(__file__).parent.parent.parent
@@ -90,7 +92,36 @@ def test_equal_seeds_give_equal_signals():
 def test_grid_method_reports_itself_honestly():
     outcome = solve(spec_of(SMALL, solver="{method: lmi, grid: 60}"))
     assert outcome.result["status"] == "optimal_on_grid"
+    assert any("on the grid of 60 frequencies" in note for note in outcome.result["notes"])
+    assert "on a grid of 60 frequencies" in summary(outcome.outcome, "s", [])
     assert outcome.result["cost"] == pytest.approx(solve(spec_of(SMALL)).result["cost"], rel=1e-5)
+
+
+@pytest.mark.parametrize("lo", [0.0, 1e-4, 0.02, 1.0])
+@pytest.mark.parametrize("lines", [2, 3, 50])
+def test_the_grid_runs_from_one_end_of_the_band_to_the_other(lo, lines):
+    grid = GridMethod(lines, "gram").frequencies(lo, 2.5)
+    assert grid.size == lines
+    assert (grid[0], grid[-1]) == pytest.approx((lo, 2.5), rel=1e-14)
+    assert np.all(np.diff(grid) > 0.0)
+
+
+def test_the_grid_method_keeps_the_accuracy_at_the_low_end_of_the_band():
+    """A very slow lag whose error is largest at the lowest frequency, a ten-thousandth of the highest."""
+    text = """
+plant: {A: [1, -0.995], B: [0, 0.005]}
+noise: {variance: 0.1}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.1, alpha: 2, band: [3.0e-4, 3]}}
+spectrum: {type: fir, order: 6}
+"""
+    exact, on_grid = (
+        solve(parse_spec(f"{text}solver: {{{solver}}}\n")).result
+        for solver in ("method: exchange", "method: lmi, grid: 40")
+    )
+    assert exact["model_error"]["worst_frequency"] == pytest.approx(3e-4)
+    assert on_grid["cost"] == pytest.approx(exact["cost"], rel=1e-5)
+    assert on_grid["model_error"]["worst_ratio"] <= 1.0 + 1e-5
 
 
 @pytest.mark.parametrize("kind", ["fir, order: 3", "free"])

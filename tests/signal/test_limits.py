@@ -7,12 +7,14 @@ from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import (
     Bounds,
     DesignedSpectrum,
+    Lines,
     Quantiser,
     SignalGenerator,
     SignalSettings,
     Target,
     best_record,
     largest_move,
+    levels,
 )
 from inputdesign_cli.signal.constraints import compressed, slow_moves
 from inputdesign_cli.signal.level_search import first_level, last_level, least_level, level_of_power
@@ -175,6 +177,39 @@ def experiment(request, first_order):
     if request.param == 1:
         return first_order.whitened(1.0)
     return Experiment(arx(), 240).whitened(1.0)
+
+
+@pytest.mark.parametrize("meets", [True, False])
+@pytest.mark.parametrize("limited", [*LIMITS, "none"])
+@pytest.mark.parametrize("kind", SETTINGS)
+def test_values_that_are_zero_make_a_record_of_zeros(monkeypatch, experiment, kind, limited, meets):
+    """A few samples may all be zeros of the sinusoids: nothing is divided by what they cause."""
+
+    def ratio(information):
+        return 0.45 / float(np.linalg.norm(np.linalg.cholesky(information), -2))
+
+    def zeros(self, rng):
+        return np.zeros((self.samples // self.settings.hold, self.spectrum.inputs))
+
+    monkeypatch.setattr(SignalGenerator, "values", zeros)
+    bounds = bounds_of(experiment.inputs, **LIMITS.get(limited, {}))
+    settings = SignalSettings(**SETTINGS[kind], candidates=2)
+    generator = SignalGenerator(SPECTRA[experiment.inputs], settings, experiment.samples)
+    target = Target(ratio, meets, {"output": 1.0}, least_ratio=ratio)
+    with np.errstate(divide="raise", invalid="raise", over="raise"):
+        record = best_record(generator, FiniteRecord(experiment, experiment.samples), target, bounds)
+    assert not record.samples.any()
+    assert not (meets and record.met)
+
+
+@pytest.mark.parametrize("kind", ["binary", "ternary"])
+def test_levels_of_a_signal_of_zeros(monkeypatch, kind):
+    """The alternation may begin with a multisine of zeros."""
+    monkeypatch.setattr(levels, "multisine_record", lambda lines, samples, *_, **__: np.zeros((samples, 1)))
+    lines = Lines.of_period(np.ones((9, 1, 1), dtype=complex), 16)
+    with np.errstate(divide="raise", invalid="raise"):
+        found = levels.few_levels(lines, 16, np.random.default_rng(0), kind)
+    assert np.all(np.isfinite(found))
 
 
 @pytest.mark.parametrize("limited", LIMITS)

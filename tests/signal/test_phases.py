@@ -1,10 +1,16 @@
 """Phases of low crest factors: of one record, and of all inputs, periods and outputs at once."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.signal import (
+    DesignedSpectrum,
     Lines,
+    SignalGenerator,
+    SignalSettings,
     Sinusoids,
     crest_factor,
     low_peak_phases,
@@ -13,6 +19,7 @@ from inputdesign_cli.signal import (
     schroeder_phases,
 )
 from inputdesign_cli.signal.constraints import compressed
+from inputdesign_cli.spectrum import LinesBasis
 
 
 def flat(lines, samples):
@@ -131,3 +138,42 @@ def test_weights_of_the_inputs():
         angles = low_peak_phases(lines, 512, start, limited=limited)
         peaks.append(np.abs(multisine_record(lines, 512, rng, "orthogonal", angles=angles)).max(axis=0))
     assert peaks[1][0] < peaks[0][0]
+
+
+@pytest.mark.parametrize("method", ["multisine", "binary", "ternary", "filtered_noise"])
+@pytest.mark.parametrize("samples", [1, 2, 3, 5])
+def test_records_of_fewer_samples_than_lines_are_numbers(method, samples):
+    """Phases of many lines can make all of a few samples zero: nothing is divided by what that leaves."""
+    spectrum = DesignedSpectrum.of(LinesBasis.at(np.pi * np.arange(1, 61) / 60, 1), np.ones(60))
+    for seed in range(80, 100):
+        kind = SignalSettings(method, phases="optimised" if method == "multisine" else "random")
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
+        with np.errstate(divide="raise", invalid="raise", over="raise"):
+            values = SignalGenerator(spectrum, kind, samples).values(rng)
+        assert np.all(np.isfinite(values))
+
+
+def test_a_record_of_zeros_has_a_crest_factor():
+    assert crest_factor(np.zeros(4)) == 1.0
+    assert crest_factor(np.array([1.0, -1.0])) == 1.0
+
+
+@settings(deadline=None, max_examples=30)
+@given(repeats=st.integers(4, 90), times=st.integers(2, 300), data=st.data())
+def test_phases_of_lines_that_repeat_are_chosen_over_one_repetition(repeats, times, data):
+    """The harmonics of a short period give the same signal again and again."""
+    first = data.draw(st.integers(1, max(repeats // 4, 1)))
+    harmonics = np.arange(first, repeats // 2 + 1)
+    lines = Lines(2.0 * np.pi * harmonics / repeats, np.ones((harmonics.size, 1, 1), dtype=complex))
+    seen, plain = [], Sinusoids.record
+
+    def record(self, phases, gains=None):
+        seen.append(self.samples)
+        return plain(self, phases, gains)
+
+    start = np.random.default_rng(repeats).uniform(0.0, 2.0 * np.pi, harmonics.size)
+    with patch.object(Sinusoids, "record", record):
+        short = low_peak_phases(lines, repeats, start, steps=10)
+        long = low_peak_phases(lines, times * repeats, start, steps=10)
+    np.testing.assert_array_equal(short, long)
+    assert max(seen) <= repeats

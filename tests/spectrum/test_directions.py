@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from inputdesign_cli.spectrum import Functional, directed_scale
 from inputdesign_cli.spectrum.directions import best_directions, every_direction
 
 
@@ -41,3 +42,19 @@ def test_a_dear_channel_does_not_make_a_cheap_one_dearer():
     price, value = np.diag([1e30, 1.0])[None], np.diag([1e30, 2.0])[None]
     ratios, _ = best_directions(price, value)
     np.testing.assert_allclose(ratios, 2.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("corner", [1e-4, 1e-2, 1.0])
+@pytest.mark.parametrize("next_to_zero", [[], [1e-18], [2e-13], [3e-14, 1e-9]])
+def test_the_best_frequency_beside_one_that_costs_nothing_has_a_price(corner, next_to_zero):
+    """price w^2, value w^2 / (1 + (w / corner)^2): the best is w -> 0, wherever the grid has its points."""
+
+    def functional(density):
+        return Functional(np.zeros(1), density)
+
+    price, value = functional(lambda w: w**2), functional(lambda w: w**2 / (1.0 + (w / corner) ** 2))
+    grid = np.concatenate([[0.0], next_to_zero, np.geomspace(3e-6, np.pi, 400)])
+    scale, peaks = directed_scale(price, value, grid)
+    assert scale == pytest.approx(1.0, rel=1e-9)
+    # As good as zero itself, and as dear as that allows.
+    assert peaks[0] == pytest.approx(1e-5 * corner, rel=0.3)

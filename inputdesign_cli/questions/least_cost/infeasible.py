@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.compute.time_limit import OutOfTimeError, time_for_hints
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
@@ -35,7 +35,7 @@ def explain(
 
     Args:
         stated: the numbers of the spec that can be loosened.
-        samples_of_record: how many samples a record takes where a spectrum takes so many; None: not known.
+        samples_of_record: maps the samples that a spectrum takes to what a record takes; None: not known.
     """
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
@@ -44,28 +44,48 @@ def explain(
         return _contradiction(involved, nearest.certificate.bound)
     missed = (problem.demands.requirement(index) for index, _ in nearest.active)
     names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
-    try:
-        parts = _what_would_do(unreachable, question, involved)
-    except OutOfTimeError:  # that it is infeasible is proved
-        parts = []
-    message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
     hint = (
         "raise the limit, or loosen the accuracy: a spectrum can keep errors "
         f"{rounded_up(bought.factor * _ROOM, 4)} times as large as asked, a record somewhat larger ones"
     )
-    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
-        # Within the same limits information grows in proportion to the length.
-        longer = int(np.ceil(question.experiment.samples * nearest.objective))
-        hint += f"; with {longer} samples a spectrum can"
-        enough = samples_of_record(longer)
-        if enough is not None:
-            hint += f"; with {units.length(enough)} (and signal.samples, if stated) a record can"
-    if _within_reach_of_any(question):
-        hint += "; spectrum: {type: free} can meet it"
+    parts: list[str] = []
+    remedies = [hint]
+    try:  # that it is infeasible is proved, whatever else is found out
+        with time_for_hints():
+            parts += _what_would_do(unreachable, question, involved)
+            for remedy in _remedies(units, question, nearest.objective, samples_of_record):
+                remedies.append(remedy)
+    except OutOfTimeError:
+        remedies.append("what else would do was not looked for further")
+    message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
+    hint = "; ".join(remedies)
     if problem.densities and question.limits:
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
     return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
+
+
+def _remedies(
+    units: Units, question: Question, times: float, samples_of_record: Callable[[int], int | None]
+) -> Iterator[str]:
+    """Yield what meets the accuracy within the limits, what takes longest to find out last.
+
+    Args:
+        times: what the information lacks within the limits, as a factor.
+
+    Raises:
+        OutOfTimeError: see `seconds_left`.
+    """
+    longer = None
+    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(times):
+        # Within the same limits information grows in proportion to the length.
+        longer = int(np.ceil(question.experiment.samples * times))
+        yield f"with {longer} samples a spectrum can"
+    if _within_reach_of_any(question):
+        yield "spectrum: {type: free} can meet it"
+    enough = None if longer is None else samples_of_record(longer)
+    if enough is not None:
+        yield f"with {units.length(enough)} (and signal.samples, if stated) a record can"
 
 
 def _what_would_do(
@@ -131,7 +151,7 @@ def _within_reach_of_any(question: Question) -> bool:
     anything = LinesBasis.anywhere(*experiment.band, experiment.inputs)
     try:
         solve_design(replace(question, basis=anything), tolerance=_TOLERANCE)
-    except (UnreachableError, OutOfTimeError, np.linalg.LinAlgError):
+    except (UnreachableError, np.linalg.LinAlgError):
         return False
     return True
 

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, time_for_hints
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
@@ -26,7 +26,14 @@ from inputdesign_cli.questions.common.record import (
     make_record,
     ratio_before,
 )
-from inputdesign_cli.questions.least_cost.shortest_record import ShortestRecord, Way, longest_search
+from inputdesign_cli.questions.least_cost.shortest_record import (
+    LONG,
+    ShortestRecord,
+    Way,
+    longest_search,
+    pilot_length,
+    reach,
+)
 from inputdesign_cli.questions.least_cost.too_short import refuse_too_short
 from inputdesign_cli.questions.least_cost.too_tight import too_tight
 from inputdesign_cli.signal import Record
@@ -36,7 +43,11 @@ _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
 _ROOM = 1.02
 _TOLERANCE = 1e-5
 # Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
-_LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
+_LENGTHS, _LONGER, _TRIED, _ROUGH = 4, 1.03, 20_000, 1e-4
+# So many candidates of a long record: luck averages out.
+_ENOUGH = 3
+# A record that needs more than so many times the length, by a pilot of it, is not made of that length.
+_FAR_FROM = 1.03
 # Spectra are compared on so many frequencies, by the share of their power that lies elsewhere.
 _LINES, _SAME_SHAPE = 256, 0.01
 _WORDS = {
@@ -60,9 +71,16 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
     """
-    if _sought(request, question):
+    sought = _sought(request, question)
+    if sought:
         # A spectrum may take fewer samples than any record has.
         samples = max(samples, least_period(design.problem.experiment.inputs) * request.settings.block)
+        if request.searched and samples > LONG:
+            pilot = _pilot(request, design, samples)
+            if pilot.record is not None and reach(pilot.record, ratio_before(design, request.step)) > (
+                _FAR_FROM * samples
+            ):
+                return _longer(pilot, [pilot.record], request.length(samples), question, Counter(), "")
     record = make_record(request, design, samples)
     plain = Made(record, request, design)
     if record is None:
@@ -81,7 +99,13 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
             break
         tried[_words(of)] += 1
         misses += [other.record] if other.record is not None else []
-    return _longer(plain, misses, question, tried, remedy)
+    return _longer(plain, misses, len(record.samples), question, tried, remedy)
+
+
+def _pilot(request: RecordRequest, design: Design, samples: int) -> Made:
+    """Make the short record that predicts the ratio of one of `samples` samples."""
+    length = pilot_length(samples, request.settings.block)
+    return Made(make_record(replace(request, samples=None), design, length, first=True), request, design)
 
 
 def _sought(request: RecordRequest, question: Question) -> bool:
@@ -116,7 +140,7 @@ def _of_less_power(question: Question, design: Design) -> Iterator[tuple[float, 
 
 
 def _told(request: RecordRequest, design: Design, other: Made) -> Made:
-    """The other record, its cost told against the design that was asked for, and a note."""
+    """Return the other record with its cost relative to the design that was asked for, and a note."""
     record = other.record
     assert record is not None
     asked, own = (design_cost(each, request.cost) for each in (design, other.design))
@@ -140,44 +164,61 @@ def _words(request: RecordRequest) -> str:
 
 
 def _longer(
-    plain: Made, misses: Sequence[Record], question: Question, tried: Counter[str], remedy: str
+    plain: Made, misses: Sequence[Record], samples: int, question: Question, tried: Counter[str], remedy: str
 ) -> Made:
     """The longer record of a shortest experiment, or the error with what was tried besides.
+
+    Args:
+        samples: the length that was asked for.
 
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
-    request = plain.request
+    request, block = plain.request, plain.request.settings.block
     sought = _sought(request, question)
     allowed = request.most_samples if sought else 0
+    longest = longest_search(samples, allowed, request.longest)
     search = ShortestRecord(
         _ways(plain, question, sought),
-        request.settings.block,
-        longest_search(len(misses[0].samples), allowed, request.longest),
+        block,
+        longest if allowed is None else min(allowed // block * block, longest),
         ratio_before(plain.design, request.step),
+        plain.design.problem.experiment.inputs,
     )
-    found = search.search(misses)
-    longer = None if found is None else found.record
-    if found is not None and longer is not None and (allowed is None or len(longer.samples) <= allowed):
+    found = search.search(misses, samples) if sought else None
+    if found is not None:
         other = found.request.settings.method != request.settings.method
         return replace(found, notes=(f"the record is {_words(found.request)}",) if other else ())
+    longer, ended = None, False
+    if allowed is not None:
+        search.longest = longest
+        try:
+            with time_for_hints():
+                longer = search.search(misses, max(samples, search.tried))
+        except OutOfTimeError:
+            seconds_left()  # that of the whole task may be over
+            ended = True
+    if len(misses[0].samples) != samples:
+        one = replace(request, settings=replace(request.settings, candidates=1, most_candidates=1))
+        misses = [make_record(one, plain.design, samples) or misses[0]]
     raise too_tight(
         request,
         misses[0],
-        longer,
+        None if longer is None else longer.record,
         allowed,
         tried=tried,
         remedy=remedy,
         needed=search.needed,
         searched=search.longest,
         longest_tried=search.tried,
+        ended=ended,
     )
 
 
 def _ways(plain: Made, question: Question, sought: bool) -> list[Way]:
-    """What is tried at a length: the kinds of signals, with the spectrum of the design, then the cheapest.
+    """Return what is tried at a length: kinds of signals with the designed, then with the cheapest spectrum.
 
-    Where a length is only told, one record of each kind is enough.
+    Where the length is only part of a hint, one record of each kind is enough.
     """
     request, design = plain.request, plain.design
     kinds = [request, *([] if request.stated_method else _kinds(request))]
@@ -188,7 +229,7 @@ def _ways(plain: Made, question: Question, sought: bool) -> list[Way]:
 
     @cache
     def cheapest(samples: int) -> Design | None:
-        """That of a stated length, if it is another spectrum than that of the design."""
+        """Return the cheapest design of a stated length if its spectrum differs from the designed one."""
         stated = replace(question.of_length(samples), goal="cost", cost=request.cost)
         try:
             found = solve_design(stated, tolerance=_TOLERANCE, any_spectrum_tolerance=None)
@@ -198,10 +239,13 @@ def _ways(plain: Made, question: Question, sought: bool) -> list[Way]:
 
     def way(kind: RecordRequest, spectrum: Callable[[int], Design | None]) -> Way:
         of_any_length = replace(kind, samples=None)
+        few = min(kind.settings.candidates, _ENOUGH)
+        quick = replace(kind.settings, candidates=few, most_candidates=few)
 
-        def made(samples: int) -> Made | None:
-            of = spectrum(samples)
-            record = None if of is None else make_record(of_any_length, of, samples, first=True)
+        def made(samples: int, spectrum_of: int | None = None) -> Made | None:
+            of = spectrum(spectrum_of or samples)
+            wanted = of_any_length if samples <= LONG else replace(of_any_length, settings=quick)
+            record = None if of is None else make_record(wanted, of, samples, first=True)
             return None if of is None else Made(record, kind, of)
 
         return made
@@ -228,21 +272,29 @@ def _alike(request: RecordRequest, one: Design, other: Design) -> bool:
 
 
 def samples_of_record(request: RecordRequest, question: Question, samples: int) -> int | None:
-    """The samples of a record that is found to meet the accuracy where a spectrum takes so many."""
-    for _ in range(_LENGTHS):
+    """Return the length of a record that meets the accuracy, or None if none is found.
+
+    Args:
+        samples: the length at which a spectrum meets it.
+
+    Raises:
+        OutOfTimeError: see `seconds_left`.
+    """
+    for number in range(_LENGTHS):
         samples = max(int(np.ceil(samples * _LONGER)), 2)
         if samples > _TRIED:
             return None
-        stated = question.of_length(samples)
         try:
-            design = solve_design(stated, tolerance=_ROUGH, any_spectrum_tolerance=_ANY)
-            of_any_length = replace(request, samples=None)
-            record = make_record(of_any_length, design, samples)
-        except (OutOfTimeError, UnreachableError):
+            design = solve_design(question.of_length(samples), tolerance=_ROUGH, any_spectrum_tolerance=None)
+        except UnreachableError:
             return None
-        if record is None or record.met:
-            return samples if record is not None else None
-        if not np.isfinite(record.worst_ratio):
+        if number == 0 and samples > LONG:
+            record = _pilot(request, design, samples).record
+        else:
+            record = make_record(replace(request, samples=None), design, samples, first=True)
+        if record is None or not np.isfinite(record.worst_ratio):
             return None
-        samples = int(np.ceil(samples * record.worst_ratio**2))
+        if record.met and len(record.samples) >= samples:
+            return samples
+        samples = max(int(np.ceil(len(record.samples) * record.worst_ratio**2)), samples)
     return None

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+import scipy
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.questions.common.record import Made
@@ -15,16 +16,21 @@ from inputdesign_cli.signal import Record
 # Lengths that are looked into: times the one that was asked for, or that many samples.
 _LONGEST, _AT_LEAST = 64, 20_000
 _LEAP, _DOUBLE = 8.0, 2.0
-# So few samples tell nothing of what more of them would do: they may be less than a dead time.
+# The ratio of so few samples predicts nothing for more of them: they may be less than a dead time.
 _FEW = 100
 _GROWTH, _MOST_GROWTHS = 1.03, 100.0
 _FAR = 1.5
-_FINE = 0.01
+_FINE, _STEP = 0.01, 0.009
 _LENGTHS = 24
 _FALLS = 0.9  # of what seemed to be needed before
 _BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
 # A way that missed nearby, and by so much, is not tried: other phases change a ratio by less as a rule.
-_NEARBY, _HOPELESS = 1.2, 1.15
+_NEARBY, _HOPELESS, _HOPELESS_LONG = 1.2, 1.15, 1.01
+# A record of more samples takes seconds to make. Its ratio follows from that of a pilot, a record of a share
+# of its samples with at least the fewest: information grows with the length, and luck averages out.
+LONG = 2000
+_PILOT, _FEWEST = 16, 1000
+_MARGIN = 1.005
 # Whether a record meets is a matter of luck near the shortest: so far below one that does all are tried.
 _BELOW = (0.96, 0.9)
 
@@ -32,15 +38,19 @@ _BELOW = (0.96, 0.9)
 class Way(Protocol):
     """A kind of signal with a rule for its spectrum."""
 
-    def __call__(self, samples: int) -> Made | None:
-        """The first record of a length that is found to meet the accuracy, else the best of some, if any."""
+    def __call__(self, samples: int, spectrum_of: int | None = None) -> Made | None:
+        """The first record of a length that is found to meet the accuracy, else the best of some, if any.
+
+        Args:
+            spectrum_of: the length for which the spectrum is designed, if that differs.
+        """
 
 
 def reach(record: Record, before: float = np.inf) -> float:
-    """The length that a record needs, were its information in proportion to its length.
+    """Return the length that a record needs if its information grows in proportion to its length.
 
     Args:
-        before: the worst ratio of what is known without it.
+        before: the worst ratio without it.
     """
     if not np.isfinite(record.worst_ratio):
         return _DOUBLE * len(record.samples)
@@ -49,8 +59,13 @@ def reach(record: Record, before: float = np.inf) -> float:
     return len(record.samples) * (1.0 - known) / gain if gain > 0.0 else np.inf
 
 
+def pilot_length(samples: int, block: int) -> int:
+    """Return the length of the short record that predicts the ratio of one of `samples` samples."""
+    return -(-max(samples // _PILOT, _FEWEST) // block) * block
+
+
 def longest_search(asked: int, most: int | None, longest: int) -> int:
-    """How long records are looked into where those of `asked` samples miss.
+    """Return the longest length that is tried if records of `asked` samples miss.
 
     Args:
         most: samples of the longest experiment, where there is a limit.
@@ -63,68 +78,120 @@ def longest_search(asked: int, most: int | None, longest: int) -> int:
 class ShortestRecord:
     """The search for the shortest record, by trying lengths in several ways.
 
+    Of a long record only the most promising way is tried at a length, by what all tries so far showed.
+
     Args:
         ways: what is tried at a length, until a record meets the accuracy.
         block: lengths are multiples of this.
         longest: samples of the longest that is looked for.
-        before: the worst ratio of what is known without any record.
+        before: the worst ratio without any record.
     """
 
     ways: Sequence[Way]
     block: int
     longest: int
     before: float = np.inf
+    inputs: int = 1  # each has as long a part of a period
     needed: float = 0.0  # samples that would do, by the records that missed
     _missed: dict[int, Record] = field(default_factory=dict)  # by way, its latest
     _tried: set[tuple[int, int]] = field(default_factory=set)  # ways and lengths
+    _found: Made | None = None
+    _low: int = 0
+    _high: int = 0
+    _lengths: int = 0
 
-    def search(self, misses: Sequence[Record]) -> Made | None:
+    def search(self, misses: Sequence[Record], low: int | None = None) -> Made | None:
         """The shortest record that meets the accuracy, to one per cent; None when none is found.
 
         Out of time, the shortest so far.
 
         Args:
-            misses: records of the length from which on longer ones are looked for.
+            misses: records that missed.
+            low: the length from which on longer ones are looked for, that of the first miss when None.
 
         Raises:
             OutOfTimeError: before one is found.
         """
-        low, found, lengths = len(misses[0].samples), None, 0
-        self.needed = min(map(self._reach, misses))
+        self._low, self._lengths = low or len(misses[0].samples), 0
+        self.needed = min(map(self._reach, self._missed.values() or misses))
+        if self._low > LONG and not self._missed:
+            self._try_pilots(misses[0])
         try:
-            while found is None and lengths < _LENGTHS:
-                # Where what is needed was told too low again and again, it is no guide.
-                growth = min(_GROWTH ** min(2.0**lengths, _MOST_GROWTHS), _LEAP)
-                high = self._rounded(min(max(self.needed, growth * low), _LEAP * low, self.longest))
-                if high <= low:
-                    return None
-                lengths += 1
-                found = self._met(high)
-                if found is None:
-                    before, low = self.needed if lengths > 1 else np.inf, high
-                    self.needed = min(map(self._reach, self._missed.values()), default=high)
-                    # Records shorter than what the plant remembers promise far less than longer ones keep.
-                    if low >= _FEW and self.needed > max(_BEYOND * self.longest, _FALLS * before):
-                        return None
-            while found is not None and high - low > max(_FINE * high, self.block) and lengths < _LENGTHS:
-                lengths += 1
-                middle = self._rounded(np.sqrt(low * high) if high > _FAR * low else 0.5 * (low + high))
-                if middle in (low, high):
-                    break
-                tried = self._met(middle)
-                low, high, found = (middle, high, found) if tried is None else (low, middle, tried)
-            below = [*_BELOW]
-            while found is not None and below and lengths < _LENGTHS:
-                shorter = int(below.pop(0) * high / self.block) * self.block
-                if 0 < shorter < high:
-                    lengths += 1
-                    tried = self._met(shorter, hopeless=np.inf)
-                    if tried is not None:
-                        high, found, below = shorter, tried, [*_BELOW]
+            self._lengthen()
+            if self._found is not None:
+                self._shorten()
+                self._try_below()
         except OutOfTimeError:
-            if found is None:
+            if self._found is None:
                 raise
-        return found
+        return self._found
+
+    def _try_pilots(self, first: Record) -> None:
+        """Make a short record in each way, so that the most promising one of a long record is known.
+
+        Args:
+            first: that of the first way, if it is as long.
+        """
+        length = pilot_length(self._low, self.block)
+        for number, way in enumerate(self.ways):
+            if number == 0 and len(first.samples) == length:
+                self._missed[number] = first
+                continue
+            made = way(length, max(self._low, self._rounded(min(self.needed, self.longest))))
+            if made is not None and made.record is not None:
+                self._missed[number] = made.record
+                self.needed = min(self.needed, self._reach(made.record))
+
+    def _lengthen(self) -> None:
+        """Try ever longer records until one meets the accuracy, or none is worth trying."""
+        while self._found is None and self._lengths < _LENGTHS:
+            low = self._low
+            # Where what is needed was told too low again and again, it is no guide.
+            least, margin = (_MARGIN, _MARGIN) if low > LONG else (_GROWTH, 1.0)
+            growth = min(least ** min(2.0**self._lengths, _MOST_GROWTHS), _LEAP)
+            self._high = self._rounded(
+                min(max(margin * self.needed, growth * low), _LEAP * low, self.longest)
+            )
+            if self._high <= low:
+                return
+            self._lengths += 1
+            self._found = self._met(self._high)
+            if self._found is None:
+                before, self._low = self.needed if self._lengths > 1 else np.inf, self._high
+                self.needed = min(map(self._reach, self._missed.values()), default=self._high)
+                # Records shorter than what the plant remembers promise far less than longer ones keep.
+                if self._low >= _FEW and self.needed > max(_BEYOND * self.longest, _FALLS * before):
+                    return
+
+    def _shorten(self) -> None:
+        """Narrow the interval between a length that misses and the one found to one per cent."""
+        step = _STEP
+        while self._high - self._low > max(_FINE * self._high, self.block) and self._lengths < _LENGTHS:
+            self._lengths += 1
+            low, high = self._low, self._high
+            middle = np.sqrt(low * high) if high > _FAR * low else 0.5 * (low + high)
+            if high > LONG:  # the first length was chosen by what is needed: it is hardly too long
+                middle, step = max(middle, (1.0 - step) * high), min(2.0 * step, 1.0)
+            whole = int(np.ceil(middle / self.block)) * self.block
+            middle = self._rounded(middle) if self._rounded(middle) < high else whole
+            if middle in (low, high):
+                return
+            tried = self._met(middle)
+            if tried is None:
+                self._low = middle
+            else:
+                self._high, self._found = middle, tried
+
+    def _try_below(self) -> None:
+        """Try all ways at lengths somewhat below the one found: short records may meet by luck."""
+        below = [*_BELOW]
+        while self._high <= LONG and below and self._lengths < _LENGTHS:
+            shorter = int(below.pop(0) * self._high / self.block) * self.block
+            if 0 < shorter < self._high:
+                self._lengths += 1
+                tried = self._met(shorter, hopeless=np.inf)
+                if tried is not None:
+                    self._high, self._found, below = shorter, tried, [*_BELOW]
 
     def _met(self, samples: int, hopeless: float = _HOPELESS) -> Made | None:
         """A record of this length that meets the accuracy, the most promising way tried first.
@@ -132,13 +199,16 @@ class ShortestRecord:
         Args:
             hopeless: how many times as long a way's record nearby would have to be for it not to be tried.
         """
+        long = samples > LONG
         for number in sorted(range(len(self.ways)), key=self._promise):
             missed = self._missed.get(number)
             if (number, samples) in self._tried or (
                 missed is not None
                 and samples < _NEARBY * len(missed.samples)
-                and samples * hopeless < self._reach(missed)
+                and samples * (_HOPELESS_LONG if long else hopeless) < self._reach(missed)
             ):
+                if long:
+                    return None
                 continue
             self._tried.add((number, samples))
             made = self.ways[number](samples)
@@ -147,10 +217,12 @@ class ShortestRecord:
             if made.record.met:
                 return made
             self._missed[number] = made.record
+            if long:
+                return None
         return None
 
     def _promise(self, number: int) -> float:
-        """Where its latest record that missed would do; those that have not missed come first."""
+        """Return the length that its latest miss predicts; a way without a miss comes first."""
         missed = self._missed.get(number)
         return 0.0 if missed is None else self._reach(missed)
 
@@ -163,4 +235,8 @@ class ShortestRecord:
         return max((samples for _, samples in self._tried), default=0)
 
     def _rounded(self, length: float) -> int:
-        return int(np.ceil(length / self.block)) * self.block
+        """The next length of whole blocks; of a long record one with a fast transform if it is near."""
+        whole = int(np.ceil(length / self.block)) * self.block
+        unit = self.block * self.inputs
+        fast = unit * int(scipy.fft.next_fast_len(int(np.ceil(length / unit))))
+        return whole if whole <= LONG or fast > min(_MARGIN * whole, self.longest) else fast

@@ -125,6 +125,7 @@ class ConvexTask:
         else:
             notes = [] if done.design.any_spectrum or self.reach.note else [no_other_spectra()]
         notes += [self.reach.note] if self.reach.note else []
+        notes += [self.grid.note(result)] if self.grid is not None else []
         try:
             made = fitting_record(self.record, done.question, done.design, done.experiment.samples)
             if self.exact is not None:

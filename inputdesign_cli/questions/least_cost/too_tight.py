@@ -22,6 +22,7 @@ def too_tight(
     needed: float,
     searched: int,
     longest_tried: int,
+    ended: bool = False,
 ) -> InfeasibleError:
     """The error `limits-too-tight`.
 
@@ -32,7 +33,9 @@ def too_tight(
         tried: spectra by kind of signal, besides.
         remedy: what else would do.
         needed: samples that would do were information in proportion to them.
-        searched: the longest that was looked for, and the longest that was tried.
+        searched: the longest that was looked for.
+        longest_tried: the longest that was tried.
+        ended: whether the search for longer ones ended for its time.
     """
     names = " and ".join(request.limit_keys)
     size = len(missed.samples)
@@ -60,5 +63,7 @@ def too_tight(
         hint = "raise the limits"
         if longest_tried > size:
             hint += f": none of those tried with up to {longest_tried} samples does either"
+    if ended:
+        hint += "; longer records were not looked for further"
     hint = "; or ".join(text for text in (hint, remedy) if text)
     return InfeasibleError.because("limits-too-tight", message, hint, request.limit_keys[0])
