@@ -147,6 +147,9 @@ def status(directory: CampaignDirectory, json_output: Json = False) -> None:
         typer.echo(json_text(write_plain(memory.campaign)), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
+    from inputdesign_cli.outcome.record import RESULT, readable
     from inputdesign_cli.outcome.run_directory import read_outcome
 
-    typer.echo(summary(read_outcome(directory), memory.campaign.time_unit, []))
+    with readable(directory / RESULT):
+        text = summary(read_outcome(directory), memory.campaign.time_unit, [])
+    typer.echo(text)

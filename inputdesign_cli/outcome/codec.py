@@ -61,7 +61,7 @@ def _complex(values: np.ndarray) -> Any:
     return [_complex(part) for part in values]
 
 
-def read_plain(kind: type[T], data: object, where: str = "result") -> T:
+def read_plain(kind: type[T], data: object, where: str = "") -> T:
     """Return a result of this type from plain data; keys that it does not know are passed over.
 
     Raises:
@@ -93,7 +93,7 @@ def _read(kind: Any, data: Any, where: str) -> Any:
         return _one_of(arguments, data, where)
     if origin is not None:  # a mapping
         content = _mapping(data, where)
-        return {key: _read(arguments[1], item, f"{where}.{key}") for key, item in content.items()}
+        return {key: _read(arguments[1], item, _below(where, key)) for key, item in content.items()}
     return _read_object(kind, data, where) if dataclasses.is_dataclass(kind) else _scalar(kind, data, where)
 
 
@@ -107,11 +107,11 @@ def _read_object(kind: Any, data: Any, where: str) -> Any:
         if "others" in field.metadata:
             given[field.name] = {key: item for key, item in content.items() if key not in known}
         elif field.name in content:
-            given[field.name] = _read(hint, content[field.name], f"{where}.{field.name}")
+            given[field.name] = _read(hint, content[field.name], _below(where, field.name))
     try:
         return kind(**given)
     except TypeError as error:
-        raise OutcomeError(f"{where} is not complete: {error}") from error
+        raise OutcomeError(f"{_named(where)} is not complete: {error}") from error
 
 
 def _read_union(kinds: tuple[Any, ...], data: Any, where: str) -> Any:
@@ -125,18 +125,18 @@ def _read_union(kinds: tuple[Any, ...], data: Any, where: str) -> Any:
             return _read(kind, data, where)
         except OutcomeError as error:
             first = first or error
-    raise first or OutcomeError(f"{where} is null")
+    raise first or OutcomeError(f"{_named(where)} is null")
 
 
 def _read_tuple(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
     if isinstance(data, np.ndarray):
         data = data.tolist()
     if not isinstance(data, _SEQUENCES):
-        raise OutcomeError(f"{where} is no list")
+        raise OutcomeError(f"{_named(where)} is no list")
     if len(arguments) == 2 and arguments[1] is Ellipsis:
         return tuple(_read(arguments[0], item, f"{where}[{i}]") for i, item in enumerate(data))
     if len(arguments) != len(data):
-        raise OutcomeError(f"{where} has {len(data)} entries, not {len(arguments)}")
+        raise OutcomeError(f"{_named(where)} has {len(data)} entries, not {len(arguments)}")
     return tuple(
         _read(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(arguments, data, strict=True))
     )
@@ -147,8 +147,8 @@ def _read_array(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
     try:
         plain = _without_complex(data) if of_complex else data
         return np.asarray(plain, dtype=complex if of_complex else float)
-    except (TypeError, ValueError, KeyError) as error:
-        raise OutcomeError(f"{where} is no array of numbers") from error
+    except (TypeError, ValueError, KeyError, OverflowError) as error:
+        raise OutcomeError(f"{_named(where)} is no array of numbers") from error
 
 
 def _without_complex(data: Any) -> Any:
@@ -157,25 +157,40 @@ def _without_complex(data: Any) -> Any:
     return [_without_complex(item) for item in data] if isinstance(data, _SEQUENCES) else data
 
 
+def _named(where: str) -> str:
+    return f'"{where}"' if where else "the result"
+
+
+def _below(where: str, name: str) -> str:
+    return f"{where}.{name}" if where else name
+
+
 def _mapping(data: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
-        raise OutcomeError(f"{where} is no object")
+        raise OutcomeError(f"{_named(where)} is no object")
     return data
 
 
 def _one_of(values: tuple[Any, ...], data: Any, where: str) -> Any:
     if data not in values:
-        raise OutcomeError(f"{where} is {data!r}, not one of {', '.join(map(str, values))}")
+        raise OutcomeError(f"{_named(where)} is {data!r}, not one of {', '.join(map(str, values))}")
     return data
+
+
+def _float(data: float, where: str) -> float:
+    try:
+        return float(data)
+    except OverflowError as error:
+        raise OutcomeError(f"{_named(where)} is too large for a number in double precision") from error
 
 
 def _scalar(kind: Any, data: Any, where: str) -> Any:
     if isinstance(data, np.generic | np.ndarray) and np.ndim(data) == 0:
         data = data.item()
     if kind is float and isinstance(data, int | float) and not isinstance(data, bool):
-        return float(data)
+        return _float(data, where)
     if issubclass(kind, Enum):
         return _one_of(tuple(kind), kind(data) if data in tuple(kind) else data, where)
     if not isinstance(data, kind) or (kind is int and isinstance(data, bool)):
-        raise OutcomeError(f"{where} is of type {type(data).__name__}, not {kind.__name__}")
+        raise OutcomeError(f"{_named(where)} is of type {type(data).__name__}, not {kind.__name__}")
     return data

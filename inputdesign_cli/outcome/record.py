@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError
@@ -77,6 +79,23 @@ def unreadable(file: Path, why: str) -> DataError:
     """The error about a record that cannot be used."""
     message = f"{file} cannot be read as the result of a run: {why}"
     return DataError.because("run-unreadable", message, hint="run the spec again")
+
+
+@contextmanager
+def readable(file: Path) -> Iterator[None]:
+    """Turn errors about a record that somebody else wrote or damaged into `run-unreadable`."""
+    try:
+        yield
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        OSError,
+        RecursionError,
+        TypeError,
+        ValueError,
+    ) as error:
+        raise unreadable(file, f"its entries are not what idesign writes ({error})") from error
 
 
 def _finite(text: str) -> float:

@@ -105,7 +105,10 @@ class DrawnEstimates:
 
 @dataclass(frozen=True)
 class Robust:
-    """What the design keeps at every plant."""
+    """What a design keeps at every plant, or what a given excitation gives there.
+
+    `support` counts the plants that bind a design, `missed` those that a given excitation misses.
+    """
 
     source: str
     scenarios: int
@@ -116,7 +119,8 @@ class Robust:
     worst_share: float
     worst_scenario: int
     active: tuple[ActivePlant, ...]
-    support: int
+    support: int | None = None
+    missed: int | None = None
     dearest: DearestPlant | None = None
     floor: FloorUse | None = None
     searched: SearchedPlant | None = None

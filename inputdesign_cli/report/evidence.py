@@ -199,7 +199,7 @@ def requirement_table(outcome: Outcome, time_unit: str) -> Rows | None:
 def campaign_facts(outcome: Outcome) -> Iterator[tuple[str, str]]:
     """Yield how a campaign stands: its parts so far, what has been reached, and what comes next."""
     campaign = outcome.campaign
-    if campaign is None:
+    if campaign is None or not campaign.rounds:
         return
     now, parts = campaign.rounds[-1], len(campaign.records)
     state = {
@@ -219,7 +219,8 @@ def campaign_facts(outcome: Outcome) -> Iterator[tuple[str, str]]:
         whole = plan.planned_samples
         first = f", the first of {whole} that are planned with {plan.power:.4g}"
         of = first if whole is not None and whole > plan.samples else ""
-        yield "next", f"apply {plan.samples} samples of power {plan.part_power:.4g} (signal.csv{of})"
+        power = plan.power if plan.part_power is None else plan.part_power
+        yield "next", f"apply {plan.samples} samples of power {power:.4g} (signal.csv{of})"
 
 
 def campaign_answer(outcome: Outcome) -> str:

@@ -203,7 +203,9 @@ def _robust(found: Robust, target: Objective | None) -> Iterator[Fact]:
             "see the notes",
         )
     bound = [_bound_by(item) for item in found.active[:3]]
-    if bound:
+    if found.missed is not None:
+        yield "least served", f"{bound[0]}: {found.worst_share:.4g} of what is admitted", ""
+    elif bound:
         yield "binding", ", ".join(bound) + (", .." if len(found.active) > len(bound) else ""), ""
     if found.dearest is not None:
         number = found.dearest.scenario
@@ -223,7 +225,8 @@ def _held_at(found: Robust) -> str:
     added = 0 if found.searched is None else found.searched.added
     sought = f" and {added} that a search found" if added else ""
     asked = "what is asked" if found.floor is None else "what is asked, or the floor below,"
-    return f"{asked} holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
+    holds = f"is missed at {found.missed} of" if found.missed else "holds at"
+    return f"{asked} {holds} the plant of the spec and {kept - added} {drawn}{sought}{left}"
 
 
 def _fresh(found: FreshPlants, *, best: bool) -> Iterator[Fact]:
@@ -267,7 +270,7 @@ def _missed(found: FreshPlants, best: bool) -> str:
 def _worst_found(found: SearchedPlant, target: Objective | None) -> str:
     """How bad the worst plant is: its ratio, relative to the ratio that is reached where that is best."""
     share, kind = found.share, None if target is None else target.kind
-    if kind in ("least_cost", "shortest_experiment"):
+    if kind in (None, "least_cost", "shortest_experiment"):
         return f"{share:.4g} of what is admitted is the worst that was found in {found.region}"
     best = target is not None and kind == "accuracy_factor"
     reached = f": {share * target.value:.4g} of what is admitted" if best and target is not None else ""
@@ -357,7 +360,8 @@ def _signal(outcome: Outcome, signal: Signal) -> Iterator[str]:
     if signal.worst_ratio is not None:
         error = outcome.model_error is not None and outcome.model_error.worst_ratio is not None
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
-        of = "" if outcome.robust is None else ", at the worst of these plants"
+        designed = outcome.robust is not None and outcome.robust.missed is None
+        of = ", at the worst of these plants" if designed else ""
         yield f"{ratio} at most {precise(signal.worst_ratio)} with these samples{of}"
     kept = signal.confidence
     if kept is not None:

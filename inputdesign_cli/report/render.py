@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.record import RESULT, unreadable
+from inputdesign_cli.outcome.record import RESULT, readable
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.hover import SCRIPT
 from inputdesign_cli.report.run_page import run_page
@@ -55,14 +55,14 @@ def _filled(
     It carries the SHA-256 of the file `record`, so that a reader can see whether it is about what stands
     beside it, and the date of the record, so that the same run gives the same page.
     """
-    try:
+    with readable(directory / record):
         digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
         date = datetime.fromtimestamp((directory / record).stat().st_mtime).strftime("%Y-%m-%d %H:%M")
         content = content_of(directory)
-    except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(directory / record, str(error)) from error
-    source = directory.name or directory.resolve().name
-    return filled(template, {"source": source, "record": record, "digest": digest, "date": date, **content})
+        source = directory.name or directory.resolve().name
+        return filled(
+            template, {"source": source, "record": record, "digest": digest, "date": date, **content}
+        )
 
 
 def filled(template: str, content: Mapping[str, object]) -> str:

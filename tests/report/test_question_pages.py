@@ -129,11 +129,16 @@ def test_the_page_of_a_study(tmp_path):
     ("inputs", "row"),
     [
         (
-            {"white": {"loss": {"mean": 2.0, "sd": 0.5}, "theory": {"loss": {"mean": 1.9, "sd": 0.4}}}},
+            {
+                "white": {
+                    "loss": {"mean": 2.0, "sd": 0.5},
+                    "theory": {"value": 3.6, "loss": {"mean": 1.9, "sd": 0.4}},
+                }
+            },
             ["white", "2 ± 0.5", "1.9 ± 0.4"],
         ),
         (
-            {"design": {"mse": 1.25, "mse_standard_error": 0.1, "theory": {"mse": 1.2}}},
+            {"design": {"mse": 1.25, "mse_standard_error": 0.1, "theory": {"mse": 1.2, "mean_estimate": []}}},
             ["design", "1.25 ± 0.1", "1.2"],
         ),
     ],
@@ -141,7 +146,7 @@ def test_the_page_of_a_study(tmp_path):
 def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
     result = json.loads((runs / "open" / "result.json").read_text())
     shutil.copytree(runs / "open", tmp_path / "run")
-    result["simulation"] = {"runs": 10, "inputs": inputs}
+    result["simulation"] = {"runs": 10, "seed": 1, "inputs": inputs}
     (tmp_path / "run" / "result.json").write_text(json.dumps(result))
     assert row in rows(parse(report_text(tmp_path / "run")))
 

@@ -45,4 +45,4 @@ def covariance_of(result, names):
 
 def said(results):
     """The summary in the terminal."""
-    return summary(results.result, results.time_unit, [Path("run/result.json")])
+    return summary(results.outcome, results.time_unit, [Path("run/result.json")])
