@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.outcome import Information, Outcome, read_plain, write_plain
+from inputdesign_cli.outcome import Information, ModelError, Objective, Outcome, read_plain, write_plain
 from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
 
 Array = NDArray[np.float64]
@@ -53,6 +53,21 @@ class Results:
         """The outcome as plain data: the content of result.json."""
         plain: Result = write_plain(self.outcome)
         return plain
+
+    @property
+    def cost(self) -> float | None:
+        """The cost of the experiment; None where nothing is applied."""
+        return self.outcome.cost
+
+    @property
+    def objective(self) -> Objective | None:
+        """The value of the design with its proved bounds; None where nothing was designed."""
+        return self.outcome.objective
+
+    @property
+    def model_error(self) -> ModelError | None:
+        """The largest r_u/r_adm and its frequency; None where no model error is looked at."""
+        return self.outcome.model_error
 
     @property
     def parameters(self) -> tuple[str, ...]:
