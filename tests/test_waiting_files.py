@@ -26,13 +26,13 @@ OPENED = {
     "cli/init.py": (1, "a file of the package"),
     "cli/examples.py": (1, "a file of the package"),
     "cli/streams.py": (3, "the null device and the standard streams"),
-    "runs/origin.py": (1, "a comparison of plain files"),
-    "runs/replacing.py": (1, "files that were just written into a folder of its own"),
-    "runs/run_directory.py": (
+    "outcome/origin.py": (1, "a comparison of plain files"),
+    "outcome/replacing.py": (1, "files that were just written into a folder of its own"),
+    "outcome/run_directory.py": (
         2,
         "a new file, which has the name of the process; a comparison of plain files",
     ),
-    "sweep/point.py": (1, "a temporary folder of its own"),
+    "sweeps/point.py": (1, "a temporary folder of its own"),
 }
 # Functions of ours with one of these names read by `read_regular`.
 OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.tasks.build.files.text"}
