@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.questions import explore, identify, solve
 from inputdesign_cli.specification import load_spec, parse_spec
 from inputdesign_cli.tasks.build.log import read_log
@@ -276,7 +277,7 @@ def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
     rows = "".join(f"{k},{a:g},{b:.5f}\n" for k, (a, b) in enumerate(zip(u, y, strict=True)))
     path.write_text(f"time,u,y\n{rows}")
     found = explore(path).results
-    assert "L 0 +-" in summary(found.result, "s", [])
+    assert "L 0 +-" in summary(found.outcome, "s", [])
     (told,) = [note for note in found.result["notes"] if note.startswith("L of a dead time")]
     deviation = found.result["identification"]["standard_deviation"]["L"]
     assert float(told.split(": ")[1].split()[0]) == pytest.approx(1.96 * deviation, rel=0.01)
@@ -300,7 +301,7 @@ def test_what_is_said_of_the_choice_is_true(run):
         assert float(re.search(r"by (\S+) points better", said)[1]) == pytest.approx(better, rel=0.06)
     else:
         assert "judges best" in said
-    told = summary(result, "min", [])
+    told = summary(typed(result), "min", [])
     assert "estimated from the other alone (the parameters above: from the whole record)" in told
     page = html.unescape((run / "report.html").read_text())
     assert "estimated from one part of them alone, explains" in page

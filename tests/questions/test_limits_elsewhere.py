@@ -38,7 +38,7 @@ def test_drawn_plants_keep_limits_and_others_are_counted():
     told = found.result["robust"]["fresh"]["beyond_limits"]
     assert told["largest"] == pytest.approx(max(others), rel=1e-9)
     assert told["draws"] == sum(size > 1.0 + 1e-6 for size in others) > 0
-    lines = {name: text for name, text, _ in facts(found.result, "s")}
+    lines = {name: text for name, text, _ in facts(found.outcome, "s")}
     assert f"of 60 more {told['draws']} go beyond, up to {100 * max(others):.3g} %" in lines["limits there"]
 
 

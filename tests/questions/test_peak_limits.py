@@ -107,10 +107,11 @@ spectrum: {type: fir, order: 8}
 limits: {amplitude: 0.4}
 signal: {type: multisine, candidates: 1}
 """
-    result = solve(parse_spec(spec)).result
+    outcome = solve(parse_spec(spec))
+    result = outcome.result
     less = 1 - result["objective"]["value"] / result["signal"]["worst_ratio"]
     assert less > 0.01
-    line = next(text for name, text, _ in facts(result, "s") if name == "signal")
+    line = next(text for name, text, _ in facts(outcome.outcome, "s") if name == "signal")
     assert f"{100 * less:.3g} % less accuracy than the design" in line
     assert "cost" not in line
     assert any(f"reaches {result['signal']['worst_ratio']:.4g} times" in note for note in result["notes"])

@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.cli.summary import summary
+from inputdesign_cli.outcome.results import typed
 from tests.support.first_order_specs import ERROR, FIR, PLANT, run
 
 
@@ -233,7 +234,7 @@ def test_what_is_known_already_may_be_enough(spec, overrides, said):
     result = solve(load_spec(f"specs/{spec}.yaml", [*overrides, "spectrum.order=3"])).result
     assert (result["status"], result["cost"]) == ("nothing_needed", 0.0)
     assert said in result["notes"][0]
-    assert "times as much" not in summary(result, "s", [Path("spec.yaml")])
+    assert "times as much" not in summary(typed(result), "s", [Path("spec.yaml")])
 
 
 def test_an_input_that_a_trace_leaves_out_is_told():

@@ -216,7 +216,7 @@ def test_what_is_said_is_said_under_the_prior():
     found = solve(
         parse_spec(FIRST, overrides=[f"uncertainty={{covariance: {COVARIANCE}, fresh: 20, scenarios: 9}}"])
     )
-    lines = {name: (text, note) for name, text, note in facts(found.result, "s")}
+    lines = {name: (text, note) for name, text, note in facts(found.outcome, "s")}
     assert lines["plants"][0] == "what is asked holds at the plant of the spec and 9 drawn"
     assert "not of the true plant" in lines["fresh plants"][1]
     question = read_question(found.resolved_spec)

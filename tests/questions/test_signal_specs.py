@@ -243,6 +243,6 @@ def test_the_share_of_each_limit_that_single_samples_take():
     (note,) = [note for note in outcome.result["notes"] if "shortest record" in note]
     rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
     assert note.endswith(f"the record takes {rate} of limits.rate")
-    (said,) = [value for name, value, _ in facts(outcome.result, "s") if name == "limits"]
+    (said,) = [value for name, value, _ in facts(outcome.outcome, "s") if name == "limits"]
     assert said.endswith(f"single samples take {rate} of rate, {values} of input amplitude")
     assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))
