@@ -123,7 +123,7 @@ def _kept(found: Coverage) -> str:
         share = _share(found.exact, found.exact_limits)
         return f"{share} of {found.draws} estimates drawn by asymptotic theory meet it"
     beyond = found.kept_limits[0] > (found.asked or 0.0) + _ROOM
-    more = ", more than asked: a smaller alpha would cost less" if beyond else ""
+    more = ", more than asked: it costs more than it need" if beyond else ""
     return f"{_share(found.kept, found.kept_limits)} of {found.runs} simulated experiments meet it{more}"
 
 
@@ -233,9 +233,9 @@ def _fresh(found: FreshPlants, *, best: bool) -> Iterator[Fact]:
     low, high = (f"{100 * share:.3g}" for share in found.limits)
     yield (
         "fresh plants",
-        f"of {found.draws} more, drawn in the same way, {_missed(found, best)}: {per_cent(found.share)} "
+        f"of {found.draws} more, drawn alike, {_missed(found, best)}: {per_cent(found.share)} "
         f"({low} to {high})",
-        _held(found) or "the true plant may lie outside of what the spec describes",
+        _held(found) or "said of plants drawn as the spec says, not of the true plant",
     )
     if found.beyond_limits is not None:
         peaks = found.beyond_limits

@@ -69,8 +69,8 @@ def test_every_plant_whose_sensitivity_exceeds_what_is_asked_is_told_and_no_othe
 
 def test_a_plant_that_the_controller_does_not_fit_is_told_by_all_that_tells_of_it():
     text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 7.5}")
-    found = solve(parse_spec(text, overrides=["uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]}"])).result
-    assert found["robust"]["floor"]["lost"] == [1]
+    found = solve(parse_spec(text, overrides=["uncertainty={scenarios: [{f1: -0.85, b1: 0.9}]}"])).outcome
+    assert found.robust.floor.lost == (1,)
     lines = {name: value for name, value, _ in facts(found, "s")}
     assert lines["floor"].endswith("at 1 of them no model keeps what is asked")
 

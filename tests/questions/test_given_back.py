@@ -17,7 +17,7 @@ DENSITIES = (
     "application", "campaign", "first_order", "flexible_transmission", "limited_signal", "motor_loop",
     "two_by_two_arx", "two_by_two_loop", "weighted_variance",
 )  # fmt: skip
-_OF_THE_DESIGN = ("limits", "simulation", "objective", "solver", "uncertainty")
+_OF_THE_DESIGN = ("limits", "simulation", "objective", "solver", "uncertainty", "campaign")
 
 
 def given_back(spec, table):

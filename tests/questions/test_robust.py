@@ -120,11 +120,11 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     ]
     less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
     dearer = {n for n, one in enumerate(tried) if one.cost > done.design.result.objective * (1 + 1e-6)}
-    found = task.solve().result
-    told = found["robust"]["fresh"]
+    solved = task.solve()
+    told = solved.result["robust"]["fresh"]
     assert (told["less"], told["dearer"], told["missed"]) == (len(less), len(dearer), len(less | dearer))
     assert less > dearer > set()
-    (words,) = (text for name, text, _ in facts(found, "s") if name == "fresh plants")
+    (words,) = (text for name, text, _ in facts(solved.outcome, "s") if name == "fresh plants")
     both = len(less & dearer)
     assert f"{len(less)} get less than that, {len(dearer)} cost more ({both} of them both)" in words
     assert f"{len(less | dearer)} in all" in words
