@@ -5,7 +5,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import draw_sweep, sweep_figures
-from inputdesign_cli.figures.sweep_table import SweepTable
+from inputdesign_cli.figures.sweep_table import SweepAxis, SweepContent, SweepTable
 
 
 def table(axes, values, *, zipped=False, floor=None, kind="least_cost"):
@@ -15,8 +15,8 @@ def table(axes, values, *, zipped=False, floor=None, kind="least_cost"):
     columns["objective.kind"] = [kind] * len(values)
     if floor is not None:
         columns["objective.any_spectrum_bound"] = [str(f) for f in floor]
-    summary = {"axes": [{"key": key, "values": axes[key]} for key in keys], "zip": zipped}
-    return SweepTable(summary, columns)
+    listed = tuple(SweepAxis(key, tuple(axes[key])) for key in keys)
+    return SweepTable(SweepContent("solve", listed, zip=zipped), columns)
 
 
 N = "experiment.samples"

@@ -8,7 +8,7 @@ import pytest
 
 from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
-from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.results import Table, typed
 from inputdesign_cli.questions.frequency_response.audit import audit_response
 from inputdesign_cli.questions.task import build_task
 
@@ -259,7 +259,7 @@ def test_a_number_that_is_wrong_does_not_pass(path):
     holder = result[outer[0]] if outer else result
     holder[name] = np.asarray(holder[name]) * 1.00001
     with pytest.raises(InaccurateError):
-        audit_response(terms, plan, replace(results, result=result))
+        audit_response(terms, plan, replace(results, outcome=typed(result)))
 
 
 def test_a_record_that_is_wrong_does_not_pass():
