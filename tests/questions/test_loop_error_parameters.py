@@ -37,10 +37,10 @@ def losses(plant, *overrides, rest=REST):
 
 
 def assert_same(found):
-    """A design is as good as its tolerance; what white input gives has no solver in it."""
+    """A design is as good as its tolerance, and white input has the power of the design."""
     designs, white = np.array(found).T
     np.testing.assert_allclose(designs, designs[0], rtol=1e-7)
-    np.testing.assert_allclose(white, white[0], rtol=1e-9)
+    np.testing.assert_allclose(white, white[0], rtol=1e-7)
 
 
 def sampled(K, T, L, w):
