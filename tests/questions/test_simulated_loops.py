@@ -4,6 +4,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, simulate
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.report.evidence import simulation_table
 
 SPEC = """
@@ -37,7 +38,7 @@ def test_unstable_loops_are_said():
     inputs = found["simulation"]["inputs"]
     counts = [entry["unstable"] for entry in inputs.values()]
     assert min(counts) > 0
-    table = simulation_table(found)
+    table = simulation_table(typed(found).simulation)
     column = table.head.index("unstable loops")
     assert [row[column] for row in table.rows] == [str(count) for count in counts]
     for (name, entry), note in zip(inputs.items(), found["notes"], strict=True):
