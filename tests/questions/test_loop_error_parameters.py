@@ -36,11 +36,11 @@ def losses(plant, *overrides, rest=REST):
     return found["objective"]["value"], found["closed_loop_error"]["parametric"]["white"]["value"]
 
 
-def assert_same(found):
-    """A design is as good as its tolerance, and white input has the power of the design."""
+def assert_same(found, within=1e-9):
+    """A design is as good as its tolerance; white input has the power that the design was given."""
     designs, white = np.array(found).T
     np.testing.assert_allclose(designs, designs[0], rtol=1e-7)
-    np.testing.assert_allclose(white, white[0], rtol=1e-7)
+    np.testing.assert_allclose(white, white[0], rtol=within)
 
 
 def sampled(K, T, L, w):
@@ -102,7 +102,8 @@ def test_states_of_several_channels(exact):
         f"{{{parameters}, sample: zoh, continuous: {{numerator: [[[k], [c]], [[0.3*k], [1]]], "
         "denominator: [[[T, 1], [1, 0.5]], [[T, 1], [1, 0.5]]]}}",
     ]
-    assert_same([losses(plant, *exact, rest=MATRIX) for plant in words])
+    # The power of lines is that of the solver, which is known to the tolerance of designs.
+    assert_same([losses(plant, *exact, rest=MATRIX) for plant in words], 1e-7 if exact else 1e-9)
 
 
 @pytest.mark.parametrize(
