@@ -8,7 +8,7 @@ import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage
-from inputdesign_cli.questions import simulated_estimates
+from inputdesign_cli.questions.common import simulated_estimates
 from inputdesign_cli.questions.common.confidence import missed
 from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates
 

@@ -8,6 +8,10 @@ import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_begun_anywhere
+from inputdesign_cli.outcome.assessment import Assessment
+from inputdesign_cli.outcome.design import RequirementMet
+from inputdesign_cli.outcome.outcome import Outcome
+from inputdesign_cli.outcome.signal import Signal
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.report.evidence import verdict
 
@@ -87,9 +91,10 @@ def test_a_plant_that_forgets_its_start_has_no_note():
     ],
 )
 def test_a_top_up_says_what_its_promise_rests_on(signal, words):
-    entry = {"name": "model_error", "worst_ratio": 3.0, "frequency": None}
-    assessment = {"requirements": [entry], "met": False, "left": 0.99}
-    assert words in " ".join(verdict({"assessment": assessment, "signal": signal}))
+    missed = (RequirementMet(name="model_error", worst_ratio=3.0, frequency=None),)
+    assessment = Assessment(verdict="missed", met=False, requirements=missed, left=0.99)
+    outcome = Outcome(assessment=assessment, signal=Signal(samples=N, details=signal))
+    assert words in " ".join(verdict(outcome))
 
 
 @pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])
