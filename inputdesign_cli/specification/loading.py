@@ -82,18 +82,27 @@ def parse_spec(
         SpecError: As `load_spec`.
     """
     folder = folder or FilePath()
-    tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine)
+    return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
+
+
+def build(tree: Tree, folder: FilePath | None = None, design: bool | None = True) -> Spec:
+    """Return the spec of plain data, checked as a whole; arguments as for `load_spec`.
+
+    Raises:
+        SpecError: As `load_spec`.
+    """
+    check_mapping(tree)
     design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
         raise SpecError(_first(_sorted(diagnostics, tree.places)))
     spec = _with_defaults(spec)
-    spec._source, spec._design = Source(tree.data, tree.places, folder), design
+    spec._source, spec._design = Source(tree.data, tree.places, folder or FilePath()), design
     return spec
 
 
-Spec.reader = parse_spec
+Spec.build = build
 
 
 def _first(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
@@ -116,18 +125,24 @@ def read_tree(
         SpecError: The text is no mapping in YAML, or a file cannot be included.
     """
     tree = read(text, file)
-    if not isinstance(tree.data, dict):
-        empty = tree.data is None
-        raise SpecError.because(
-            "empty-file" if empty else "not-a-mapping",
-            "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
-            "`idesign init` writes a spec to start from",
-            location=tree.places.location(tree.places.mark(())) or Location(file, 1, 1),
-        )
+    check_mapping(tree)
     compose(tree, folder, overrides, known=Spec.model_fields.keys(), confine=confine)
     if confine is not None:
         keep_inside(tree, folder, confine)
     return tree
+
+
+def check_mapping(tree: Tree) -> None:
+    """Raise `SpecError` (`empty-file`, `not-a-mapping`) unless the data of a spec are a mapping."""
+    if isinstance(tree.data, dict):
+        return
+    empty, files = tree.data is None, [Location(file, 1, 1) for file, _ in tree.places.sources]
+    raise SpecError.because(
+        "empty-file" if empty else "not-a-mapping",
+        "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
+        "`idesign init` writes a spec to start from",
+        location=tree.places.location(tree.places.mark(())) or next(iter(files), None),
+    )
 
 
 def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:

@@ -10,7 +10,6 @@ import pytest
 import inputdesign_cli
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.rebuild import Change, Rebuild
 from inputdesign_cli.questions.building.system import build_experiment, build_model
 from tests.support.campaigns import SPEC
@@ -21,12 +20,12 @@ KNOWN = "uncertainty={intervals: {b1: [3, 4]}, scenarios: 10, fresh: 0}"
 def rebuilt(change, *overrides, theta=None):
     spec = parse_spec(SPEC, overrides=[KNOWN, *overrides])
     model = None if theta is None else build_model(spec).at(np.array(theta), np.array([[1.2]]))
-    return Rebuild(spec, lambda spec: spec, blocks_of).at(model, change)
+    return Rebuild(spec, lambda spec: spec).at(model, change)
 
 
 def test_without_a_change_only_the_model_is_another():
     spec = parse_spec(SPEC)
-    again = Rebuild(spec, build_experiment, blocks_of)
+    again = Rebuild(spec, build_experiment)
     model = build_model(spec).at(np.array([3.4, -0.73]), np.array([[1.2]]))
     experiment = again.at(model)
     assert np.array_equal(experiment.model.theta, model.theta)
@@ -60,7 +59,7 @@ def test_plants_that_the_data_leave_open_replace_those_of_the_spec():
 
 
 def test_it_goes_to_other_processes():
-    again = pickle.loads(pickle.dumps(Rebuild(parse_spec(SPEC), build_experiment, blocks_of)))
+    again = pickle.loads(pickle.dumps(Rebuild(parse_spec(SPEC), build_experiment)))
     assert again.at(None).samples == 200
 
 

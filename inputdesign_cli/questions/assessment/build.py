@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -12,9 +11,7 @@ from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification import Earlier
-from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.knowledge import (
@@ -28,12 +25,13 @@ from inputdesign_cli.questions.building.model_error import (
     unstated_errors,
 )
 from inputdesign_cli.questions.building.prior import build_earlier, stated_prior
+from inputdesign_cli.questions.building.rebuild import restated
 from inputdesign_cli.questions.building.requirements import build_requirements
 from inputdesign_cli.questions.building.signal_settings import operating_points
 from inputdesign_cli.questions.building.system import build_experiment, build_model, prior_record, record_step
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.least_cost.build import build_convex
-from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_header
 
 
@@ -82,35 +80,24 @@ def operating_point(spec: Spec) -> dict[str, float]:
     return {f"u{j + 1}": float(level) for j, level in enumerate(operating_points(spec))}
 
 
-def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:
-    """The override that lets a record vary about the levels of the data, where the spec does not say it."""
+def _offset(spec: Spec, levels: Mapping[str, float]) -> dict[str, object]:
+    """The change that lets a record vary about the levels of the data, where the spec does not say it."""
     inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
     if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
-        return []
+        return {}
     offsets = [levels.get(name, 0.0) for name in inputs]
-    return [f"signal.offset={json.dumps(offsets if len(offsets) > 1 else offsets[0])}"]
+    return {"signal.offset": offsets if len(offsets) > 1 else offsets[0]}
 
 
-def _reaching(spec: Spec, values: Mapping[str, float]) -> list[str]:
-    """The override that lets intervals reach the estimate, which may be outside of them."""
+def _reaching(spec: Spec, values: Mapping[str, float]) -> dict[str, object]:
+    """The change that lets intervals reach the estimate, which may be outside of them."""
     if spec.uncertainty is None or spec.uncertainty.intervals is None:
-        return []
+        return {}
     reaching = {
         name: (min(low, values.get(name, low)), max(high, values.get(name, high)))
         for name, (low, high) in spec.uncertainty.intervals.items()
     }
-    return [f"uncertainty.intervals={json.dumps(reaching)}"]
-
-
-def restated(spec: Spec, model: Model, source: str) -> Spec:
-    """The spec with another model in place of its nominal plant and noise."""
-    return parse_spec(
-        spec.to_yaml(),
-        file=source,
-        overrides=[f"{key}={json.dumps(block)}" for key, block in blocks_of(model).items()],
-        folder=spec.resolve_path("."),
-        design=False,
-    )
+    return {"uncertainty.intervals": reaching}
 
 
 def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
@@ -125,19 +112,9 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
     def topped_up(levels: Mapping[str, float]) -> Results:
         # With its values it counts for the estimate, too, when the spec is assessed with further records.
         values = dict(zip(raw.model.names, raw.model.theta.tolist(), strict=True))
-        prior = {"parameters": values, "information": (factor @ factor.T).tolist()}
-        task = build_convex(
-            parse_spec(
-                spec.to_yaml(),
-                file="top-up",
-                overrides=[
-                    f"experiment.prior={json.dumps(prior)}",
-                    *_offset(spec, levels),
-                    *_reaching(spec, values),
-                ],
-                folder=spec.resolve_path("."),
-            )
-        )
+        prior = {"parameters": values, "information": factor @ factor.T}
+        changes = {"experiment.prior": prior, **_offset(spec, levels), **_reaching(spec, values)}
+        task = build_convex(spec.revised(changes, file="top-up", design=True))
         if task.foresight is None:
             return task.solve()
         # Both records are assessed together.

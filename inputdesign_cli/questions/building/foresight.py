@@ -13,11 +13,11 @@ from inputdesign_cli.questions.building.knowledge import build_knowledge
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.prior import build_earlier
 from inputdesign_cli.questions.common.foresight import Foresight
-from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
 
 # Filtered noise: power between the lines of a multisine, where whole periods of them differ.
-_RICHER = ("{type: fir, order: 12}", "{type: fir, order: 60}")
+_ORDERS = (12, 60)
 
 
 def build_foresight(
@@ -38,10 +38,9 @@ def build_foresight(
     # Several plants take their time, and noise of a filter has no other spectrum beside it.
     alone = spec.uncertainty is not None or stated is None or stated.type == "fir"
 
-    def solved(words: str) -> Result:
+    def solved(order: int) -> Result:
         assert design is not None
-        overrides, folder = [f"spectrum={words}"], spec.resolve_path(".")
-        return design(parse_spec(spec.to_yaml(), "other spectrum", overrides, folder=folder))
+        return design(spec.with_(spectrum={"type": "fir", "order": order}))
 
     return Foresight(
         units=build_units(spec),
@@ -51,7 +50,9 @@ def build_foresight(
         advice=f"excite more frequencies, or hold what is known (plant.known: [{names}])",
         knowledge=build_knowledge(spec),
         looks=spec.solver.any_spectrum,
-        richer={} if design is None or alone else {words: partial(solved, words) for words in _RICHER},
+        richer={} if design is None or alone else {
+            f"{{type: fir, order: {order}}}": partial(solved, order) for order in _ORDERS
+        },
     )
 
 

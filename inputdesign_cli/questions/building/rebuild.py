@@ -1,21 +1,32 @@
-"""Build a question again at an estimate: the one object that keeps the sections of a spec after building."""
+"""Build a question again at an estimate, from the sections of its spec."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import Model
-from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import SOURCES
 
 Built = TypeVar("Built")
-_SOURCE = "plan"
 # Keys that say how well the plant is known before any data.
 _PRIOR = {*SOURCES, "parameters"}
+
+
+def restated(spec: Spec, model: Model, source: str) -> Spec:
+    """Return the spec with a model in place of its nominal plant and noise; no design need be asked for.
+
+    Args:
+        source: what diagnostics about the model name as its file.
+
+    Raises:
+        SpecError: the spec does not go with this model.
+    """
+    return spec.revised(blocks_of(model), file=source, design=False)
 
 
 @dataclass(frozen=True)
@@ -49,12 +60,10 @@ class Rebuild(Generic[Built]):
     Attributes:
         sections: of the spec; nothing else may read them after building.
         build: makes the object.
-        words: returns `plant` and `noise` of a model.
     """
 
     sections: Spec
     build: Callable[[Spec], Built]
-    words: Callable[[Model], Mapping[str, object]]
 
     def at(self, model: Model | None, change: Change | None = None) -> Built:
         """Return the object at a model; None is the plant of the spec.
@@ -62,17 +71,10 @@ class Rebuild(Generic[Built]):
         Raises:
             IdesignError: it cannot be built of this model.
         """
-        values = {} if model is None else dict(self.words(model))
+        values: dict[str, object] = {} if model is None else {**blocks_of(model)}
         if change is not None:
             values |= self._changed(change, model)
-        spec = parse_spec(
-            self.sections.to_yaml(),
-            file=_SOURCE,
-            overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()],
-            folder=self.sections.resolve_path("."),
-            design=change is not None,
-        )
-        return self.build(spec)
+        return self.build(self.sections.revised(values, file="plan", design=change is not None))
 
     def _changed(self, change: Change, model: Model | None) -> Iterator[tuple[str, object]]:
         stated, signal = self.sections.uncertainty, self.sections.signal
@@ -89,7 +91,7 @@ class Rebuild(Generic[Built]):
             yield "objective", "best_accuracy"
         known: dict[str, object] = {}
         if model is not None and change.information is not None:
-            known = {"parameters": list(model.names), "information": change.information.tolist()}
+            known = {"parameters": model.names, "information": change.information}
             yield "experiment.prior", known
         if change.uncertainty == "data":
             own = {} if stated is None else stated.model_dump(mode="json", exclude_unset=True, exclude=_PRIOR)

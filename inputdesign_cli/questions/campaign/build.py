@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.assessment.build import ask, build_identification
 from inputdesign_cli.questions.assessment.identify import ModelQuestion
 from inputdesign_cli.questions.building.rebuild import Rebuild
@@ -130,8 +129,8 @@ def build_planner(spec: Spec) -> Planner:
         step=record_step(spec),
         bounded=spec.limits.bounds_power,
         seed=spec.signal.seed or 0,
-        designs=Rebuild(spec, build_convex, blocks_of),
-        asked=Rebuild(spec, _asked, blocks_of),
+        designs=Rebuild(spec, build_convex),
+        asked=Rebuild(spec, _asked),
     )
 
 

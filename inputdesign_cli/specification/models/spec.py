@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
+import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar, Literal, Protocol, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr
 
@@ -24,22 +24,15 @@ from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
-from inputdesign_cli.specification.yaml.places import Source, parse_key
+from inputdesign_cli.specification.yaml.overrides import replace_values
+from inputdesign_cli.specification.yaml.places import Places, Source, parse_key
 from inputdesign_cli.specification.yaml.plain import plain
+from inputdesign_cli.specification.yaml.reader import Tree
 from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
 
 Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
 
 _Error = TypeVar("_Error", bound=IdesignError)
-
-
-class Reader(Protocol):
-    """What makes a spec of text; see `parse_spec`."""
-
-    def __call__(
-        self, text: str, file: str, overrides: Sequence[str], *, folder: Path | None, design: bool
-    ) -> Spec:
-        """A spec of YAML with overrides."""
 
 
 OF_DESIGNS = (
@@ -117,14 +110,14 @@ class Spec(Section):
     _source: Source = PrivateAttr(default_factory=Source)
     _design: bool = PrivateAttr(default=True)
 
-    # What reads text; `specification.loading` sets it, which itself needs this class.
-    reader: ClassVar[Reader]
+    # Checks the tree of a whole spec; `specification.loading`, which needs this class, sets it.
+    build: ClassVar[Callable[[Tree, Path | None, bool | None], Spec]]
 
     @classmethod
     def from_dict(
         cls, data: Mapping[str, object], *, folder: Path | None = None, design: bool = True
     ) -> Spec:
-        """The spec of plain data: mappings, lists, numbers and texts, as a file holds them.
+        """Return the spec of plain data: mappings, lists, numbers and texts, as a file holds them.
 
         Args:
             data: arrays of numpy will do for lists.
@@ -136,10 +129,25 @@ class Spec(Section):
         """
         if folder is not None and not isinstance(folder, Path):
             raise bad_spec("bad-argument", "folder must be a pathlib.Path", hint="Path(..)", key="folder")
-        return cls.reader(to_yaml(plain(data)), "<dict>", (), folder=folder, design=design)
+        return cls.build(Tree(plain(data), Places()), folder, design)
 
     def with_(self, **changes: object) -> Spec:
-        """The spec with other values: `spec.with_(**{"experiment.samples": 600})`; None removes a key.
+        """Return the spec with other values: `spec.with_(**{"experiment.samples": 600})`; None removes a key.
+
+        Raises:
+            SpecError: everything that is wrong with the new one.
+        """
+        return self.revised(changes)
+
+    def revised(
+        self, changes: Mapping[str, object], *, file: str = "<spec>", design: bool | None = None
+    ) -> Spec:
+        """Return the spec with other values at some dotted keys, checked as a whole.
+
+        Args:
+            changes: values by key; None removes a key.
+            file: what diagnostics about the new values name as their file.
+            design: as for `from_dict` (default: as this spec).
 
         Raises:
             SpecError: everything that is wrong with the new one.
@@ -147,10 +155,9 @@ class Spec(Section):
         for key in changes:
             if "=" in key:
                 raise bad_spec("bad-argument", f"{key!r} is no key", hint="no key has =", key=key)
-        overrides = [f"{key}={json.dumps(plain(value, key))}" for key, value in changes.items()]
-        return type(self).reader(
-            self.to_yaml(), "<spec>", overrides, folder=self._source.folder, design=self._design
-        )
+        tree = Tree(copy.deepcopy(self.content), copy.deepcopy(self._source.places))
+        replace_values(tree, {key: plain(value, key) for key, value in changes.items()}, file)
+        return type(self).build(tree, self._source.folder, self._design if design is None else design)
 
     @property
     def goal(self) -> Objective:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path as FilePath
 
 from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.specification.yaml.include import KEY, apply_includes
 from inputdesign_cli.specification.yaml.nodes import MAX_DEPTH
-from inputdesign_cli.specification.yaml.places import Mark, Path, format_key, parse_key
+from inputdesign_cli.specification.yaml.places import Mark, Path, Places, format_key, parse_key
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
@@ -56,20 +56,31 @@ def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError
     return SpecError.because("bad-override", message, hint, location=location)
 
 
+def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
+    """Put plain values at dotted keys of the tree; None removes a key.
+
+    Args:
+        tree: changed in place.
+        changes: values by key, such as `{"experiment.samples": 600}`.
+        file: what diagnostics about the new values name as their file.
+
+    Raises:
+        SpecError: `bad-override`, a key leads nowhere.
+    """
+    mark = Mark(len(tree.places.sources), 1, 1)
+    tree.places.sources.append((file, []))
+    for key, value in changes.items():
+        _put(tree, _resolve(tree.data, key, f"{key}=.."), Tree(value, Places()), mark)
+
+
 def _apply(tree: Tree, override: str) -> None:
     key, equals, text = override.partition("=")
     name = key.strip()
-    path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(name))
-    if not equals or not path or "" in path or not key.isprintable():
-        message = f"{override!r} is not of the form key.path=value"
-        raise _error(override, message, "write --set noise.variance=0.5")
-    if len(path) > MAX_DEPTH:
-        raise _error(override, "the key has too many steps", "no key has more than six")
+    where = _resolve(tree.data, key if equals else "", override)
     if not text.strip():
         hint = f"write {name}=VALUE, or {name}=null to remove the key"
         raise _error(override, f"no value is given for {name}", hint, len(key) + 2)
     number = len(tree.places.sources)
-    where = _resolve(tree.data, path, override)
     value = read(text, f"--set {override}", source=number, before=key + equals, at=where)
     tree.places.sources.append(value.places.sources[0])
     _put(tree, where, value, Mark(number, 1, 1))
@@ -77,8 +88,18 @@ def _apply(tree: Tree, override: str) -> None:
     tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
 
 
-def _resolve(data: Plain, path: Path, override: str) -> Path:
-    """The path with digits turned into indices where the tree has a list."""
+def _resolve(data: Plain, key: str, override: str) -> Path:
+    """The path of a dotted key, with digits turned into indices where the tree has a list.
+
+    Raises:
+        SpecError: `bad-override`.
+    """
+    path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(key.strip()))
+    if not path or "" in path or not key.isprintable():
+        message = f"{override!r} is not of the form key.path=value"
+        raise _error(override, message, "write --set noise.variance=0.5")
+    if len(path) > MAX_DEPTH:
+        raise _error(override, "the key has too many steps", "no key has more than six")
     found: list[str | int] = []
     for step in path:
         above = format_key(found)
@@ -117,7 +138,7 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
         node.pop(last, None)
         return
     node[last] = value.data
-    places.keys[path] = mark
+    places.keys[path] = places.values[path] = mark
     places.adopt(value.places, path)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,6 +18,8 @@ This is the one place where the type is open. A union that names itself would ha
 for the type of each step; the models do that once.
 """
 
+FORBIDDEN_IN_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+"""Characters that no text of a spec may hold."""
 _DEEPEST = 50
 
 
@@ -43,6 +46,8 @@ def plain(value: object, where: str = "", depth: int = 0) -> Plain:
         return {str(k): plain(v, f"{where}.{k}" if where else str(k), depth + 1) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [plain(part, f"{where}[{i}]", depth + 1) for i, part in enumerate(value)]
+    if isinstance(value, str) and FORBIDDEN_IN_TEXT.search(value):
+        raise _no_data("holds an unprintable character", where)
     if value is None or isinstance(value, str | bool | int | float):
         return value
     raise _no_data(f"is a {type(value).__name__}", where)

@@ -5,16 +5,14 @@ Aliases are expanded under the bounds of `nodes`; duplicate keys, tags and merge
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 
 from inputdesign_cli.errors import Diagnostic
 from inputdesign_cli.specification.yaml.nodes import Document, Node, compose
 from inputdesign_cli.specification.yaml.places import Mark, Path, Places, format_key
-from inputdesign_cli.specification.yaml.plain import Plain
+from inputdesign_cli.specification.yaml.plain import FORBIDDEN_IN_TEXT, Plain
 from inputdesign_cli.specification.yaml.scalars import clip, resolve
 
-_FORBIDDEN_IN_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 _PLAIN_TAGS = (None, "!")
 
 
@@ -86,7 +84,7 @@ class _Expansion:
     def _scalar(self, node: Node, path: Path, mark: Mark) -> Plain:
         if node.plain:
             return resolve(node.value)
-        if bad := _FORBIDDEN_IN_TEXT.search(node.value):
+        if bad := FORBIDDEN_IN_TEXT.search(node.value):
             what = f"the unprintable character U+{ord(bad.group()):04X}"
             message = f"{format_key(path) or 'the spec'} holds {what}"
             self._complain("bad-text", message, "remove the escape that makes it", path, mark, lost=path)
@@ -99,7 +97,7 @@ class _Expansion:
         for key, value in zip(node.value[::2], node.value[1::2], strict=True):
             mark = self._mark(key)
             written = key.value if key.kind == "alias" else key
-            if written.kind != "scalar" or _FORBIDDEN_IN_TEXT.search(written.value):
+            if written.kind != "scalar" or FORBIDDEN_IN_TEXT.search(written.value):
                 message = f"a key of {format_key(path) or 'the spec'} is not a word"
                 hint = 'keys are plain words; a list or mapping goes behind a colon ("key: value")'
                 self._complain("bad-key", message, hint, path, mark, lost=path)
