@@ -17,7 +17,7 @@ def one_of(words: Sequence[str], help_text: str) -> Any:
 
     def check(value: str) -> str:
         if value not in words:
-            from inputdesign_cli.specification.wording import unknown_word
+            from inputdesign_cli.specification.models.wording import unknown_word
 
             message, hint = unknown_word(value, words)
             raise typer.BadParameter("; ".join(filter(None, (message.replace("{key}", "it"), hint))))

@@ -29,9 +29,8 @@ from pydantic import AfterValidator, ValidationError
 
 from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.specification.models.fields import FileName, Number, Positive, Several, Text
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
 from inputdesign_cli.specification.models.pydantic_errors import translate
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, fail
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import parse_key
 from inputdesign_cli.specification.yaml.reader import read

@@ -3,8 +3,8 @@
 from inputdesign_cli.specification.loading import load_spec, parse_spec
 from inputdesign_cli.specification.model_file import is_prior, load_estimate
 from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
-from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
+from inputdesign_cli.specification.models.loop import ClosedLoopError
 from inputdesign_cli.specification.models.plant import PolynomialPlant
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.specification.models.spec import Spec

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
-from inputdesign_cli.specification.yaml.include import KEY
+from inputdesign_cli.specification.yaml.overrides import KEY
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.version import __version__
 

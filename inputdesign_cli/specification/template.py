@@ -21,9 +21,8 @@ from inputdesign_cli.specification.named_files import named_files
 from inputdesign_cli.specification.yaml.files import is_outside, read_text
 from inputdesign_cli.specification.yaml.overrides import apply_overrides
 from inputdesign_cli.specification.yaml.places import Places
-from inputdesign_cli.specification.yaml.plain import Plain
+from inputdesign_cli.specification.yaml.plain import Plain, fingerprint
 from inputdesign_cli.specification.yaml.reader import Tree, read
-from inputdesign_cli.specification.yaml.writer import fingerprint
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.specification.yaml.reader import read
-from inputdesign_cli.specification.yaml.writer import to_yaml
 from inputdesign_cli.sweeps.layout import SPEC, SUMMARY
 from inputdesign_cli.sweeps.plan import Plan, without_sweep
 

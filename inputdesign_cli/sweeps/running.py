@@ -27,7 +27,7 @@ from inputdesign_cli.outcome.provenance import environment
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.outcome.text_formats import json_text
-from inputdesign_cli.specification.yaml.writer import to_yaml
+from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps.earlier import check_same_sweep
 from inputdesign_cli.sweeps.grid import Settings
 from inputdesign_cli.sweeps.kept import flaw

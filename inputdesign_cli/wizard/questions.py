@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location, SpecError
-from inputdesign_cli.specification.wording import unknown_word
+from inputdesign_cli.specification.models.wording import unknown_word
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.reader import read
 

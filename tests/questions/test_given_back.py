@@ -7,8 +7,8 @@ import pytest
 
 from inputdesign_cli import analyse, load_spec, parse_spec, solve
 from inputdesign_cli.outcome.text_formats import csv_text
+from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.specification.yaml.reader import read
-from inputdesign_cli.specification.yaml.writer import to_yaml
 from inputdesign_cli.spectrum import TabulatedSpectrum
 
 SPECS = Path(__file__).parents[2] / "specs"

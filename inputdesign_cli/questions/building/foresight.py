@@ -50,9 +50,9 @@ def build_foresight(
         advice=f"excite more frequencies, or hold what is known (plant.known: [{names}])",
         knowledge=build_knowledge(spec),
         looks=spec.solver.any_spectrum,
-        richer={} if design is None or alone else {
-            f"{{type: fir, order: {order}}}": partial(solved, order) for order in _ORDERS
-        },
+        richer={}
+        if design is None or alone
+        else {f"{{type: fir, order: {order}}}": partial(solved, order) for order in _ORDERS},
     )
 
 

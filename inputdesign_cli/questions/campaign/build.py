@@ -22,7 +22,7 @@ from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
 from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.campaign import Campaign, Pilot
+from inputdesign_cli.specification.models.experiment import Campaign, Pilot
 
 _TENTH, _LONGEST, _CAP = 10, 3, 10.0
 

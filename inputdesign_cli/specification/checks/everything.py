@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from inputdesign_cli.specification.checks import goal, loop, plant, regression, size
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.checks import goal, loop, plant, size
+from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.places import Path, parse_key
 
@@ -21,7 +21,7 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (plant.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
     (plant.true_noise_fits, ("plant", "simulation.noise")),
     (plant.spectrum_fits, ("plant", "spectrum.type")),
-    (regression.regression_fits, ("plant", "accuracy.mean_squared_error")),
+    (plant.regression_fits, ("plant", "accuracy.mean_squared_error")),
     (plant.weights_fit, ("plant.sample", "plant.continuous")),
     (loop.control_fits, ("plant", "accuracy.closed_loop_error")),
     (size.channels, ("plant",)),

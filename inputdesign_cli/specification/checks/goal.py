@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.wording import choices
+from inputdesign_cli.specification.models.wording import choices
 
 
 def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:

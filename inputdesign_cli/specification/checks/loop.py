@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from inputdesign_cli.specification.checks.plant import SAMPLED
 from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
+from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.shapes import size_of
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.wording import count
+from inputdesign_cli.specification.models.wording import count
 
 _SENSITIVITY = ("accuracy", "model_error", "sensitivity")
 _LOOP = ("accuracy", "loop")

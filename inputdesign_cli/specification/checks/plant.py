@@ -1,4 +1,4 @@
-"""Do stability, noise, spectrum, weights and the true system of a simulation fit the kind of plant."""
+"""Do stability, noise, spectrum, weights, the true system of a simulation and a regression fit the plant."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from inputdesign_cli.specification.models.experiment import NoiseShape
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
-from inputdesign_cli.specification.models.polynomials import check_no_growth
+from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.shapes import check_each, check_per_output
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.wording import count
+from inputdesign_cli.specification.models.values import check_no_growth
+from inputdesign_cli.specification.models.wording import count
 
 
 def stable_unless_controlled(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -145,3 +145,29 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
         hint = "the true system may be of another order, but has the same signals"
         yield PathDiagnostic("wrong-shape", message, hint, path)
     yield from check_stable(spec, true, *path)
+
+
+def regression_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """A regression is designed for mean-squared error, and that error is one of regressions."""
+    error, plant = spec.accuracy.mean_squared_error, spec.plant
+    path = ("accuracy", "mean_squared_error")
+    if plant.kind != "regression":
+        if error is not None:
+            message = "{key} is for a linear regression, but the plant is not one"
+            hint = "write plant: {regression: {estimated: 1, neglected: 1}}, or ask for a model_error"
+            yield PathDiagnostic("regression-mismatch", message, hint, path)
+        return
+    for key in (*spec.accuracy.requirements, *spec.accuracy.goals):
+        if key != "mean_squared_error":
+            message, hint = "{key} does not go with a regression", "ask for accuracy.mean_squared_error"
+            yield PathDiagnostic("regression-mismatch", message, hint, ("accuracy", key))
+    if error is None:
+        return
+    for name, given, size in (
+        ("estimated", error.estimated, plant.regression.estimated),
+        ("neglected", error.neglected, plant.regression.neglected),
+    ):
+        if given is not None and len(given) != size:
+            message = f"{{key}} holds {count(len(given), 'weight')}, but {size} regressors are {name}"
+            hint = "write one weight per regressor; plant.regression says how many there are"
+            yield PathDiagnostic("wrong-shape", message, hint, (*path, name))

@@ -8,8 +8,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
@@ -30,9 +28,8 @@ from inputdesign_cli.specification.models.fields import (
     SemidefiniteMatrix,
     SymmetricMatrix,
 )
-from inputdesign_cli.specification.models.loop import LoopMargin
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.section import Section, Shorthand
+from inputdesign_cli.specification.models.loop import ClosedLoopError, LoopMargin
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, Wording
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
 from inputdesign_cli.specification.models.units import FRACTION

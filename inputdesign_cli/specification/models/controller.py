@@ -7,10 +7,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import Count, Index, NonNegative, Number, Several, Time
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.section import Section, pick
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, pick
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import ContinuousRatio, DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.units import TIME

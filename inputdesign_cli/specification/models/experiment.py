@@ -1,15 +1,14 @@
-"""`noise:`, `experiment:` and `cost:`: what disturbs, how long, in which loop, at what price."""
+"""`noise:`, `channels:`, `experiment:`, `campaign:`, `cost:`: how data are collected, and at what price."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field
+from pydantic import AfterValidator, Discriminator, Field, Strict
 
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
@@ -23,17 +22,25 @@ from inputdesign_cli.specification.models.fields import (
     PerChannel,
     Positive,
     SemidefiniteMatrix,
+    Several,
     StablePerOutput,
     Time,
     Variance,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import check_delay_stable
-from inputdesign_cli.specification.models.section import TAG, Section, tag
+from inputdesign_cli.specification.models.section import (
+    TAG,
+    PathDiagnostic,
+    Section,
+    Shorthand,
+    Wording,
+    fail,
+    tag,
+)
 from inputdesign_cli.specification.models.shapes import with_paths
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import FRACTION
-from inputdesign_cli.specification.models.values import depth
-from inputdesign_cli.specification.wording import count
+from inputdesign_cli.specification.models.values import check_delay_stable, depth
+from inputdesign_cli.specification.models.wording import count
 
 # Roots on the unit circle come inside, as far as decimals can tell, when they are shrunk by this.
 _INSIDE = 1.0 - 1e-7
@@ -231,3 +238,84 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
             "write one name per row, in the order of the rows",
             ("parameters",),
         )
+
+
+_LONGEST = 40
+
+
+def _one_line(text: str) -> str:
+    """A text that may stand in the header of a table."""
+    if any(c in '",;\t\r\n' for c in text) or len(text) > _LONGEST:
+        message = f"{{key}} must be one line of at most {_LONGEST} characters without commas and quotes"
+        raise fail("bad-name", message, "shorten it: it stands in headers of tables")
+    return text
+
+
+Label = Annotated[
+    str, Strict(), Field(pattern=r"\S"), AfterValidator(_one_line), Wording("a text", 'quote it: "%"')
+]
+
+
+class Channel(Section):
+    """One input or output."""
+
+    name: Label | None = Field(default=None, description="What it is called.", examples=["valve"])
+    unit: Label | None = Field(default=None, description="The unit of its samples.", examples=["%"])
+
+
+Channels = Mapping[str, Channel]
+
+
+Samples = Annotated[Count, SIZES["signal.samples"]]
+
+
+class Pilot(Section):
+    """The first part, while little is known of the plant."""
+
+    samples: Samples = Field(description="Its length.")
+    power: Positive | None = Field(
+        default=None,
+        description="Power of white noise in place of the first plan, for a plant of which next to nothing "
+        "is known.",
+    )
+
+
+class Campaign(Section):
+    """An experiment in parts, planned anew after each of them until the data say stop."""
+
+    block: Samples | None = Field(
+        default=None, description="Samples of each part (default: a tenth of the experiment)."
+    )
+    stages: Annotated[Several[Samples], SIZES["campaign.stages"]] | None = Field(
+        default=None, description="In place of block: the samples of the parts, one by one."
+    )
+    pilot: (
+        Annotated[Pilot, Shorthand("samples", {"type": "integer", "minimum": 1, "maximum": 1_000_000})] | None
+    ) = Field(
+        default=None,
+        description="The first part: its samples, or {samples, power} for white noise (default: a block, at "
+        "most a tenth of the experiment).",
+    )
+    max_samples: Samples | None = Field(
+        default=None,
+        description="Where the experiment ends at the latest (default: three times its samples).",
+    )
+    power_cap: Positive | None = Field(
+        default=None,
+        description="Largest cost of a sample, relative to the first plan; a plan beyond it is made longer, "
+        "a part weaker (default: 10).",
+    )
+    last: Literal["robust", "nominal"] = Field(
+        default="robust",
+        description="robust: a plan that ends with its first part is made for all plants that the data leave "
+        "open (default); nominal: for the estimate alone.",
+    )
+    stop: Literal["data", "never"] = Field(
+        default="data",
+        description="data: as soon as the data meet the accuracy (default); never: at experiment.samples.",
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """The parts are stated once."""
+        yield from self.at_most_one("stages", "block")
+        yield from self.at_most_one("stages", "pilot")

@@ -18,23 +18,19 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry, fail
-from inputdesign_cli.specification.models.polynomials import (
+from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Wording, carry, fail, tag
+from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
+from inputdesign_cli.specification.models.units import FRACTION, FREQUENCY, SIGNAL, TIME
+from inputdesign_cli.specification.models.values import (
     Polynomial,
+    as_text,
+    as_whole,
+    ascending,
     check_delay_stable,
     check_leading,
     check_monic,
     check_no_growth,
     check_not_zero,
-)
-from inputdesign_cli.specification.models.section import TAG, tag
-from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
-from inputdesign_cli.specification.models.units import FRACTION, FREQUENCY, SIGNAL, TIME
-from inputdesign_cli.specification.models.values import (
-    as_text,
-    as_whole,
-    ascending,
     depth,
     positive_definite,
     product_exists,

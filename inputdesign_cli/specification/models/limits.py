@@ -18,8 +18,7 @@ from inputdesign_cli.specification.models.fields import (
     PerChannel,
     Time,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, pick, tag
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
 from inputdesign_cli.specification.models.units import MOVE
 from inputdesign_cli.specification.yaml.plain import Plain

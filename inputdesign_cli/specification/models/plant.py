@@ -4,33 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     Count,
     GainMatrix,
     Index,
     MonicPerOutput,
+    Names,
+    NonNegative,
+    Number,
     Numbers,
+    Several,
     StableMatrix,
+    nested,
 )
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTerms,
     NamedParameter,
     Terms,
+    check_names,
+    check_used,
     expressed,
     leading,
     matrix,
+    texts_in,
+    values_of,
+    worth,
 )
-from inputdesign_cli.specification.models.named_plant import NamedPlant
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.process import ProcessModel
-from inputdesign_cli.specification.models.section import Section, pick
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, carry, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_gain,
@@ -39,9 +46,119 @@ from inputdesign_cli.specification.models.shapes import (
     size_of,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.state_space import StateSpace
 from inputdesign_cli.specification.models.transfer import DelayedMatrix
-from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+from inputdesign_cli.specification.models.units import TIME
+from inputdesign_cli.specification.models.values import Matrix, PolynomialMatrix, depth, same_columns
+from inputdesign_cli.specification.yaml.plain import Plain
+
+
+class NamedPlant(Section):
+    """What plants have in common whose coefficients may be expressions in named parameters."""
+
+    TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ()
+
+    parameters: Annotated[Mapping[str, Number], SIZES["plant.parameters"]] | None = Field(
+        default=None,
+        min_length=1,
+        description="Named parameters and their values. Coefficients may then be expressions in them, and "
+        "these alone are estimated.",
+        examples=[{"K": 2.1, "T": 180}],
+    )
+    known: Names | None = Field(
+        default=None, description="Names of parameters that are known and not estimated.", examples=[["b1"]]
+    )
+
+    _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _worth(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """The section with the values of its expressions; it remembers what was written."""
+        if not isinstance(data, dict):
+            return handler(data)
+        numbers = dict(data)
+        if isinstance(data.get("parameters"), dict):
+            values = values_of(data["parameters"])
+            if len(values) > SIZES["plant.parameters"].most:
+                return handler(numbers)
+            found = list(check_names(values))
+            stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
+            numbers |= {key: worth(data[key], values, (key,), found) for key in stated}
+            if not found:
+                found += check_used(values, texts_in([data[key] for key in stated]))
+            if found:
+                raise carry(*found)
+        made = handler(numbers)
+        made._written = dict(data)
+        if wrong := tuple(made.check_written()):
+            raise carry(*wrong)
+        return made
+
+    def check_written(self) -> Iterator[PathDiagnostic]:
+        """What is wrong with what its coefficients are, whatever the values of its parameters."""
+        return iter(())
+
+    @property
+    def written(self) -> dict[str, Plain]:
+        """The section as it was written, with its expressions."""
+        return self._written
+
+    @property
+    def named_parameters(self) -> tuple[NamedParameter, ...]:
+        """Parameters with names of their own; none where the coefficients are the parameters."""
+        stated = self.parameters or {}
+        return tuple(NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
+
+
+_Row = Annotated[Several[Number], SIZES["states"]]
+Rows = Annotated[
+    Several[_Row],
+    SIZES["states"],
+    nested(2, "a matrix", "write rows: [[0, 1], [0, -2]]"),
+    AfterValidator(same_columns),
+    Wording("a matrix", "write rows: [[0, 1], [0, -2]]"),
+    EXPRESSIONS,
+]
+"""A matrix of numbers and expressions."""
+
+
+class StateSpace(Section):
+    """dx/dt = A x + B u(t - delay), y = C x + D u(t - delay); or x(t + 1) = .. with `time: discrete`.
+
+    With K the noise enters the states: x(t + 1) = A x + B u + K e, y = C x + D u + e, in samples.
+    """
+
+    A: Rows = Field(description="States by states.", examples=[[[0, 1], [0, "-1/T"]]])
+    B: Rows = Field(description="States by inputs.", examples=[[[0], ["k/T"]]])
+    C: Rows = Field(description="Outputs by states.", examples=[[[1, 0]]])
+    D: Rows | None = Field(default=None, description="Outputs by inputs (default 0).")
+    K: Rows | None = Field(
+        default=None,
+        description="Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
+        "noise is added to the outputs).",
+    )
+    delay: Annotated[NonNegative, EXPRESSIONS, TIME] = Field(
+        default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
+    )
+    time: Literal["continuous", "discrete"] = Field(
+        default="continuous", description="Whether A and B are those of derivatives, or of samples."
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """The matrices fit each other."""
+        n, r, p = len(self.A), len(self.B[0]), len(self.C)
+        sizes: tuple[tuple[str, Matrix | None, int, int, str], ...] = (
+            ("A", self.A, n, n, "states by states"),
+            ("B", self.B, n, r, "states by inputs"),
+            ("C", self.C, p, n, "outputs by states"),
+            ("D", self.D, p, r, "outputs by inputs"),
+            ("K", self.K, n, p, "states by outputs"),
+        )
+        for key, entries, rows, columns, words in sizes:
+            if entries is not None and (len(entries), len(entries[0])) != (rows, columns):
+                message = f"{{key}} is {len(entries)} x {len(entries[0])}, and must be {rows} x {columns}"
+                yield PathDiagnostic("wrong-shape", message, f"it has {words}", (key,))
+
 
 Continuous = Annotated[
     DelayedMatrix | ProcessModel,

@@ -17,8 +17,7 @@ from inputdesign_cli.specification.models.named import (
     Terms,
     expressed,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section
 from inputdesign_cli.specification.models.units import FREQUENCY, TIME
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.fields import (
     Count,
@@ -22,9 +21,8 @@ from inputdesign_cli.specification.models.fields import (
     Several,
     Tolerance,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
 from inputdesign_cli.specification.models.plant import TruePlant
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
 

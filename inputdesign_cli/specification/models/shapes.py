@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from inputdesign_cli.specification.models.named import TermMatrix, Terms, leading
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import Polynomial, product
-from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
-from inputdesign_cli.specification.wording import count
+from inputdesign_cli.specification.models.section import PathDiagnostic
+from inputdesign_cli.specification.models.values import Polynomial, PolynomialMatrix, depth, product
+from inputdesign_cli.specification.models.wording import count
 
 
 def as_matrix(value: tuple) -> PolynomialMatrix:

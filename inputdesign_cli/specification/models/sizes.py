@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
-from inputdesign_cli.specification.models.path_diagnostic import fail
-from inputdesign_cli.specification.wording import show
+from inputdesign_cli.specification.models.section import fail
+from inputdesign_cli.specification.models.wording import show
 from inputdesign_cli.specification.yaml.plain import Plain
 
 

@@ -13,9 +13,14 @@ from pydantic import Field, PrivateAttr
 
 from inputdesign_cli.errors import IdesignError, Location, SpecError, bad_spec
 from inputdesign_cli.specification.models.accuracy import Accuracy
-from inputdesign_cli.specification.models.campaign import Campaign
-from inputdesign_cli.specification.models.channels import Channels
-from inputdesign_cli.specification.models.experiment import Cost, Estimated, Experiment, Noise
+from inputdesign_cli.specification.models.experiment import (
+    Campaign,
+    Channels,
+    Cost,
+    Estimated,
+    Experiment,
+    Noise,
+)
 from inputdesign_cli.specification.models.fields import Text, Time
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
@@ -26,9 +31,8 @@ from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.specification.yaml.overrides import replace_values
 from inputdesign_cli.specification.yaml.places import Places, Source, parse_key
-from inputdesign_cli.specification.yaml.plain import plain
+from inputdesign_cli.specification.yaml.plain import fingerprint, plain, to_yaml
 from inputdesign_cli.specification.yaml.reader import Tree
-from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
 
 Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
 
@@ -155,7 +159,7 @@ class Spec(Section):
         for key in changes:
             if "=" in key:
                 raise bad_spec("bad-argument", f"{key!r} is no key", hint="no key has =", key=key)
-        tree = Tree(copy.deepcopy(self.content), copy.deepcopy(self._source.places))
+        tree = Tree(copy.deepcopy(self.content), self._source.places.copy())
         replace_values(tree, {key: plain(value, key) for key, value in changes.items()}, file)
         return type(self).build(tree, self._source.folder, self._design if design is None else design)
 

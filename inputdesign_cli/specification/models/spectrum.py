@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Discriminator, Field
 
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     Band,
     Count,
@@ -19,11 +18,10 @@ from inputdesign_cli.specification.models.fields import (
     Positive,
     Several,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
+from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Section, Wording, pick, tag
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.values import depth
-from inputdesign_cli.specification.wording import count
+from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
 

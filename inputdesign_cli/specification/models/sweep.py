@@ -9,10 +9,8 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import Flag, Several
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, carry
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.scalars import resolve
 

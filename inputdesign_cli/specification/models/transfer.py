@@ -9,7 +9,6 @@ from typing import Annotated, ClassVar, Literal, cast
 from pydantic import Field
 
 from inputdesign_cli.expressions import product_of
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     ContinuousDenominator,
     Denominator,
@@ -25,15 +24,7 @@ from inputdesign_cli.specification.models.named import (
     expressed,
     matrix,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import (
-    Polynomial,
-    check_delay_stable,
-    check_left_half_plane,
-    check_no_growth_in_s,
-    product,
-)
-from inputdesign_cli.specification.models.section import Section, pick
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_each,
@@ -43,7 +34,16 @@ from inputdesign_cli.specification.models.shapes import (
     denominators_of,
 )
 from inputdesign_cli.specification.models.units import TIME
-from inputdesign_cli.specification.models.values import PolynomialList, PolynomialMatrix, depth
+from inputdesign_cli.specification.models.values import (
+    Polynomial,
+    PolynomialList,
+    PolynomialMatrix,
+    check_delay_stable,
+    check_left_half_plane,
+    check_no_growth_in_s,
+    depth,
+    product,
+)
 from inputdesign_cli.specification.yaml.plain import Plain
 
 

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Discriminator, Field
 
-from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.experiment import InformationSource, Values, check_names
 from inputdesign_cli.specification.models.fields import (
     Count,
@@ -20,10 +19,9 @@ from inputdesign_cli.specification.models.fields import (
     Number,
     Several,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
-from inputdesign_cli.specification.models.section import TAG, Section, tag
+from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Section, Wording, fail, tag
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.wording import show
+from inputdesign_cli.specification.models.wording import show
 
 CovarianceSource = Annotated[
     Annotated[FileName, tag("file")] | Annotated[CovarianceMatrix, tag("matrix")],

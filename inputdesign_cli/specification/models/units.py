@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from inputdesign_cli.specification.wording import synonym
+from inputdesign_cli.specification.models.wording import synonym
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
 """How long each `time_unit` is."""

@@ -77,6 +77,10 @@ class Places:
         text = lines[mark.line - 1] if 0 < mark.line <= len(lines) else ""
         return Location(file, mark.line, mark.column, text)
 
+    def copy(self) -> Places:
+        """Return places that may change while these stay."""
+        return Places(list(self.sources), dict(self.keys), dict(self.values))
+
     def adopt(self, other: Places, path: Path) -> None:
         """Take over the marks of `path` and of all below it."""
         for mine, theirs in ((self.keys, other.keys), (self.values, other.values)):

@@ -8,9 +8,8 @@ import pytest
 from pydantic import Field, ValidationError
 
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.annotations import Wording, declared_at, sections_in
 from inputdesign_cli.specification.models.fields import Number, PerChannel, Several
-from inputdesign_cli.specification.models.pydantic_errors import translate
+from inputdesign_cli.specification.models.pydantic_errors import Wording, declared_at, sections_in, translate
 from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 
