@@ -10,6 +10,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
+from typing import Literal
+
+CAUSES = ("unsettled", "contradicted", "unasked", "undetermined", "spikes", "drift", "nonlinearity", "chance")
+"""Why nothing is decided: the search, the data, the question at the estimate, other explanations; of a
+response without a model: a few samples, a drift, a nonlinearity, or the scatter of its periods."""
 
 
 class Severity(StrEnum):
@@ -56,6 +61,7 @@ class FindingKind:
         title: a phrase of a few words.
         text: what it means and how it is found.
         remedy: what to do about it.
+        cause: why nothing is decided where a finding is `undecided`; what refutes, contradicts.
     """
 
     code: str
@@ -63,6 +69,7 @@ class FindingKind:
     title: str
     text: str
     remedy: str
+    cause: str = "undetermined"
 
     def __post_init__(self) -> None:
         if self.code in KINDS:
@@ -81,6 +88,27 @@ class FindingKind:
             figures: its numbers and names.
         """
         return Finding(self.code, severity or self.severity, message, where, figures)
+
+
+def cause_of(finding: Finding) -> str:
+    """Return why a finding leaves nothing decided; empty where it does not."""
+    if finding.severity is Severity.REFUTED:
+        return "contradicted"
+    return KINDS[finding.code].cause if finding.severity is Severity.UNDECIDED else ""
+
+
+def reasons(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
+    """Return the findings that forbid the verdicts "met" and "missed", by their cause."""
+    found = list(findings)
+    listed = {cause: [one for one in found if cause_of(one) == cause] for cause in CAUSES}
+    return {cause: those for cause, those in listed.items() if those}
+
+
+def verdict(findings: Iterable[Finding], *, met: bool) -> Literal["met", "missed", "undecided"]:
+    """Return what follows from the numbers, unless a finding forbids to say so."""
+    if undecided(findings):
+        return "undecided"
+    return "met" if met else "missed"
 
 
 def undecided(findings: Iterable[Finding]) -> bool:

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from inputdesign_cli.questions.frequency_response.silent_lines import silent_notes
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification.periodic_response import periodic_response
 from inputdesign_cli.questions.frequency_response.build import build_measurement
 from inputdesign_cli.questions.frequency_response.measure import _judged, _silent
-from inputdesign_cli.questions.frequency_response.silent_lines import silent_notes
 from inputdesign_cli.tasks.build.data import Data
 
 TEXT = """

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
+from inputdesign_cli.findings.nonlinear_response import silent_lines_answer
 from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.explore import Fits, Found, answers_output, fits
@@ -40,7 +41,7 @@ from inputdesign_cli.questions.exploration.outcome import (
     validation_entry,
     without_drift,
 )
-from inputdesign_cli.questions.frequency_response.silent_lines import silent_entry, silent_notes
+from inputdesign_cli.questions.frequency_response.measured import silent_entry
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.log import Log, read_logs, with_channels
@@ -150,7 +151,7 @@ class _Response:
                     "notes": [
                         *result.get("notes", []),
                         *response_note(self.told),
-                        *silent_notes(self.silent),
+                        *(one.message for one in silent_lines_answer(self.silent)),
                     ],
                 }
             ),
