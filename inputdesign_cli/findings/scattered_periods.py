@@ -86,10 +86,8 @@ def drifting_periods(
     at = int(np.argmax(moved))
     if moved[at] < MATTERS:
         return []
-    sizes = {output_name(units, i): float(np.ptp(drift.curve[:, i])) for i in np.flatnonzero(drift.degree).tolist()(
-        "
-        "{output_name(units, i): float(np.ptp(drift.curve[:, i])) for i in np.flatnonzero(drift.degree).tolist()}
-    )
+    moving = np.flatnonzero(drift.degree).tolist()
+    sizes = {output_name(units, i): float(np.ptp(drift.curve[:, i])) for i in moving}
     listed = " and ".join(f"{name} drifts by {size:.3g}" for name, size in sizes.items())
     straight = int(drift.degree.max()) == 1 and not lined
     remedy = "add --detrend linear" if straight else "subtract its course, which is no line, from the column"
