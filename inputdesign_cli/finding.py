@@ -10,9 +10,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
+from typing import Literal
 
-CAUSES = ("unsettled", "contradicted", "unasked", "undetermined")
-"""Why nothing is decided: the search, the data, the question at the estimate, other explanations."""
+CAUSES = ("unsettled", "contradicted", "unasked", "undetermined", "spikes", "drift", "nonlinearity", "chance")
+"""Why nothing is decided: the search, the data, the question at the estimate, other explanations; of a
+response without a model: a few samples, a drift, a nonlinearity, or the scatter of its periods."""
 
 
 class Severity(StrEnum):
@@ -100,6 +102,13 @@ def reasons(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
     found = list(findings)
     listed = {cause: [one for one in found if cause_of(one) == cause] for cause in CAUSES}
     return {cause: those for cause, those in listed.items() if those}
+
+
+def verdict(findings: Iterable[Finding], *, met: bool) -> Literal["met", "missed", "undecided"]:
+    """Return what follows from the numbers, unless a finding forbids to say so."""
+    if undecided(findings):
+        return "undecided"
+    return "met" if met else "missed"
 
 
 def undecided(findings: Iterable[Finding]) -> bool:

@@ -115,7 +115,7 @@ def identify(
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
         if frequency_response:
-            measured, _ = measure(build_measurement(spec), _paths(data), known)
+            measured = measure(build_measurement(spec), _paths(data), known)
             return finite(measured, most_extreme(spec.content))
         found = identify_records(build_identification(spec), _paths(data), known)
         return finite(found, most_extreme(spec.content))
@@ -147,9 +147,10 @@ def assess(
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
         if spec.accuracy.frequency_response is not None:
-            results, judged = measure(build_measurement(spec), _paths(data), known, assess=True)
-            assert judged is not None  # the spec has lines
-            return Assessment(judged.verdict, finite(results, most_extreme(spec.content)))
+            results = measure(build_measurement(spec), _paths(data), known, assess=True)
+            found = results.outcome.assessment
+            assert found is not None  # the spec has lines
+            return Assessment(found.verdict, finite(results, most_extreme(spec.content)))
         return assess_records(build_identification(spec), _paths(data), known)
 
 

@@ -9,8 +9,11 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.outcome.curves import SignalCurves, SpectrumCurves
-from inputdesign_cli.outcome.results import Curves, Json, Results, Table, typed
+from inputdesign_cli.outcome import Outcome, Signal
+from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.plain_signal import signal_results
 from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
 from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
 from inputdesign_cli.signal.shift_register import register_length
@@ -62,18 +65,9 @@ def make_signal(asked: ReadyMade) -> Results:
     u, period = _made(asked)
     _check_apart(u, asked)
     record = scaled(u, asked.levels)
-    time = asked.sample_time * np.arange(len(u), dtype=float)
-    channels = {f"u{i + 1}": column for i, column in enumerate(record.T)}
-    entry: dict[str, Json] = {
-        "type": asked.kind,
-        "samples": len(record),
-        "period": period,
-        "sample_time": asked.sample_time,
-        "time_unit": asked.time_unit,
-        "channels": {},
-    }
-    for name, one in zip(channels, excites(record), strict=True):
-        entry["channels"][name] = {
+    units = Units(asked.time_unit, asked.sample_time, True, False, asked.inputs, 0)
+    channels = {
+        f"u{i + 1}": {
             "mean": one.mean,
             "power": one.power,
             "peak": one.peak,
@@ -81,13 +75,13 @@ def make_signal(asked: ReadyMade) -> Results:
             "order_of_excitation": one.order,
             "band": [edge / asked.sample_time for edge in one.band],
         }
-    return Results(
-        typed({"format": 1, "status": "made", "signal": entry}),
-        "",
-        asked.time_unit,
-        {"signal": Table({f"time_{asked.time_unit}": time, **channels})},
-        {"signal": SignalCurves(time, channels), "spectrum": _lines(asked, record)},
-    )
+        for i, one in enumerate(excites(record))
+    }
+    details = {"period": period, "time_unit": asked.time_unit, "channels": channels}
+    signal = Signal(len(record), asked.kind, asked.sample_time, details=details)
+    table, curves = signal_results(units, record)
+    shown: dict[str, Curves] = {"signal": curves, "spectrum": _lines(asked, record)}
+    return Results(Outcome(status="made", signal=signal), "", asked.time_unit, {"signal": table}, shown)
 
 
 def _made(asked: ReadyMade) -> tuple[Array, int]:

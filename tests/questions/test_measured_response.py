@@ -7,10 +7,11 @@ import pytest
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.nonlinear_response import silent_lines_answer
 from inputdesign_cli.identification.periodic_response import periodic_response
 from inputdesign_cli.questions.frequency_response.build import build_measurement
-from inputdesign_cli.questions.frequency_response.measure import _judged, _silent
-from inputdesign_cli.questions.frequency_response.silent_lines import silent_notes
+from inputdesign_cli.questions.frequency_response.measure import judge_lines, silent_of
+from inputdesign_cli.questions.frequency_response.whole_periods import Counted
 from inputdesign_cli.tasks.build.data import Data
 
 TEXT = """
@@ -37,6 +38,10 @@ def recorded(text, seed, *, square=0.0, cube=0.0):
     e = np.sqrt(0.01) * rng.standard_normal((1, len(u), 1))
     answer, noise = model.simulate((u + square * u**2 + cube * u**3)[None], e, 1.0)
     return spec, u, (answer + noise)[0]
+
+
+def codes(results):
+    return {one.code: one for one in results.outcome.findings or ()}
 
 
 def table(u, y):
@@ -86,15 +91,15 @@ def test_records_that_repeat_count_together(write):
 def verdicts(admitted, number):
     """Of data of the design for 5 %, judged as if so much were admitted."""
     spec, u, _ = recorded(TEXT, 0)
-    task = build_measurement(spec.with_(**{"accuracy.frequency_response.relative": admitted})).task
+    task = build_measurement(spec.with_(**{"accuracy.frequency_response.relative": admitted})).terms
     found = []
     for seed in range(number):
         _, _, y = recorded_again(spec, u, seed)
         data = data_of(u, y)
         by_lines = periodic_response(u, y, task.periods, task.grid.excited)
-        found.append(
-            _judged(task, by_lines, data, task.periods, 1, np.ones(len(by_lines.G), dtype=bool)).verdict
-        )
+        counted = Counted(data, task.periods, 1)
+        judged = judge_lines(task, by_lines, counted, np.ones(len(by_lines.G), dtype=bool))
+        found.append("missed" if judged.missed else "met" if judged.limits[1] <= 1.0 else "undecided")
     return found
 
 
@@ -127,7 +132,7 @@ def test_assess_tells_how_many_periods_would_do(write):
     assert missed.results.result["assessment"]["periods"] > 5 * (0.05 / 0.02) ** 2
     open_ = assess(spec, path)
     assert open_.verdict == "undecided"
-    assert "by chance" in open_.results.result["notes"][-1]
+    assert codes(open_.results)["response-within-chance"].severity == "undecided"
 
 
 @pytest.mark.parametrize(
@@ -138,17 +143,17 @@ def test_silent_lines_tell_the_degree_of_a_nonlinearity(write, square, cube, spe
     results = identify(spec, write(table(u, y)), frequency_response=True)
     told = results.result["frequency_response"]["nonlinearity"]
     assert {kind for kind, entry in told.items() if entry["probability"][0] < 0.01} == ({speaks} - {""})
-    notes = " ".join(results.result.get("notes", []))
-    assert (f"{speaks} lines that are not excited" in notes) if speaks else "not excited" not in notes
+    found = [one.where for one in results.outcome.findings or () if one.code == "silent-lines-answer"]
+    assert found == ([speaks] if speaks else [])
 
 
 def test_of_noise_alone_the_probability_is_uniform():
     spec, u, _ = recorded(TEXT, 0)
-    task = build_measurement(spec).task
+    task = build_measurement(spec).terms
     found = []
     for seed in range(100):
         _, _, y = recorded_again(spec, u, seed)
-        silent = _silent(task, data_of(u, y), task.periods, 1)
+        silent = silent_of(task, Counted(data_of(u, y), task.periods, 1))
         found.append(silent["even"].probability[0])
     assert np.mean(found) == pytest.approx(0.5, abs=0.1)
     assert 0.02 < np.mean(np.array(found) < 0.1) < 0.2
@@ -177,14 +182,14 @@ def test_blocks_that_are_cut_are_refused(write):
 
 def test_what_does_not_repeat_and_what_is_left_out_is_told(write):
     spec, u, y = recorded(TEXT, 1)
-    whole = identify(spec, write(table(u, y)), frequency_response=True).result.get("notes", [])
-    assert not any("left out" in note or "do not repeat" in note for note in whole)
-    short = identify(spec, write(table(u[:2700], y[:2700])), frequency_response=True).result["notes"]
-    assert any(note.startswith("the first 200 of 2700 samples are left out") for note in short)
+    whole = codes(identify(spec, write(table(u, y)), frequency_response=True))
+    assert not {"samples-before-periods", "inputs-do-not-repeat"} & whole.keys()
+    short = codes(identify(spec, write(table(u[:2700], y[:2700])), frequency_response=True))
+    assert short["samples-before-periods"].figures == {"samples": 200, "period": 500}
     noise = np.random.default_rng(5).standard_normal(u.shape)
-    other = identify(spec, write(table(noise, y)), frequency_response=True).result["notes"]
-    assert any("they do not repeat as the spec says" in note for note in other)
-    assert not any("drifts" in note for note in other), "periods differ because the input does"
+    other = identify(spec, write(table(noise, y)), frequency_response=True)
+    assert "drifting-periods" not in codes(other), "periods differ because the input does"
+    assert codes(other)["inputs-do-not-repeat"].figures["share"] > 0.5
 
 
 SHIPPED = (Path(__file__).parents[2] / "specs" / "frequency_response.yaml").read_text()
@@ -209,7 +214,7 @@ def through(question, u):
 
 def changed(question, u, answer):
     """The largest change of the response at the lines without noise, over 5 % of its size."""
-    periods, lines = question.task.periods, question.task.grid.excited
+    periods, lines = question.terms.periods, question.terms.grid.excited
     curved, linear = (periods.means(y, lines)[:, 0, 0] for y in (answer, through(question, u)))
     return float(np.max(np.abs(curved / linear - 1.0)) / 0.05)
 
@@ -240,16 +245,16 @@ def test_a_response_that_a_nonlinearity_changes_is_never_called_met(write, shipp
         assert found.verdict != "met"
     if found.verdict == "undecided":
         assert "nonlinearity" in found.results.result["assessment"]["causes"]
-        assert "smaller amplitude" in found.results.result["notes"][-1]
+        assert codes(found.results)["nonlinear-response"].figures["share"] >= 0.5
 
 
 def test_a_linear_plant_is_hardly_ever_doubted(shipped):
     question, u = shipped
-    task, doubted, answer = question.task, 0, through(question, u)
+    task, doubted, answer = question.terms, 0, through(question, u)
     for seed in range(100):
         y = answer + recorded_noise(question, u, seed)
-        silent = _silent(task, data_of(u, y), task.periods, 1)
-        doubted += bool(silent_notes(silent)) or silent["odd"].probability[0] < 0.04
+        silent = silent_of(task, Counted(data_of(u, y), task.periods, 1))
+        doubted += bool(silent_lines_answer(silent)) or silent["odd"].probability[0] < 0.04
         assert all(np.all(lines.rms > 0.0) for lines in silent.values() if lines.probability.min() < 0.05)
     assert doubted <= 7  # 4 are expected
 
@@ -263,7 +268,7 @@ def test_a_nonlinearity_that_changes_little_is_told_and_met(write, shipped):
     assert found.verdict == "met"
     odd = found.results.result["frequency_response"]["nonlinearity"]["odd"]
     assert 0.3 * changed(question, u, answer) < odd["worst_ratio"] < 0.5
-    assert any("is small" in note for note in found.results.result["notes"])
+    assert codes(found.results)["nonlinear-response"].severity == "note"
 
 
 OPTIMISED = """

@@ -8,7 +8,8 @@ import pytest
 
 from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
-from inputdesign_cli.outcome.results import Table, typed
+from inputdesign_cli.outcome import Outcome, read_plain
+from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.questions.frequency_response.audit import audit_response
 from inputdesign_cli.questions.task import build_task
 
@@ -136,9 +137,9 @@ def test_equal_lines_keep_lower_limits_too():
 
 def test_a_record_that_limits_keep_from_the_accuracy_says_so():
     need = solve(spec()).result["cost"]
-    result = solve(spec(limits__input_power=need * (1 + 1e-9))).result
-    assert result["signal"]["worst_ratio"] > 1.0001
-    assert any("leaks" in note for note in result["notes"])
+    found = solve(spec(limits__input_power=need * (1 + 1e-9))).outcome
+    (one,) = [one for one in found.findings if one.code == "noise-leaks"]
+    assert one.figures["ratio"] == found.signal.worst_ratio > 1.0001
 
 
 def test_one_run_has_no_deviation():
@@ -242,7 +243,8 @@ def test_limits_that_are_too_tight_say_what_would_do():
 def audited():
     task = build_task(spec())
     plan, results = task._solved()
-    return replace(task, experiment=replace(task.experiment, samples=plan.counted)), plan, results
+    experiment = replace(task.terms.experiment, samples=plan.counted)
+    return replace(task.terms, experiment=experiment), plan, results
 
 
 def test_what_is_written_passes_the_audit():
@@ -259,7 +261,7 @@ def test_a_number_that_is_wrong_does_not_pass(path):
     holder = result[outer[0]] if outer else result
     holder[name] = np.asarray(holder[name]) * 1.00001
     with pytest.raises(InaccurateError):
-        audit_response(terms, plan, replace(results, outcome=typed(result)))
+        audit_response(terms, plan, replace(results, outcome=read_plain(Outcome, result)))
 
 
 def test_a_record_that_is_wrong_does_not_pass():

@@ -56,7 +56,8 @@ def test_as_many_periods_as_lie_between_the_gaps_count(gaps, skip, step, files):
         with pytest.raises(DataError, match="whole periods of 20 samples"):
             whole_periods(Periods(PERIOD, skip=skip), data, "a.csv", step)
         return
-    kept, periods, repeats = whole_periods(Periods(PERIOD, skip=skip), data, "a.csv", step)
+    counted = whole_periods(Periods(PERIOD, skip=skip), data, "a.csv", step)
+    kept, periods, repeats = counted.data, counted.periods, counted.repeats
     if len(pieces) == 1:
         return
     assert repeats == 1
@@ -71,9 +72,9 @@ def test_as_many_periods_as_lie_between_the_gaps_count(gaps, skip, step, files):
 
 def test_records_without_gaps_stay_as_they_are():
     data = record([(0, 105)], files=3)
-    kept, periods, repeats = whole_periods(Periods(PERIOD, skip=1), data, "a.csv", 1.0)
-    assert kept is data
-    assert (periods, repeats) == (Periods(PERIOD, skip=1), 3)
+    counted = whole_periods(Periods(PERIOD, skip=1), data, "a.csv", 1.0)
+    assert counted.data is data
+    assert (counted.periods, counted.repeats) == (Periods(PERIOD, skip=1), 3)
 
 
 def test_blocks_with_a_gap_are_refused():

@@ -15,6 +15,7 @@ from inputdesign_cli.explore import Fits, Found, answers_output, fits
 from inputdesign_cli.findings.faults import biasing
 from inputdesign_cli.findings.level_shifts import shifted_levels
 from inputdesign_cli.findings.measured_response import contradicted, response_note
+from inputdesign_cli.findings.nonlinear_response import silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.identification import cross_correlations, frequency_response, response_delays, silent_in
 from inputdesign_cli.identification.checks import check_varying, signal_name
@@ -43,7 +44,7 @@ from inputdesign_cli.questions.exploration.outcome import (
     validation_entry,
     without_drift,
 )
-from inputdesign_cli.questions.frequency_response.silent_lines import silent_entry, silent_notes
+from inputdesign_cli.questions.frequency_response.measured import silent_entry
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.log import Log, read_logs, with_channels
@@ -157,7 +158,7 @@ class _Response:
                     "notes": [
                         *result.get("notes", []),
                         *(one.message for one in response_note(self.told)),
-                        *silent_notes(self.silent),
+                        *(one.message for one in silent_lines_answer(self.silent)),
                     ],
                 }
             ),

@@ -23,7 +23,8 @@ from inputdesign_cli.questions.frequency_response.build_lines import (
     stated_response,
 )
 from inputdesign_cli.questions.frequency_response.measure import Measurement
-from inputdesign_cli.questions.frequency_response.solve import KEY, ResponseTask
+from inputdesign_cli.questions.frequency_response.solve import ResponseTask
+from inputdesign_cli.questions.frequency_response.terms import KEY, ResponseTerms
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import GivenMultisine
@@ -67,23 +68,22 @@ def build_response_task(spec: Spec) -> ResponseTask:
     G = model.plant_at(grid.frequencies)
     lines = ResponseLines(G, _noise(spec, model, grid), _admitted(spec, grid, G), stated.relative)
     experiment = Experiment(model, counted)
-    return ResponseTask(
+    terms = ResponseTerms(
         header=build_header(spec),
         experiment=experiment,
         grid=grid,
         lines=lines,
         periods=periods,
         goal=goal,
-        given=_given(spec, grid),
         cost=build_cost(spec),
         limits=(*build_power_limits(spec), *implied_limits(spec)),
-        most_samples=spec.limits.samples,
         tolerance=spec.solver.tolerance,
-        tabulated=stated.noise is not None,
         asked=spec.experiment.samples,
-        record=build_record_request(spec, experiment.size),
-        simulation=build_simulation(spec, experiment),
+        most_samples=spec.limits.samples,
+        tabulated=stated.noise is not None,
     )
+    record, simulation = build_record_request(spec, experiment.size), build_simulation(spec, experiment)
+    return ResponseTask(terms, _given(spec, grid), record, simulation)
 
 
 def build_measurement(spec: Spec) -> Measurement:
@@ -96,7 +96,7 @@ def build_measurement(spec: Spec) -> Measurement:
     return Measurement(
         header=build_header(spec),
         model=build_model(spec),
-        task=build_response_task(spec) if asked else None,
+        terms=build_response_task(spec).terms if asked else None,
         operating_point=operating_point(spec),
     )
 

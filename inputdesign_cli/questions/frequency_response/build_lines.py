@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.questions.frequency_response.solve import KEY
+from inputdesign_cli.questions.frequency_response.terms import KEY
 from inputdesign_cli.signal.harmonic_grid import (
     HarmonicGrid,
     TooFewHarmonicsError,

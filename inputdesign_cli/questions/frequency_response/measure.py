@@ -1,9 +1,9 @@
-"""Records -> the frequency response without a model, beside what the spec designed, and whether it is met."""
+"""Records -> the frequency response without a model, and whether it meets what the spec asks."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,14 +14,18 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.identification import frequency_response, response_delays
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE, inputs_do_not_repeat, unexcited_lines
+from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
+from inputdesign_cli.findings.places import places
+from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
+from inputdesign_cli.identification import FrequencyResponse, frequency_response, response_delays
 from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.period_drift import period_drift
 from inputdesign_cli.identification.periodic_response import (
     PeriodicResponse,
-    Periods,
     differing,
     excited_lines,
     periodic_response,
@@ -33,17 +37,9 @@ from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.responses import response_of_data
-from inputdesign_cli.questions.frequency_response.doubts import Doubts, drift_told, spikes_told
-from inputdesign_cli.questions.frequency_response.measured import (
-    REMEDY,
-    UNLIKE,
-    Judged,
-    measured_results,
-    unexcited,
-)
-from inputdesign_cli.questions.frequency_response.silent_lines import Distorted, distorted
-from inputdesign_cli.questions.frequency_response.solve import ResponseTask
-from inputdesign_cli.questions.frequency_response.whole_periods import left_out, whole_periods
+from inputdesign_cli.questions.frequency_response.measured import Judged, measured_results
+from inputdesign_cli.questions.frequency_response.terms import ResponseTerms
+from inputdesign_cli.questions.frequency_response.whole_periods import Counted, whole_periods
 from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 
@@ -54,23 +50,33 @@ _SURE = 0.95
 
 @dataclass(frozen=True)
 class Measurement:
-    """How a frequency response is measured: by the lines of `task`, or without it by what data excite.
+    """How a frequency response is measured: at the lines of `terms`, or without them where data excite.
 
     Attributes:
         model: the nominal plant, which the response is drawn beside.
-        operating_point: by channel, what the spec says that signals vary about.
+        operating_point: by channel, the values of the spec that signals vary about.
     """
 
     header: Header
     model: Model
-    task: ResponseTask | None
+    terms: ResponseTerms | None
     operating_point: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A response with the data that count for it; with lines of a spec also how it compares."""
+
+    data: Data
+    response: FrequencyResponse
+    judged: Judged | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def measure(
     question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
-) -> tuple[Results, Judged | None]:
-    """The response with its confidence; with lines of a spec also how it compares with what is asked.
+) -> Results:
+    """Return the response with its confidence; with lines of a spec also how it compares with what is asked.
 
     Args:
         assess: whether the result is a verdict.
@@ -79,131 +85,124 @@ def measure(
         DataError: a file cannot be used, or does not repeat as the spec says.
     """
     started = time.perf_counter()
-    units = question.header.units
+    units, terms, name = question.header.units, question.terms, paths[0].name
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
-    task, judged = question.task, None
-    silent: dict[str, SilentLines] = {}
-    if task is None:
-        delays = partial(response_delays, question.model, step=units.step)
-        found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
-        if found is None:
-            raise DataError.because(
-                "too-few-samples",
-                f"{paths[0].name} excites no frequency enough for a response without a model",
-                hint="record longer, or excite more frequencies",
-            )
+    if terms is None:
+        found = _without_lines(question, data, name)
     else:
-        data, periods, repeats = whole_periods(task.periods, data, paths[0].name, units.sample_time)
-        excited = excited_lines(data.u, periods, task.grid.excited, repeats=repeats)
-        missing = unexcited(question.header, task.grid.frequencies, excited)
-        by_lines = periodic_response(data.u, data.y, periods, task.grid.excited[excited], repeats=repeats)
-        if by_lines is None or (assess and missing):
-            raise DataError.because(
-                "not-exciting",
-                f"{paths[0].name}: {missing or 'the inputs cannot be told apart at the lines of the spec'}",
-                hint=REMEDY,
-            )
-        found = of_periods(by_lines, periods.period)
-        judged = _judged(task, by_lines, data, periods, repeats, excited)
-        silent, doubts = _doubted(question, task, by_lines, data, judged, repeats)
-        judged = replace(judged, doubts=doubts)
-        lacking = [f"{missing}: {REMEDY}"] if missing else []
-        told = [*lacking, *left_out(data, periods), *_unlike(judged)]
-        data = replace(data, notes=(*data.notes, *told))
-    shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
-    results = measured_results(
-        question.header, found, shown, judged, silent, data, time.perf_counter() - started, assess=assess
+        counted = whole_periods(terms.periods, data, name, units.sample_time)
+        found = _at_lines(question, terms, counted, name, assess=assess)
+    of_reference = data.r is not None and terms is None
+    shown = response_of_data(units, question.model, found.response, by_reference=of_reference)
+    table, curves, response = shown
+    return measured_results(
+        question.header,
+        found.data,
+        table,
+        curves,
+        response,
+        found.judged,
+        found.findings,
+        time.perf_counter() - started,
+        assess=assess,
     )
-    return results, judged
 
 
-def _unlike(judged: Judged) -> Iterator[str]:
-    """Whether the inputs repeat at all."""
-    if judged.differing > UNLIKE:
-        yield (
-            f"{100.0 * judged.differing:.3g} % of the power of the inputs differs from period to period of "
-            f"{judged.periods.period} samples: they do not repeat as the spec says; was its signal.csv "
-            "applied, and is u recorded as it was?"
+def _without_lines(question: Measurement, data: Data, name: str) -> _Measured:
+    """Return the response where the data excite it."""
+    delays = partial(response_delays, question.model, step=question.header.units.step)
+    found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
+    if found is None:
+        raise DataError.because(
+            "too-few-samples",
+            f"{name} excites no frequency enough for a response without a model",
+            hint="record longer, or excite more frequencies",
         )
+    return _Measured(data, found)
+
+
+def _at_lines(
+    question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
+) -> _Measured:
+    """Return the response at the lines of the spec that the data excite."""
+    data, periods, repeats = counted.data, counted.periods, counted.repeats
+    excited = excited_lines(data.u, periods, terms.grid.excited, repeats=repeats)
+    missing = unexcited_lines(question.header.units, terms.grid.frequencies, excited)
+    found = periodic_response(data.u, data.y, periods, terms.grid.excited[excited], repeats=repeats)
+    if found is None or (assess and missing):
+        why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
+        raise DataError.because("not-exciting", f"{name}: {why}", hint=REMEDY)
+    judged = judge_lines(terms, found, counted, excited)
+    seen = [*missing, *counted.findings, *inputs_do_not_repeat(judged.differing, periods.period)]
+    # Periods of outputs differ by those of inputs that do not repeat.
+    if judged.differing <= UNLIKE:
+        judged = _doubted(question, terms, found, counted, judged)
+    return _Measured(data, of_periods(found, periods.period), judged, tuple(seen))
 
 
 def _doubted(
-    question: Measurement,
-    task: ResponseTask,
-    found: PeriodicResponse,
-    data: Data,
-    judged: Judged,
-    repeats: int,
-) -> tuple[dict[str, SilentLines], Doubts]:
-    """What silent lines have beside a drift, and what besides noise decides on the response.
+    question: Measurement, terms: ResponseTerms, found: PeriodicResponse, counted: Counted, judged: Judged
+) -> Judged:
+    """Return the same with what decides besides noise, and with the silent lines after drifts are taken away.
 
-    Spikes are in every line: beside them silent lines tell nothing. Of inputs that do not repeat, periods of
-    outputs differ by what these do.
+    Spikes are in every line, so that silent lines show nothing then.
     """
-    if judged.differing > UNLIKE:
-        return {}, judged.doubts
-    units, periods, doubts = question.header.units, judged.periods, judged.doubts
-    kept = repeats * periods.kept(data.lengths[0])
-    spiked = spikes_told(units, period_spikes(data.y, periods, repeats=repeats), data, kept)
-    if spiked:
-        return {}, replace(doubts, spiked=spiked)
-    drift = period_drift(
-        data.y, data.time, periods, _noise_at_rest(question.model, task, judged), repeats=repeats
-    )
+    units, data, periods, repeats = question.header.units, counted.data, counted.periods, counted.repeats
+    spikes = period_spikes(data.y, periods, repeats=repeats)
+    if spikes:
+        where = [places(units, data, one.samples) for one in spikes]
+        spiked = spiked_periods(units, spikes, where, len(data.y), counted.kept)
+        return replace(judged, scattered=tuple(spiked))
+    noise = _noise_at_rest(question.model, terms, judged)
+    drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)
     if drift is not None:
-        data = replace(data, y=data.y - drift.curve)
-        without = periodic_response(data.u, data.y, periods, found.harmonics, repeats=repeats)
+        counted = replace(counted, data=replace(data, y=data.y - drift.curve))
+        without = periodic_response(data.u, counted.data.y, periods, found.harmonics, repeats=repeats)
         if without is not None:
             scatter = np.abs(found.deviation**2 - without.deviation**2)
             moved = judged.lines.ratios(np.sqrt(np.abs(found.G - without.G) ** 2 + scatter))
             w = judged.grid.frequencies / units.frequency
-            drifting, moved = drift_told(units, drift, moved, w, lined=data.lined)
-            found, doubts = without, replace(doubts, drifting=drifting, moved=moved)
-    silent = _silent(task, data, periods, repeats)
-    if "odd" not in silent:
-        return silent, doubts
-    bent = _distorted(question.model, task, found, data, judged, silent)
-    return silent, replace(doubts, distorted=bent)
+            drifting = drifting_periods(units, drift, moved, w, lined=data.lined)
+            found, judged = without, replace(judged, scattered=tuple(drifting))
+            judged = replace(judged, moved=moved) if drifting else judged
+    silent = silent_of(terms, counted)
+    bent = _distorted(question.model, terms, found, counted, judged, silent) if "odd" in silent else None
+    return replace(judged, silent=silent, distorted=bent)
 
 
-def _noise_at_rest(model: Model, task: ResponseTask, judged: Judged) -> Array:
-    """(p,): the spectrum of the noise towards frequency zero, of the data, by that at their lowest line.
+def _noise_at_rest(model: Model, terms: ResponseTerms, judged: Judged) -> Array:
+    """(p,): the spectrum of the noise of the data towards frequency zero, by that at their lowest line.
 
     Noise of the spec may go on rising below that line.
     """
     lowest = int(np.argmin(judged.grid.frequencies))
     there = judged.noise[lowest]
-    if task.tabulated:
+    if terms.tabulated:
         return there
     known = NoiseSpectrum.of(model).at(judged.periods.period, np.array([0]))[0]
     return np.maximum(there, there / judged.lines.noise[lowest] * known)
 
 
-def _judged(
-    task: ResponseTask,
-    found: PeriodicResponse,
-    data: Data,
-    periods: Periods,
-    repeats: int,
-    excited: NDArray[np.bool_],
+def judge_lines(
+    terms: ResponseTerms, found: PeriodicResponse, counted: Counted, excited: NDArray[np.bool_]
 ) -> Judged:
-    """The deviations of the data against r_adm at the measured G, with noise averaged along the lines.
+    """Return the deviations of the data against r_adm at the measured G, with noise averaged along the lines.
 
-    The scatter of a few periods tells the noise of one line badly: what it is over the noise of the spec is
-    averaged over neighbouring lines.
+    The scatter of a few periods gives the noise of one line badly. Its ratio to the noise of the spec is
+    therefore averaged over neighbouring lines.
 
     Args:
-        excited: (L,) lines of the task that were found.
+        excited: (L,) lines of the spec that were found.
     """
     if np.any(found.noise <= 0.0):
         raise DataError.because(
             "noise-free-data",
-            "the periods do not differ at all, so that they tell nothing of the noise",
+            "the periods do not differ at all, so that their noise is not known",
             hint="give records of a real plant, not of one period that was repeated",
         )
-    lines = task.lines.where(excited).at(found.G)
-    counted = repeats * periods.blocks * periods.kept(data.lengths[0]) * periods.period
+    periods, repeats = counted.periods, counted.repeats
+    lines = terms.lines.where(excited).at(found.G)
     expected = found.deviation * np.sqrt(lines.noise / found.noise)[:, :, None]
     window = min(max(-(-_FREEDOM // found.freedom), 1), len(found.harmonics))
     excess = _averaged(found.noise / lines.noise, window)
@@ -221,9 +220,9 @@ def _judged(
     at_least = lines.at(np.maximum(np.abs(found.G) - away, 1e-9 * away))
     at_most = lines.at(np.abs(found.G) + away)
     return Judged(
-        grid=replace(task.grid, excited=found.harmonics),
+        grid=replace(terms.grid, excited=found.harmonics),
         asked=excited.size,
-        differing=differing(data.u, periods, repeats=repeats),
+        differing=differing(counted.data.u, periods, repeats=repeats),
         # Sizes are less by `far` deviations at most, and noise comes out anew, in these data and in those.
         times=float(
             np.max(lines.ratios(smooth))
@@ -238,9 +237,9 @@ def _judged(
         ratios=lines.ratios(smooth),
         least=low * at_most.ratios(smooth),
         largest=high * at_least.ratios(smooth),
-        counted=counted,
+        counted=counted.kept * periods.blocks * periods.period,
         noise=lines.noise * excess,
-        doubts=Doubts(np.zeros(len(found.harmonics))),
+        moved=np.zeros(len(found.harmonics)),
     )
 
 
@@ -251,12 +250,13 @@ def _averaged(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     return np.asarray((sums[first + window] - sums[first]) / window)
 
 
-def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> dict[str, SilentLines]:
-    """What the outputs have at lines of the design that are not excited, odd and even."""
+def silent_of(terms: ResponseTerms, counted: Counted) -> dict[str, SilentLines]:
+    """Return what the outputs have at lines of the design that are not excited, odd and even."""
     found = {}
-    for kind, harmonics in (("odd", task.grid.odd), ("even", task.grid.even)):
-        records = [periods.transforms(one)[:, :, harmonics] for one in np.split(data.y, repeats)]
-        shape = _between(task.grid.at(harmonics), task.grid.frequencies, task.lines.noise)
+    for kind, harmonics in (("odd", terms.grid.odd), ("even", terms.grid.even)):
+        parts = np.split(counted.data.y, counted.repeats)
+        records = [counted.periods.transforms(one)[:, :, harmonics] for one in parts]
+        shape = _between(terms.grid.at(harmonics), terms.grid.frequencies, terms.lines.noise)
         lines = silent_lines(np.concatenate(records, axis=1), shape)
         if lines is not None:
             found[kind] = lines
@@ -265,19 +265,18 @@ def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> d
 
 def _distorted(
     model: Model,
-    task: ResponseTask,
+    terms: ResponseTerms,
     found: PeriodicResponse,
-    data: Data,
+    counted: Counted,
     judged: Judged,
     silent: Mapping[str, SilentLines],
 ) -> Distorted | None:
-    """What a nonlinearity of odd degree changes of the response, by power at silent lines and by cubes."""
-    odd, periods, repeats = task.grid.odd, judged.periods, len(data.lengths)
-    kept = repeats * periods.kept(data.lengths[0])
-    error = response_error(found, periods.period, kept, silent["odd"], odd)
-    nominal = tuple(model.plant_at(task.grid.at(lines)) for lines in (found.harmonics, odd))
-    shape = _between(task.grid.at(odd), task.grid.frequencies, task.lines.noise)
-    cube = cubes(found, data.u, data.y, periods, odd, (nominal[0], nominal[1]), shape, repeats=repeats)
+    """Return the change of the response by a nonlinearity, by power at silent lines and by cubes."""
+    odd, periods, data = terms.grid.odd, counted.periods, counted.data
+    error = response_error(found, periods.period, counted.kept, silent["odd"], odd)
+    nominal = (model.plant_at(terms.grid.at(found.harmonics)), model.plant_at(terms.grid.at(odd)))
+    shape = _between(terms.grid.at(odd), terms.grid.frequencies, terms.lines.noise)
+    cube = cubes(found, data.u, data.y, periods, odd, nominal, shape, repeats=counted.repeats)
     return distorted(
         silent,
         judged.lines.ratios(error),

@@ -1,48 +1,48 @@
-"""A measured frequency response -> `result.json`, tables and figures."""
+"""A measured frequency response: its deviations against those admitted, and its outcome."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.design.response import ResponseLines
-from inputdesign_cli.identification import FrequencyResponse
+from inputdesign_cli.finding import Finding, reasons, trusted, verdict
+from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE
+from inputdesign_cli.findings.nonlinear_response import Distorted, nonlinear_response, silent_lines_answer
+from inputdesign_cli.findings.scattered_periods import within_chance
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.silent_lines import SilentLines
-from inputdesign_cli.outcome import MeasuredLines, write_plain
-from inputdesign_cli.outcome.curves import Curves, DeviationCurves, DeviationPanel, ResponseCurves
-from inputdesign_cli.outcome.results import Array, Json, Results, Table, typed
-from inputdesign_cli.outcome.units import Header
-from inputdesign_cli.questions.frequency_response.doubts import Doubts, bent_told
-from inputdesign_cli.questions.frequency_response.silent_lines import Distorted, silent_entry, silent_notes
+from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
+from inputdesign_cli.outcome.curves import Curves, ResponseCurves
+from inputdesign_cli.outcome.response import SilentLine
+from inputdesign_cli.outcome.results import Array, Results, Table
+from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.frequency_response.terms import deviation_curves
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.tasks.build.data import Data
 
-Verdict = Literal["met", "missed", "undecided"]
-REMEDY = "apply the signal.csv of the spec, and record u as it was applied; or is this the record of another?"
-UNLIKE = 0.5
-"""Inputs of which more than this differs from period to period do not repeat, in a loop with noise either."""
-
 
 @dataclass(frozen=True)
 class Judged:
-    """The deviations (L, p, r) that data leave: with the noise of the spec, and with that of the data.
+    """The deviations (L, p, r) of data: with the noise of the spec, and with that of the data.
 
     Attributes:
         lines: with the measured G.
         ratios: (L,) of the latter over r_adm, the largest entry.
         least, largest: (L,), between which the true ratios lie, with 95 % all of them.
         counted: samples that count.
-        asked: how many lines the spec has, of which these are those that the inputs excite.
+        asked: lines of the spec, of which these are the ones that the inputs excite.
         differing: the share of the power of the inputs that differs from period to period.
         noise: (L, p), the spectrum of the noise of the data, averaged along the lines.
-        times: with so many times the periods a verdict would be met, by the same plant and noise.
-        doubts: what decides besides noise.
+        times: with this multiple of the periods a verdict would be met, by the same plant and noise.
+        moved: (L,), the change of the response by a drift, over what is admitted.
+        distorted: its change by a nonlinearity; None where none is seen, or none is watched for.
+        scattered: findings on spikes and drifts, which are in the scatter of the periods too.
     """
 
     grid: HarmonicGrid
@@ -58,12 +58,10 @@ class Judged:
     differing: float
     times: float
     noise: NDArray[np.float64]
-    doubts: Doubts
-
-    @property
-    def doubted(self) -> bool:
-        """Whether something else than noise may decide."""
-        return bool(np.any(self.doubts.changed > 0.0)) or bool(self.doubts.spiked)
+    moved: Array
+    distorted: Distorted | None = None
+    scattered: tuple[Finding, ...] = ()
+    silent: Mapping[str, SilentLines] = field(default_factory=dict)
 
     @property
     def worst(self) -> int:
@@ -71,174 +69,149 @@ class Judged:
         return int(np.argmax(self.ratios))
 
     @property
-    def verdict(self) -> Verdict:
-        """Met or missed where neither chance nor anything else than noise decides.
+    def limits(self) -> tuple[float, float]:
+        """Limits of the largest ratio, with 95 %."""
+        return float(self.least.max()), float(self.largest.max())
+
+    @property
+    def missed(self) -> bool:
+        """Whether noise alone misses what is admitted, beyond chance.
 
         What is admitted may be a share of |G|, so that it is not known better than the response itself.
-        Spikes and drifts are in the scatter, too.
         """
-        sure = self.least / (1.0 + (self.lines.share or 0.0) * self.doubts.changed)
-        noisy = not self.doubts.spiked and not self.doubts.drifting
-        if noisy and np.any(sure > 1.0):
-            return "missed"
-        return "undecided" if self.doubted or np.any(self.largest > 1.0) else "met"
+        bent = self.distorted.shares if self.distorted is not None and self.distorted.matters else 0.0
+        sure = self.least / (1.0 + (self.lines.share or 0.0) * (self.moved + bent))
+        return not self.scattered and bool(np.any(sure > 1.0))
+
+    def doubts(self, units: Units) -> list[Finding]:
+        """Return findings on spikes, drifts and a nonlinearity."""
+        w = self.grid.frequencies / units.frequency
+        bent = nonlinear_response(units, self.distorted, w, decided=self.missed)
+        return [*self.scattered, *bent]
+
+    @property
+    def periods_needed(self) -> int | None:
+        """The periods (of each block) that would have to count; None where more are no remedy."""
+        samples = self.times * self.counted
+        # Of inputs that do not repeat the mean of the periods falls as the noise does.
+        if self.differing > UNLIKE or samples > most("signal.samples"):
+            return None
+        return int(np.ceil(samples / (self.periods.blocks * self.grid.period)))
+
+    @property
+    def remedy(self) -> str:
+        """How many periods would do, or what to do where more of them would not."""
+        if self.periods_needed is not None:
+            blocks = "" if self.periods.blocks == 1 else f" in each of {self.periods.blocks} blocks"
+            return f"about {self.periods_needed} periods that count{blocks} would do"
+        why = "do not repeat" if self.differing > UNLIKE else "are too weak at some lines"
+        return f"more periods of this signal are no remedy, as the inputs {why}: {REMEDY}"
 
 
 def measured_results(
     header: Header,
-    found: FrequencyResponse,
-    shown: tuple[Table, ResponseCurves, MeasuredLines],
-    judged: Judged | None,
-    silent: Mapping[str, SilentLines],
     data: Data,
+    table: Table,
+    curves: ResponseCurves,
+    response: MeasuredLines,
+    judged: Judged | None,
+    findings: Sequence[Finding],
     seconds: float,
     *,
     assess: bool,
 ) -> Results:
-    """The result, frequency_response.csv and its figure; with lines of a spec also their deviations.
+    """Return the outcome, frequency_response.csv and its figure; with lines of a spec also their deviations.
 
     Args:
-        shown: of the response beside the nominal plant, see `response_of_data`.
+        response: beside the nominal plant, see `response_of_data`.
         assess: whether the result is a verdict.
     """
-    units, (table, curves, told) = header.units, shown
-    entry: dict[str, Json] = {**write_plain(told), "blocks": 1}
-    notes = list(data.notes)
     tables: dict[str, Table] = {"frequency_response": table}
     drawn: dict[str, Curves] = {"frequency_response": curves}
-    result: dict[str, Json] = {
-        "format": 1, "title": header.title, "status": "measured", "samples": len(data.y),
-        "identification": {"method": found.method}, "frequency_response": entry,
-    }  # fmt: skip
+    found, assessment = list(findings), None
+    status: Literal["measured", "met", "missed", "undecided"] = "measured"
     if judged is not None:
-        w = judged.grid.frequencies / units.frequency
-        entry |= {
-            "lines": int(w.size),
-            "asked": judged.asked,
-            "period": judged.periods.period,
-            "periods": judged.periods.each(data.lengths[0]),
-            "records": len(data.lengths),
-            "blocks": judged.periods.blocks,
-            "transient": judged.periods.skip,
-            "counted": judged.counted,
-            "worst_ratio": float(judged.ratios[judged.worst]),
-            "worst_frequency": float(w[judged.worst]),
-            "worst_ratio_limits": [float(judged.least.max()), float(judged.largest.max())],
-        }
-        columns, panels = _deviations(header, judged, w)
-        tables["deviations"], drawn["deviations"] = Table(columns), DeviationCurves(panels)
-    if silent:
-        entry["nonlinearity"] = silent_entry(silent)
-        notes += silent_notes(silent)
-    if judged is not None:
-        bent = judged.doubts.distorted
-        if bent is not None:
-            entry["nonlinearity"]["odd"] |= _odd(bent, w)
-            notes += [] if bent.matters else [bent_told(units, bent, w)]
-        # As the reasons of a verdict they stand among the notes anyway.
-        if not (assess and judged.verdict == "undecided"):
-            notes += [reason for _, reason in _reasons(header, judged, w)]
-    if assess and judged is not None:
-        assessment = _assessment(header, judged, w)
-        result |= {"status": judged.verdict, "assessment": assessment}
-        notes += assessment.get("undecided", [])
-    result |= {"notes": notes} if notes else {}
-    result["timing_s"] = {"measurement": seconds}
-    return Results(typed(result), header.resolved_spec, units.time_unit, tables, drawn)
+        w = judged.grid.frequencies / header.units.frequency
+        listed = {"deviation": judged.expected, "deviation_data": judged.found}
+        shown = ("deviation_data", "these data")
+        columns, drawn["deviations"] = deviation_curves(header.units, w, judged.lines, listed, shown)
+        tables["deviations"] = Table(columns)
+        response = _of_lines(response, judged, w, len(data.lengths), data.lengths[0])
+        doubts = judged.doubts(header.units)
+        if assess:
+            assessment, doubts = _assessment(header.units, judged, w, doubts)
+            status = assessment.verdict
+        found += [*silent_lines_answer(judged.silent), *doubts]
+    outcome = Outcome(
+        title=header.title,
+        status=status,
+        samples=len(data.y),
+        identification=Identification(method=response.method),
+        frequency_response=replace(response, blocks=1 if judged is None else judged.periods.blocks),
+        assessment=assessment,
+        notes=data.notes or None,
+        timing_s={"measurement": seconds},
+    )
+    return Results(outcome.saying(found), header.resolved_spec, header.units.time_unit, tables, drawn)
 
 
-def _deviations(
-    header: Header, judged: Judged, w: Array
-) -> tuple[dict[str, Array], tuple[DeviationPanel, ...]]:
-    """Columns and panels of the entries that are bounded: by the noise of the spec, by that of the data."""
-    units, columns, panels = header.units, {header.units.frequency_header: w}, []
-    for i, j in np.ndindex(judged.found.shape[1:]):
-        admitted = judged.lines.admitted[:, i, j]
-        if not np.all(np.isfinite(admitted)):
-            continue
-        size, expected = np.abs(judged.lines.G[:, i, j]), judged.expected[:, i, j]
-        found = judged.found[:, i, j]
-        listed = {"G_abs": size, "r_adm": admitted, "deviation": expected, "deviation_data": found}
-        columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
-        entry = None if units.single else (i, j)
-        shown = (w, size, admitted, expected, found, "these data")
-        panels.append(DeviationPanel(*shown, entry, units.passage(entry)))
-    return columns, tuple(panels)
-
-
-def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
-    """The verdict, and how many times as many periods would settle it."""
-    verdict, worst = judged.verdict, judged.worst
-    ratio, low, high = float(judged.ratios[worst]), float(judged.least.max()), float(judged.largest.max())
-    entry: dict[str, Json] = {
-        "verdict": verdict,
-        "met": verdict == "met",
-        "requirements": [{"name": "frequency_response", "worst_ratio": ratio, "frequency": float(w[worst])}],
-    }
-    doubts = _reasons(header, judged, w)
-    if doubts and verdict == "missed":
-        entry["no_top_up"] = "more periods alone are no remedy: the notes say what stands behind that"
-    elif high > 1.0 and not doubts:
-        counted = periods_needed(judged)
-        entry |= {} if counted is None else {"periods": counted}
-        enough = _enough(judged, counted)
-        if verdict == "missed":
-            entry["no_top_up"] = enough if counted is None else f"repeat the record: {enough}"
-        else:
-            by_chance = (
-                f"the largest deviation is {ratio:.4g} of what is admitted, at {w[worst]:.4g} "
-                f"{header.units.per_time}, and by chance anything between {low:.3g} and {high:.3g} may stand "
-                f"behind that: {enough}"
-            )
-            doubts = [("chance", by_chance)]
-    if verdict == "undecided":
-        causes, reasons = zip(*doubts, strict=True)
-        entry |= {"causes": list(dict.fromkeys(causes)), "undecided": list(reasons)}
-    return entry
-
-
-def _reasons(header: Header, judged: Judged, w: Array) -> list[tuple[str, str]]:
-    """What decides besides noise: causes of `assessment.causes`, each with a sentence."""
-    doubts, found = judged.doubts, list[tuple[str, str]]()
-    found += [("spikes", told) for told in doubts.spiked]
-    found += [("drift", doubts.drifting)] if doubts.drifting else []
-    if doubts.distorted is not None and doubts.distorted.matters:
-        found.append(("nonlinearity", bent_told(header.units, doubts.distorted, w)))
-    return found
-
-
-def periods_needed(judged: Judged) -> int | None:
-    """How many periods (of each block) would have to count; None where that is no remedy."""
-    blocks, period = judged.periods.blocks, judged.grid.period
-    samples = judged.times * judged.counted
-    # Of inputs that do not repeat the mean of the periods falls as the noise does.
-    if judged.differing > UNLIKE or samples > most("signal.samples"):
-        return None
-    return int(np.ceil(samples / (blocks * period)))
-
-
-def _enough(judged: Judged, counted: int | None) -> str:
-    """How many periods would do, or what to do where more of them would not."""
-    if counted is not None:
-        blocks = "" if judged.periods.blocks == 1 else f" in each of {judged.periods.blocks} blocks"
-        return f"about {counted} periods that count{blocks} would do"
-    why = "do not repeat" if judged.differing > UNLIKE else "are so weak at some lines"
-    return f"more periods of this signal are no remedy, as the inputs {why}: {REMEDY}"
-
-
-def unexcited(header: Header, frequencies: Array, excited: NDArray[np.bool_]) -> str:
-    """How many lines (L,), in rad/sample, the data do not excite, and the first of them; or nothing."""
-    lacking = frequencies[~excited] / header.units.frequency
-    if not lacking.size:
-        return ""
-    first = f"{lacking[0]:.4g} {header.units.per_time}"
-    return (
-        f"{lacking.size} of {excited.size} lines of the spec, the first at {first}, have no more of the "
-        "inputs than rounding or noise leaves: the response is not measured there"
+def _of_lines(response: MeasuredLines, judged: Judged, w: Array, records: int, samples: int) -> MeasuredLines:
+    """Return what is measured with the lines w (L,), their deviations, and the silent lines."""
+    silent, bent = silent_entry(judged.silent), judged.distorted
+    if bent is not None:
+        at = float(w[bent.line])
+        silent["odd"] = replace(silent["odd"], worst_ratio=bent.share, frequency=at, cubed=bent.cubed or None)
+    return replace(
+        response,
+        lines=int(w.size),
+        asked=judged.asked,
+        period=judged.periods.period,
+        periods=judged.periods.each(samples),
+        records=records,
+        transient=judged.periods.skip,
+        counted=judged.counted,
+        worst_ratio=float(judged.ratios[judged.worst]),
+        worst_frequency=float(w[judged.worst]),
+        worst_ratio_limits=judged.limits,
+        nonlinearity=silent or None,
     )
 
 
-def _odd(distorted: Distorted, w: Array) -> dict[str, Json]:
-    """What `nonlinearity.odd` of the result says of the response."""
-    cubed = {"cubed": distorted.cubed} if distorted.cubed else {}
-    return {"worst_ratio": distorted.share, "frequency": float(w[distorted.line]), **cubed}
+def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
+    """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
+    return {
+        kind: SilentLine(
+            found.lines,
+            tuple(found.over_noise.tolist()),
+            tuple(found.probability.tolist()),
+            tuple(found.rms.tolist()),
+        )
+        for kind, found in silent.items()
+    }
+
+
+def _assessment(
+    units: Units, judged: Judged, w: Array, doubts: list[Finding]
+) -> tuple[Assessment, list[Finding]]:
+    """Return the verdict with the periods that would settle it, and the findings that it rests on."""
+    ratio, at = float(judged.ratios[judged.worst]), float(w[judged.worst])
+    met, periods, no_top_up = judged.limits[1] <= 1.0, None, None
+    doubted = not trusted(doubts)
+    if judged.missed and doubted:
+        no_top_up = "more periods alone are no remedy: the notes say why"
+    elif not met and not doubted:
+        periods = judged.periods_needed
+        if judged.missed:
+            no_top_up = judged.remedy if periods is None else f"repeat the record: {judged.remedy}"
+        else:
+            doubts = [*doubts, within_chance(units, ratio, judged.limits, at, judged.remedy)]
+    answer, why = verdict(doubts, met=met), reasons(doubts)
+    return Assessment(
+        verdict=answer,
+        met=answer == "met",
+        requirements=(RequirementMet("frequency_response", ratio, at),),
+        undecided=tuple(one.message for those in why.values() for one in those) or None,
+        causes=tuple(why) or None,
+        no_top_up=no_top_up,
+        periods=periods,
+    ), doubts

@@ -21,39 +21,37 @@ from inputdesign_cli.design.response import (
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.information import PowerKind
-from inputdesign_cli.monte_carlo.response import ResponseStudy, study_response
+from inputdesign_cli.monte_carlo.response import study_response
+from inputdesign_cli.outcome import Simulation as SimulationOutcome
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.simulation import Simulation
+from inputdesign_cli.questions.common.study import timing, with_study
 from inputdesign_cli.questions.frequency_response.audit import audit_response
 from inputdesign_cli.questions.frequency_response.limits import too_long, too_tight, unreachable
 from inputdesign_cli.questions.frequency_response.outcome import (
-    Planned,
-    ResponseTerms,
-    design_result,
-    flat_powers,
     response_results,
-    study_results,
+    studied_deviations,
+    tried_lines,
 )
 from inputdesign_cli.questions.frequency_response.record import LineRecords
+from inputdesign_cli.questions.frequency_response.terms import KEY, Planned, ResponseTerms
 from inputdesign_cli.signal import Record
 
-KEY = "accuracy.frequency_response"
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class ResponseTask(ResponseTerms):
+class ResponseTask:
     """A design of lines, or the analysis of given ones, and its study.
 
     Attributes:
         given: (L, r) powers that are not designed.
-        tabulated: whether the noise comes from a table, so that there is no model of it.
     """
 
+    terms: ResponseTerms
     given: NDArray[np.float64] | None
-    tabulated: bool
     record: RecordRequest
     simulation: Simulation
 
@@ -72,6 +70,35 @@ class ResponseTask(ResponseTerms):
         Raises:
             SpecError: `not-supported` for inputs to compare with; see `solve`.
         """
+        self._check_study()
+        terms, study = self.terms, self.simulation
+        plan, results = self._solved()
+        begun = time.perf_counter()
+        records = {"design": (plan.applied, plan.record.samples)}
+        if study.compare:
+            records["white"] = (plan.flat, self._records.best(plan.flat, plan.length))
+        nominal, power = terms.experiment, results.outcome.power
+        if study.truth is not None and power is not None:
+            nominal = study.truth.experiment(nominal, power.output or ())
+        studies = {
+            name: study_response(
+                nominal.model,
+                u,
+                terms.periods,
+                terms.grid.excited,
+                runs=study.runs,
+                seed=study.seed,
+                executor=executor,
+            )
+            for name, (_, u) in records.items()
+        }
+        inputs = {name: tried_lines(terms, plan, records[name][0], found) for name, found in studies.items()}
+        table, curves = studied_deviations(terms, plan, results, studies["design"])
+        entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
+        return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
+
+    def _check_study(self) -> None:
+        """Raise `SpecError` for a study that this kind of question does not have."""
         if any(name != "white" for name in self.simulation.compare):
             raise bad_spec(
                 "not-supported",
@@ -86,124 +113,103 @@ class ResponseTask(ResponseTerms):
                 hint="write simulation.runs: 1000, whose deviations are known to 2 %",
                 key="simulation.runs",
             )
-        plan, results = self._solved()
-        begun = time.perf_counter()
-        records = {"design": plan.record.samples}
-        if self.simulation.compare:
-            records["white"] = self._records.best(flat_powers(plan), len(plan.record.samples))
-        truth, nominal = self.simulation.truth, self.experiment
-        if truth is not None:
-            nominal = truth.experiment(nominal, results.result["power"]["output"])
-        studies: dict[str, ResponseStudy] = {
-            name: study_response(
-                nominal.model,
-                u,
-                self.periods,
-                self.grid.excited,
-                runs=self.simulation.runs,
-                seed=self.simulation.seed,
-                executor=executor,
-            )
-            for name, u in records.items()
-        }
-        return study_results(self, plan, results, studies, self.simulation, begun)
 
     def _problem(self, samples: int) -> ResponseProblem:
-        shape = self.lines.G.shape[0], self.experiment.inputs
+        terms = self.terms
+        shape = terms.lines.G.shape[0], terms.experiment.inputs
         price = sum(
-            (w * self._row(kind, channel) for kind, channel, w in weights_of(self.cost)), np.zeros(shape)
+            (w * self._row(kind, channel) for kind, channel, w in weights_of(terms.cost)), np.zeros(shape)
         )
-        rows = [self._row(limit.kind, limit.channel).ravel() for limit in self.limits]
+        rows = [self._row(limit.kind, limit.channel).ravel() for limit in terms.limits]
         return ResponseProblem(
-            self.lines.needed(samples).ravel(),
+            terms.lines.needed(samples).ravel(),
             price.ravel(),
-            self.limits,
+            terms.limits,
             np.array(rows).reshape(len(rows), np.prod(shape)),
         )
 
     def _row(self, kind: PowerKind, channel: int | None) -> NDArray[np.float64]:
         """(L, r): what a unit of power of each line adds to a power."""
-        gains = np.abs(self.experiment.response(kind, self.grid.frequencies)) ** 2
+        gains = self.terms.gains(kind)
         return np.asarray(gains.sum(axis=1) if channel is None else gains[:, channel])
 
     def _designed(self) -> tuple[ResponseDesign, int]:
-        """The powers and the samples that count."""
-        samples = self.experiment.samples
+        """Return the powers and the samples that count."""
+        terms = self.terms
+        samples = terms.experiment.samples
         problem = self._problem(samples)
         if self.given is not None:
             flat = self.given.ravel()
             return ResponseDesign(flat, float(problem.price @ flat), float(problem.price @ flat)), samples
         try:
-            design = cheapest(problem) if self.goal == "cost" else most_accurate(problem)
+            design = cheapest(problem) if terms.goal == "cost" else most_accurate(problem)
         except UnreachableError as error:
-            raise unreachable(self.header.units, error, samples) from error
-        if self.goal == "samples":
-            samples = self._whole(1.0 / design.value)
-        return design, samples
+            raise unreachable(terms.header.units, error, samples) from error
+        return design, self._whole(1.0 / design.value) if terms.goal == "samples" else samples
 
     def _whole(self, samples: float) -> int:
-        """So many samples at least, in whole periods."""
-        whole = self.periods.blocks * self.periods.period
+        """Return a number of samples rounded up to whole periods."""
+        whole = self.terms.periods.blocks * self.terms.periods.period
         return whole * int(np.ceil(samples / whole * (1.0 - 1e-12)))
 
     def _solved(self) -> tuple[Planned, Results]:
         started = time.perf_counter()
         design, counted = self._designed()
-        flat = self._problem(counted)
-        powers = design.powers.reshape(-1, self.experiment.inputs)
-        length = counted + self.periods.blocks * self.periods.skip * self.periods.period
-        self._check_length(length)
         solved = time.perf_counter()
-        samples = self._records.best(powers, length)
+        plan = self._planned(design, counted)
+        experiment = replace(self.terms.experiment, samples=plan.counted)
+        terms = replace(self.terms, experiment=experiment)
+        results = response_results(terms, plan, self.record, timing(started, solved))
+        audit_response(terms, plan, results)
+        return plan, results
+
+    def _realised(self, design: ResponseDesign, counted: int) -> tuple[Array, float, int]:
+        """Return a record of the lines, the largest share of its limits, and the samples that count."""
+        terms = self.terms
+        powers = design.powers.reshape(-1, terms.experiment.inputs)
+        samples = self._records.best(powers, self._length(counted))
         beyond = self._records.beyond(samples)
-        if self.goal == "samples" and beyond > 1.0:
+        if terms.goal == "samples" and beyond > 1.0:
             # The lines are scaled into the limits, and more periods make up for it.
-            length -= counted
             counted = self._whole(beyond**2 / design.value)
-            length += counted
-            self._check_length(length)
-            samples = self._records.best(powers, length)
+            samples = self._records.best(powers, self._length(counted))
             beyond = self._records.beyond(samples)
-        experiment = replace(self.experiment, samples=counted)
-        noise = self.lines.noise
-        if not self.tabulated:
-            spectrum = NoiseSpectrum.of(self.experiment.model)
-            noise = spectrum.averaged(
-                self.grid.period, self.grid.excited, counted // (self.periods.blocks * self.periods.period)
-            )
-        exact = self.lines.deviations(powers, counted, noise)
-        worst = float(np.max(self.lines.ratios(exact)))
-        scale = 1.0
-        if self.goal == "cost" and self.record.meets:
-            scale = min(worst, float(np.sqrt(flat.alike(design.powers / flat.needed))))
+        return samples, beyond, counted
+
+    def _planned(self, design: ResponseDesign, counted: int) -> Planned:
+        """Return the record of a design, scaled so that it meets the accuracy or keeps to the limits."""
+        terms = self.terms
+        samples, beyond, counted = self._realised(design, counted)
+        problem, noise = self._problem(counted), terms.lines.noise
+        if not terms.tabulated:
+            times = counted // (terms.periods.blocks * terms.periods.period)
+            spectrum = NoiseSpectrum.of(terms.experiment.model)
+            noise = spectrum.averaged(terms.grid.period, terms.grid.excited, times)
+        powers = design.powers.reshape(-1, terms.experiment.inputs)
+        exact = terms.lines.deviations(powers, counted, noise)
+        worst, scale = float(np.max(terms.lines.ratios(exact))), 1.0
+        if terms.goal == "cost" and self.record.meets:
+            scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
-                raise too_tight(self.header.units, self.record.limit_keys, scale * beyond, length)
+                raise too_tight(terms.header.units, self.record.limit_keys, scale * beyond, len(samples))
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
-        plan = Planned(
-            design,
-            flat,
-            powers,
-            counted,
-            length,
-            record,
-            exact,
-            self._shifted(samples, exact),
-            not self.tabulated,
-        )
-        timing = {"design": solved - started, "signal": time.perf_counter() - solved}
-        terms = replace(self, experiment=experiment)
-        result = {**design_result(terms, plan), "timing_s": timing}
-        results = response_results(terms, plan, result, self.record)
-        audit_response(terms, plan, results)
-        return plan, results
+        shift = self._shifted(samples, exact)
+        return Planned(design, problem, powers, counted, len(samples), record, exact, shift)
 
-    def _check_length(self, length: int) -> None:
-        """Raise where the shortest experiment is longer than it may be, or than records are."""
-        if self.goal == "samples" and self.most_samples is not None and length > self.most_samples:
-            raise too_long(self.header.units, length, self.most_samples)
+    def _length(self, counted: int) -> int:
+        """Return the length of a record, transient included.
+
+        Raises:
+            InfeasibleError: the shortest experiment is longer than it may be.
+            SpecError: `too-large`.
+        """
+        terms = self.terms
+        length = counted + terms.periods.blocks * terms.periods.skip * terms.periods.period
+        if terms.goal == "samples" and terms.most_samples is not None and length > terms.most_samples:
+            raise too_long(terms.header.units, length, terms.most_samples)
         if length > self.record.longest:
             raise bad_spec(
                 "too-large",
@@ -211,14 +217,17 @@ class ResponseTask(ResponseTerms):
                 hint="ask for less accuracy, or allow more power",
                 key=KEY,
             )
+        return length
 
     @property
     def _records(self) -> LineRecords:
-        return LineRecords(self.experiment, self.grid, self.record.settings, self.record.bounds)
+        settings, bounds = self.record.settings, self.record.bounds
+        return LineRecords(self.terms.experiment, self.terms.grid, settings, bounds)
 
     def _shifted(self, u: Array, deviations: NDArray[np.float64]) -> float:
-        """How far what the start leaves shifts G, in standard deviations at most."""
-        quiet = np.zeros((1, 1, self.experiment.model.outputs))
-        y = self.experiment.model.simulate(u[None], quiet, 1.0)[0][0]
-        U, Y = (self.periods.means(signal, self.grid.excited) for signal in (u, y))
-        return float(np.max(np.abs(response_at(U, Y) - self.lines.G) / deviations))
+        """Return the largest shift of G by the start, in standard deviations."""
+        terms = self.terms
+        quiet = np.zeros((1, 1, terms.experiment.model.outputs))
+        y = terms.experiment.model.simulate(u[None], quiet, 1.0)[0][0]
+        U, Y = (terms.periods.means(signal, terms.grid.excited) for signal in (u, y))
+        return float(np.max(np.abs(response_at(U, Y) - terms.lines.G) / deviations))

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.counted_periods import periods_between_gaps, samples_before_periods
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.tasks.build.data import Data
 
 
-def whole_periods(stated: Periods, data: Data, name: str, step: float) -> tuple[Data, Periods, int]:
-    """The data that count, how they repeat, and how many records of equal length there are.
+@dataclass(frozen=True)
+class Counted:
+    """Data that count, how they repeat, the number of records of equal length, and what is left out."""
+
+    data: Data
+    periods: Periods
+    repeats: int
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def kept(self) -> int:
+        """Periods of one phase that count, in all records."""
+        return self.repeats * self.periods.kept(self.data.lengths[0])
+
+
+def whole_periods(stated: Periods, data: Data, name: str, step: float) -> Counted:
+    """Return the data that count.
 
     Records of equal length stay as they are. Of pieces between gaps, and of records of several lengths, the
     periods that lie in one piece are taken: those that begin at the sample of a period of which there are
@@ -32,7 +48,7 @@ def whole_periods(stated: Periods, data: Data, name: str, step: float) -> tuple[
     if len(lengths) == 1 and len(data.files) == len(data.lengths):
         if stated.blocks == 1 or length % whole == 0:
             _check(stated.kept(length), stated.kept(length) * len(data.lengths), stated, name)
-            return data, stated, len(data.lengths)
+            return Counted(data, stated, len(data.lengths), tuple(samples_before_periods(length, stated)))
     elif stated.blocks == 1:
         return _from_pieces(stated, data, name, step)
     what = " and ".join(str(one) for one in sorted(lengths))
@@ -44,8 +60,8 @@ def whole_periods(stated: Periods, data: Data, name: str, step: float) -> tuple[
     )
 
 
-def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> tuple[Data, Periods, int]:
-    """One record of the periods without a gap."""
+def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> Counted:
+    """Return one record of the periods without a gap."""
     period, places = stated.period, _places(data, step)
     transient = stated.skip * period
     follow = np.ones(len(places), dtype=bool)
@@ -62,10 +78,6 @@ def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> tuple[D
     samples = (taken[:, None] + np.arange(period)).ravel()
     ends = np.cumsum([count for _, count in data.files])
     counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=ends.size)
-    note = (
-        f"the data have {len(data.lengths)} pieces without gaps: the {taken.size} whole periods of {period} "
-        "samples in them count, after the transient"
-    )
     kept = replace(
         data,
         u=data.u[samples],
@@ -74,14 +86,14 @@ def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> tuple[D
         time=data.time[samples],
         lengths=(len(samples),),
         files=tuple((file, int(count)) for (file, _), count in zip(data.files, counts, strict=True)),
-        notes=(*data.notes, note),
         recorded=None if data.recorded is None else data.recorded.at(samples),
     )
-    return kept, replace(stated, skip=0), 1
+    left_out = periods_between_gaps(len(data.lengths), taken.size, period)
+    return Counted(kept, replace(stated, skip=0), 1, (left_out,))
 
 
 def _places(data: Data, step: float) -> NDArray[np.int64]:
-    """(N,): how many samples after the begin of its file each one was taken."""
+    """(N,): the number of samples between the begin of a file and each of its samples."""
     ends = np.cumsum([count for _, count in data.files])[:-1]
     return np.concatenate([np.round((part - part[0]) / step) for part in np.split(data.time, ends)]).astype(
         np.int64
@@ -89,7 +101,7 @@ def _places(data: Data, step: float) -> NDArray[np.int64]:
 
 
 def _check(each: int, together: int, stated: Periods, name: str) -> None:
-    """Enough periods count, in a block and in all records.
+    """Check that enough periods count, in a block and in all records.
 
     Raises:
         DataError: `too-few-samples`.
@@ -98,17 +110,6 @@ def _check(each: int, together: int, stated: Periods, name: str) -> None:
         raise DataError.because(
             "too-few-samples",
             f"{name} has {max(each, 0)} whole periods of {stated.period} samples after {stated.skip} that "
-            "are transient: the scatter of two that count is needed to tell the noise",
+            "are transient: the noise is estimated from the scatter of two or more",
             hint="record more periods, or give several records",
-        )
-
-
-def left_out(data: Data, periods: Periods) -> Iterator[str]:
-    """A sentence on samples before the first whole period."""
-    samples = data.lengths[0]
-    left = samples - periods.each(samples) * periods.blocks * periods.period
-    if left:
-        yield (
-            f"the first {left} of {samples} samples are left out: the others are whole periods of "
-            f"{periods.period}"
         )

@@ -1,4 +1,4 @@
-"""Losses of the runs of a loop-error study -> the entry `simulation` and its histogram."""
+"""Losses of the closed loop over all Monte Carlo runs -> the section `simulation` and its histogram."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.monte_carlo.loop_error import LossStudy
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.outcome.curves import Curves, LossCurves
-from inputdesign_cli.questions.loop_error.outcome import Entry, theory_entry
+from inputdesign_cli.outcome.loop_error import LossMoments
+from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
+from inputdesign_cli.questions.loop_error.outcome import theory_of
 from inputdesign_cli.signal.lines import Lines
 
 
@@ -21,8 +23,8 @@ def loss_results(
     studies: Mapping[str, LossStudy],
     inputs: Mapping[str, Lines],
     samples: int,
-) -> tuple[Entry, dict[str, Curves]]:
-    """What `simulation` says of each input, and the histogram if there is anything to count.
+) -> tuple[dict[str, TriedInput], Improvement | None, dict[str, Curves]]:
+    """Return what each input gave, the improvement over white noise, and the histogram where runs count.
 
     Args:
         criterion: of the true system.
@@ -32,46 +34,30 @@ def loss_results(
     for name, lines in inputs.items():
         information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
         theory[name] = loss_theory(criterion, information)
-        entries[name] = _entry(theory[name], studies[name], samples * information)
-    found: Entry = {"inputs": entries}
+        entries[name] = _tried(theory[name], studies[name], samples * information)
     losses = {name: study.loss for name, study in studies.items() if study.loss.size > 1}
+    improvement = None
     if {"design", "white"} <= losses.keys():
-        found["improvement"] = {
-            "measured": 1 - float(losses["design"].mean() / losses["white"].mean()),
-            "theory": 1 - theory["design"].mean / theory["white"].mean,
-        }
+        measured = 1 - float(losses["design"].mean() / losses["white"].mean())
+        improvement = Improvement(measured, 1 - theory["design"].mean / theory["white"].mean)
     means = {name: theory[name].mean for name in losses}
-    return found, {"loss": LossCurves(losses, means)} if losses else {}
+    return entries, improvement, {"loss": LossCurves(losses, means)} if losses else {}
 
 
-def unstable_notes(studies: Mapping[str, LossStudy], runs: int) -> list[str]:
-    """Say for each input how many controllers made the true loop unstable."""
-    return [
-        f"simulation: with the input {name}, {study.unstable} of {runs} controllers made the true loop "
-        "unstable. Their losses are infinite; the means are those of the other runs"
-        for name, study in studies.items()
-        if study.unstable
-    ]
+def _tried(theory: LossTheory, study: LossStudy, information: Array) -> TriedInput:
+    several, counted = len(study.estimates) > 1, study.loss.size > 1
+    return TriedInput(
+        theory=theory_of(theory),
+        unstable=study.unstable,
+        mean_estimate=study.estimates.mean(axis=0),
+        power=tuple(np.ravel(study.power).tolist()),
+        covariance_eigenvalues=whitened_eigenvalues(study.estimates, information) if several else None,
+        loss=_moments(study.loss) if counted else None,
+        squared=_moments(study.loss**2) if counted else None,
+        exact=ExactLoss(_moments(study.exact), _moments(study.exact**2)) if counted else None,
+    )
 
 
-def _entry(theory: LossTheory, study: LossStudy, information: Array) -> Entry:
-    entry: Entry = {
-        "theory": theory_entry(theory),
-        "unstable": study.unstable,
-        "mean_estimate": study.estimates.mean(axis=0),
-        "power": study.power,
-    }
-    if len(study.estimates) > 1:
-        entry["covariance_eigenvalues"] = whitened_eigenvalues(study.estimates, information)
-    if study.loss.size > 1:
-        entry |= {
-            "loss": _moments(study.loss),
-            "squared": _moments(study.loss**2),
-            "exact": {"loss": _moments(study.exact), "squared": _moments(study.exact**2)},
-        }
-    return entry
-
-
-def _moments(values: Array) -> dict[str, float]:
+def _moments(values: Array) -> LossMoments:
     sd = float(values.std(ddof=1))
-    return {"mean": float(values.mean()), "sd": sd, "standard_error": sd / float(np.sqrt(values.size))}
+    return LossMoments(float(values.mean()), sd, sd / float(np.sqrt(values.size)))

@@ -1,4 +1,4 @@
-"""A design for the closed-loop error -> `result.json`, tables and curves."""
+"""A design for the closed-loop error -> its outcome, tables and curves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,20 @@ from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
 from inputdesign_cli.design.loop_error.weight import adjoint
+from inputdesign_cli.outcome import (
+    Baseline,
+    ClosedLoopError,
+    Information,
+    Objective,
+    Outcome,
+    Powers,
+    Signal,
+    Solver,
+    Spectrum,
+    White,
+)
 from inputdesign_cli.outcome.curves import Curves, DirectionCurves, SpectrumCurves
+from inputdesign_cli.outcome.loop_error import ActivePower, LossMoments, TheoreticalLoss
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
@@ -24,12 +37,10 @@ from inputdesign_cli.questions.common.status import proof_status
 _POINTS = 800
 _LOWEST = 1e-3
 
-Entry = dict[str, object]
-
 
 @dataclass(frozen=True)
 class LoopErrorTerms:
-    """How the question was put, as far as its results repeat it.
+    """The question, as far as its results repeat it.
 
     Attributes:
         law: the control law as the spec calls it.
@@ -49,59 +60,57 @@ class LoopErrorTerms:
     grid: int
 
 
-def design_result(terms: LoopErrorTerms, design: LoopErrorDesign) -> Entry:
-    """`result.json` but for the signal."""
-    criterion, samples = design.criterion, terms.samples
-    powers = {"input": np.diag(design.input_covariance), "output": np.diag(design.output_covariance)}
-    powers["excitation"] = powers["input"]
-    step = terms.header.units.sample_time
-    return {
-        "format": 1,
-        "title": terms.header.title,
-        "status": proof_status(design.gap, terms.tolerance),
-        "objective": {
-            "kind": "closed_loop_error",
-            "value": design.value,
-            "lower_bound": design.lower_bound,
-            "relative_gap": design.gap,
-            "any_spectrum_bound": design.lower_bound,
-        },
-        "cost": float(sum(np.sum(weight * powers[kind]) for kind, weight in terms.cost.items())),
-        "samples": samples,
-        "power": {kind: power.tolist() for kind, power in powers.items()},
-        "closed_loop_error": {
-            "law": terms.law,
-            "covariance": terms.covariance,
-            "expected": design.value / samples,
-            "band": [edge / step for edge in design.problem.band],
-            "noise_model_part": design.noise_part,
-            "parametric": {
-                "design": theory_entry(loss_theory(criterion, design.information)),
-                "white": theory_entry(loss_theory(criterion, design.white.information)),
-            },
-            "limits": _limits(design),
-        },
-        "information": {
-            "parameters": list(design.problem.structure.names),
-            "matrix": samples * design.information,
-            "covariance": np.linalg.inv(design.information) / samples,
-        },
-        "spectrum": _spectrum(terms, design),
-        "baseline": {
-            "white": {
-                "value": design.white.value,
-                "ratio": design.white.value / design.value,
-                "power": _white_power(design),
-            }
-        },
-        "solver": {
-            "method": "exchange" if design.of_lines else "dual",
-            "steps": design.steps,
-            "nodes": int(design.rule.nodes.size),
-            "settled": design.settled,
-            "tolerance": terms.tolerance,
-        },
-    }
+def design_outcome(
+    terms: LoopErrorTerms, design: LoopErrorDesign, signal: Signal, timing: dict[str, float]
+) -> Outcome:
+    """Return what result.json says of a design."""
+    criterion, samples, white = design.criterion, terms.samples, design.white
+    inputs = tuple(np.diag(design.input_covariance).tolist())
+    outputs = tuple(np.diag(design.output_covariance).tolist())
+    power = Powers(inputs, outputs, inputs)
+    lo, hi = (edge / terms.header.units.sample_time for edge in design.problem.band)
+    of = {"input": inputs, "output": outputs, "excitation": inputs}
+    cost = sum(float(np.sum(weight * of[kind])) for kind, weight in terms.cost.items())
+    informations = {"design": design.information, "white": white.information}
+    return Outcome(
+        title=terms.header.title,
+        status=proof_status(design.gap, terms.tolerance),
+        objective=Objective(
+            "closed_loop_error",
+            design.value,
+            lower_bound=design.lower_bound,
+            relative_gap=design.gap,
+            any_spectrum_bound=design.lower_bound,
+        ),
+        cost=cost,
+        samples=samples,
+        power=power,
+        closed_loop_error=ClosedLoopError(
+            law=terms.law,
+            covariance=terms.covariance,
+            expected=design.value / samples,
+            band=(lo, hi),
+            noise_model_part=design.noise_part,
+            parametric={name: theory_of(loss_theory(criterion, M)) for name, M in informations.items()},
+            limits=_limits(design),
+        ),
+        information=Information(
+            design.problem.structure.names,
+            samples * design.information,
+            np.linalg.inv(design.information) / samples,
+        ),
+        spectrum=_spectrum(terms, design),
+        baseline=Baseline(
+            White(value=white.value, ratio=white.value / design.value, power=_white_power(design))
+        ),
+        signal=signal,
+        solver=Solver(
+            "exchange" if design.of_lines else "dual",
+            terms.tolerance,
+            details={"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled},
+        ),
+        timing_s=timing,
+    )
 
 
 def spectrum_results(
@@ -128,57 +137,60 @@ def spectrum_results(
     }
 
 
-def theory_entry(theory: LossTheory) -> Entry:
-    """N E||y - y0||^2 of the model structure, and mean and sd of its root over experiments."""
-    return {"value": theory.value, "loss": {"mean": theory.mean, "sd": theory.sd}}
+def theory_of(theory: LossTheory) -> TheoreticalLoss:
+    """Return N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
+    return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
 
 
-def _white_power(design: LoopErrorDesign) -> dict[str, list[float]]:
+def _white_power(design: LoopErrorDesign) -> Powers:
     weights, level = design.rule.weights, design.white.level
-    share = level * float(weights.sum())
     G = design.problem.plant.plant_at(design.rule.nodes)
     output = level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
-    inputs = [share] * design.problem.plant.inputs
-    return {"input": inputs, "output": output.tolist(), "excitation": inputs}
+    inputs = (level * float(weights.sum()),) * design.problem.plant.inputs
+    return Powers(inputs, tuple(output.tolist()), inputs)
 
 
-def _limits(design: LoopErrorDesign) -> list[Entry]:
-    rows = []
-    for index, limit in enumerate(design.problem.limits):
-        row: Entry = {"power": limit.kind, "max": limit.most, "attained": float(design.powers[index])}
-        if limit.channel is not None:
-            row["channel"] = limit.channel + 1
-        if design.multipliers is not None:
-            row["multiplier"] = float(design.multipliers[index])
-        rows.append(row)
-    return rows
+def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
+    return tuple(
+        ActivePower(
+            limit.kind,
+            limit.most,
+            float(design.powers[index]),
+            channel=None if limit.channel is None else limit.channel + 1,
+            multiplier=None if design.multipliers is None else float(design.multipliers[index]),
+        )
+        for index, limit in enumerate(design.problem.limits)
+    )
 
 
-def _spectrum(terms: LoopErrorTerms, design: LoopErrorDesign) -> Entry:
+def _spectrum(terms: LoopErrorTerms, design: LoopErrorDesign) -> Spectrum:
     unit = terms.header.units.frequency
     if design.of_lines:
-        return {"type": "multisine", "frequencies": design.frequencies / unit, "masses": design.spectrum}
+        lines = {"frequencies": design.frequencies / unit, "masses": design.spectrum}
+        return Spectrum("multisine", lines)
 
     def trace(w: Array) -> Array:
         return np.asarray(np.trace(design.density(w), axis1=1, axis2=2).real)
 
-    lo, hi = design.problem.band
-    grid = graded_grid(design.problem.plant.singularities, lo, hi)
-    peaks, heights = local_maxima(trace, grid, trace(grid))
-    entry: Entry = {"type": "pointwise", "grid": terms.grid}
-    for name, w in {"peak": float(peaks[np.argmax(heights)]), "lowest": lo, "highest": hi}.items():
+    def at(w: float) -> dict[str, object]:
         matrix = design.density(np.array([w]))[0]
-        entry[name] = {
+        return {
             "frequency": w / unit,
             "trace": float(np.trace(matrix).real),
             "matrix": _tidy(matrix),
             "eigenvalues": np.linalg.eigvalsh(matrix),
         }
-    return entry | {"loop_input": _loop_input(design.problem)}
+
+    lo, hi = design.problem.band
+    grid = graded_grid(design.problem.plant.singularities, lo, hi)
+    peaks, heights = local_maxima(trace, grid, trace(grid))
+    shown = {"peak": float(peaks[np.argmax(heights)]), "lowest": lo, "highest": hi}
+    details = {"grid": terms.grid, **{name: at(w) for name, w in shown.items()}}
+    return Spectrum("pointwise", {**details, "loop_input": _loop_input(design.problem)})
 
 
-def _loop_input(problem: LoopErrorProblem) -> Entry:
-    """C S Phi_r (C S)^* at the lowest frequency: what the loop will apply there, and its matrix root."""
+def _loop_input(problem: LoopErrorProblem) -> Mapping[str, object]:
+    """Return C S Phi_r (C S)^* at the lowest frequency, the input of the loop there, and its matrix root."""
     w = np.array([problem.band[0]])
     applied = np.linalg.inv(problem.plant.plant_at(w)) @ problem.law.complementary(w)
     reference = problem.entering(w) - problem.plant.disturbance_at(w)

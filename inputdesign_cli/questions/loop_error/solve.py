@@ -8,12 +8,15 @@ from dataclasses import dataclass, replace
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.findings.unstable_runs import unstable_runs
 from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
-from inputdesign_cli.outcome.results import Results, typed
-from inputdesign_cli.questions.common.plain_signal import signal_entry, signal_results
-from inputdesign_cli.questions.loop_error.losses import loss_results, unstable_notes
-from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms, design_result, spectrum_results
+from inputdesign_cli.outcome import Signal, Simulation, read_plain, write_plain
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.questions.common.plain_signal import signal_of, signal_results
+from inputdesign_cli.questions.common.study import timing, with_study
+from inputdesign_cli.questions.loop_error.losses import loss_results
+from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms, design_outcome, spectrum_results
 from inputdesign_cli.questions.loop_error.signal import (
     LoopErrorSignalSettings,
     design_lines,
@@ -71,34 +74,27 @@ class LoopErrorTask:
         studies = study_losses(
             trial.problem, inputs, samples=samples, runs=trial.runs, seed=trial.seed, executor=executor
         )
-        entry, curves = loss_results(trial.problem.parametric(), studies, inputs, samples)
-        study = {
-            "runs": trial.runs,
-            "seed": trial.seed,
-            "samples": samples,
-            "parameters": list(trial.problem.plant.names),
-            **entry,
-        }
-        timing = {**results.result["timing_s"], "simulation": time.perf_counter() - begun}
-        result = {**results.result, "simulation": study, "timing_s": timing}
-        notes = unstable_notes(studies, trial.runs)
-        if notes:
-            result["notes"] = [*result.get("notes", []), *notes]
-        return replace(results, outcome=typed(result), curves={**results.curves, **curves})
+        tried, improvement, curves = loss_results(trial.problem.parametric(), studies, inputs, samples)
+        names = tuple(trial.problem.plant.names)
+        study = Simulation(
+            trial.runs, trial.seed, tried, samples=samples, parameters=names, improvement=improvement
+        )
+        findings = unstable_runs({name: one.unstable for name, one in studies.items()}, trial.runs)
+        return with_study(results, study, begun, curves=curves, findings=findings)
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
         started = time.perf_counter()
         design = design_loop_error(self.problem, self.terms.covariance, tolerance=self.terms.tolerance)
         solved = time.perf_counter()
-        signal = realise(design, self.signal)
-        entry = {"type": signal.method, **signal_entry(signal.samples), **signal.details}
-        timing = {"design": solved - started, "signal": time.perf_counter() - solved}
-        result = {**design_result(self.terms, design), "signal": entry, "timing_s": timing}
+        made = realise(design, self.signal)
+        signal = replace(signal_of(made.samples), type=made.method)
+        signal = read_plain(Signal, write_plain(signal) | made.details)
+        outcome = design_outcome(self.terms, design, signal, timing(started, solved))
         header = self.terms.header
         tables, curves = spectrum_results(self.terms, design)
-        table, record = signal_results(header.units, signal.samples)
+        table, record = signal_results(header.units, made.samples)
         return design, Results(
-            typed(result),
+            outcome,
             header.resolved_spec,
             header.units.time_unit,
             {**tables, "signal": table},

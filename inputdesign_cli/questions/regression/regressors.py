@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,8 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.questions.common.plain_signal import signal_entry
+from inputdesign_cli.outcome import Signal
+from inputdesign_cli.questions.common.plain_signal import signal_of
 from inputdesign_cli.signal import delayed_regressors, free_regressors, periodic_input, rank
 from inputdesign_cli.signal.moments import Start
 
@@ -58,7 +60,7 @@ class RegressorRecord:
 
     Phi: NDArray[np.float64]
     channels: NDArray[np.float64]
-    entry: dict[str, object]
+    signal: Signal
     lines: PowerLines | None = None
 
 
@@ -88,7 +90,8 @@ def _free(settings: RegressorSettings, regression: Regression, R: Array) -> Regr
     if period is None:
         period = directions if samples % directions == 0 else samples
     Phi = free_regressors(R, samples, period)
-    return RegressorRecord(Phi, Phi, signal_entry(Phi) | _attained(regression, Phi, R) | {"period": period})
+    details = {**_attained(regression, Phi, R), "period": period}
+    return RegressorRecord(Phi, Phi, _with_error(signal_of(Phi), regression, Phi, details))
 
 
 def _delayed(
@@ -102,26 +105,33 @@ def _delayed(
     power = found.energy / (n * samples)
     u = periodic_input(found.shares, power, samples, period, np.random.default_rng(settings.seed))
     Phi = delayed_regressors(u, n, settings.start)
-    entry = signal_entry(u[:, None]) | _attained(regression, Phi, R)
-    entry |= {
+    rest = delayed_regressors(u, n, "zero")
+    details = {
+        **_attained(regression, Phi, R),
         "period": period,
         "start": settings.start,
         "on_grid": found.exact,
-        "from_rest": _attained(regression, delayed_regressors(u, n, "zero"), R),
+        "from_rest": {**_attained(regression, rest, R), **_error(regression, rest)},
     }
+    signal = _with_error(signal_of(u[:, None]), regression, Phi, details)
     used = np.flatnonzero(found.shares > 0.0)
     lines = PowerLines(2.0 * np.pi * used / period, found.shares[used] * power)
-    return RegressorRecord(Phi, u[:, None], entry, lines)
+    return RegressorRecord(Phi, u[:, None], signal, lines)
 
 
 def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, object]:
-    """Energy and error of the Gram matrix of these samples, and its distance to R."""
+    """Return the energy of the Gram matrix of these samples, and its distance to R."""
     G = Phi.T @ Phi
-    split = regression.error(G)
-    attained: dict[str, object] = {
-        "energy": float(np.trace(G)),
-        "moments_error": float(np.abs(G - R).max() / np.abs(R).max()),
-    }
-    if np.isfinite(split.total):
-        attained["mean_squared_error"] = split.total
-    return attained
+    return {"energy": float(np.trace(G)), "moments_error": float(np.abs(G - R).max() / np.abs(R).max())}
+
+
+def _error(regression: Regression, Phi: Array) -> dict[str, float]:
+    """Return the error of these samples where it is finite."""
+    total = regression.error(Phi.T @ Phi).total
+    return {"mean_squared_error": total} if np.isfinite(total) else {}
+
+
+def _with_error(signal: Signal, regression: Regression, Phi: Array, details: Mapping[str, object]) -> Signal:
+    """Return the signal with its details and the error of its samples."""
+    error = _error(regression, Phi).get("mean_squared_error")
+    return replace(signal, details=details, mean_squared_error=error)

@@ -21,15 +21,18 @@ from inputdesign_cli.design.regression import (
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
+from inputdesign_cli.outcome import Simulation, Solver
 from inputdesign_cli.outcome.curves import Curves, MomentsCurves
-from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.simulation import TriedInput
 from inputdesign_cli.questions.common.plain_signal import signal_results
+from inputdesign_cli.questions.common.study import timing, with_study
 from inputdesign_cli.questions.regression.outcome import (
     MomentsDesign,
     RegressionTerms,
     error_curves,
-    moments_result,
-    trial_entry,
+    moments_outcome,
+    tried_regressors,
 )
 from inputdesign_cli.questions.regression.regressors import (
     RegressorRecord,
@@ -114,7 +117,7 @@ class RegressionTask:
                 hint="set experiment.samples",
                 key="experiment.samples",
             )
-        regression = self.terms.regression
+        begun, regression = time.perf_counter(), self.terms.regression
         if trial.noise is not None:
             regression = replace(regression, variance=trial.noise.of(record.Phi @ trial.theta))
         seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
@@ -128,8 +131,7 @@ class RegressionTask:
                 rng=np.random.default_rng(drawn),
             )
             inputs[name] = self._tried(trial, regression, Phi, noise, executor)
-        study = {"runs": trial.runs, "seed": trial.seed, "inputs": inputs}
-        return replace(results, outcome=typed({**results.result, "simulation": study}))
+        return with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
 
     def _tried(
         self,
@@ -138,9 +140,9 @@ class RegressionTask:
         Phi: Array,
         seed: np.random.SeedSequence,
         executor: Executor | None,
-    ) -> dict[str, object]:
+    ) -> TriedInput:
         found = run_experiments(regression, Phi, trial.theta, runs=trial.runs, seed=seed, executor=executor)
-        return trial_entry(regression, Phi, trial.theta, found)
+        return tried_regressors(regression, Phi, trial.theta, found)
 
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
         started = time.perf_counter()
@@ -148,13 +150,13 @@ class RegressionTask:
         design = self._toeplitz() if terms.toeplitz else self._free()
         solved = time.perf_counter()
         record = realise_regressors(self.signal, terms.regression, design.R, design.rho, terms.target)
-        result = moments_result(terms, design)
+        signal = None if record is None else record.signal
+        outcome = moments_outcome(terms, design, signal, timing(started, solved))
         units = terms.header.units
         tables: dict[str, Table] = {}
         curves: dict[str, Curves] = {"error": error_curves(terms, design)}
         moments = MomentsCurves(design.R, terms.regression.m)
         if record is not None:
-            result["signal"] = record.entry
             tables["signal"], curves["signal"] = signal_results(units, record.channels)
             if record.lines is not None:
                 w, power = record.lines.frequencies / units.frequency, record.lines.powers
@@ -162,8 +164,7 @@ class RegressionTask:
                 nyquist = np.pi / units.sample_time
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
         curves["moments"] = moments
-        result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
-        return record, Results(typed(result), terms.header.resolved_spec, units.time_unit, tables, curves)
+        return record, Results(outcome, terms.header.resolved_spec, units.time_unit, tables, curves)
 
     def _free(self) -> MomentsDesign:
         regression, target, energy = self.terms.regression, self.terms.target, self.terms.energy
@@ -174,7 +175,7 @@ class RegressionTask:
             assert energy is not None
             R = least_error(regression, energy)
             bound = error_bound(regression, energy)
-        return MomentsDesign(R, None, regression.error(R), bound, 1e-9, {"method": "closed_form"})
+        return MomentsDesign(R, None, regression.error(R), bound, 1e-9, Solver("closed_form"))
 
     def _toeplitz(self) -> MomentsDesign:
         terms = self.terms
@@ -190,16 +191,12 @@ class RegressionTask:
         except OutOfReachError as error:
             assert terms.target is not None
             raise _out_of_reach(terms.regression, terms.target, error) from error
-        how: dict[str, object] = {
-            "method": "alternating" if self.alternating else "sequential_convex",
-            "starts": found.starts,
-            "solves": found.solves,
-            "nodes": found.nodes,
-            "tolerance": self.tolerance,
-        }
+        how: dict[str, object] = {"starts": found.starts, "solves": found.solves, "nodes": found.nodes}
         if found.assumed:
             how["assumed_smallest_eigenvalue"] = found.assumed
-        return MomentsDesign(found.R, found.rho, found.split, found.bound, self.tolerance, how)
+        method = "alternating" if self.alternating else "sequential_convex"
+        solver = Solver(method, self.tolerance, details=how)
+        return MomentsDesign(found.R, found.rho, found.split, found.bound, self.tolerance, solver)
 
 
 def _out_of_reach(

@@ -1,0 +1,160 @@
+"""Outputs answer at lines that are not excited, and a nonlinearity changes a measured frequency response."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.identification.cubes import Cubes
+from inputdesign_cli.identification.silent_lines import SilentLines
+from inputdesign_cli.outcome.units import Units
+
+# Silent lines are worth a finding below this probability, times the number of tests.
+_SPEAKS = 0.01
+# A response that a nonlinearity would change by much is doubted earlier, by the odd lines alone.
+_DOUBT = 0.05
+# The two tests of odd lines: their power, and their likeness to a cube.
+_WAYS = 2
+MATTERS = 0.5
+"""From this share of what is admitted on, a quarter in mean square, a change leaves a verdict open."""
+
+SILENT_LINES = FindingKind(
+    "silent-lines-answer",
+    Severity.DOUBT,
+    "outputs answer at lines that are not excited",
+    "A linear plant answers only at the lines of its input. A nonlinearity of odd degree answers at odd "
+    "harmonics, one of even degree at even ones. An F test compares the power there with the noise.",
+    "Look at the plant for saturation, dead zones and backlash. See whether the input was applied "
+    "as recorded.",
+)
+NONLINEAR = FindingKind(
+    "nonlinear-response",
+    Severity.UNDECIDED,
+    "a nonlinearity changes the measured response",
+    "Odd lines that are not excited show by how much a nonlinearity of odd degree changes the response. From "
+    "half of what is admitted on, the response is not called met.",
+    "Measure at a smaller amplitude, or with other phases, and see whether the response stays. More periods "
+    "do not help.",
+    "nonlinearity",
+)
+
+
+@dataclass(frozen=True)
+class Distorted:
+    """The change of a response by a nonlinearity of odd degree, at most, over what is admitted.
+
+    Attributes:
+        shares: (L,), at every line.
+        probability: that noise alone has as much at the silent lines.
+        cubed: the signal, such as u1, whose cube the silent lines resemble; empty where power alone speaks.
+    """
+
+    shares: Array
+    probability: float
+    cubed: str
+
+    @property
+    def line(self) -> int:
+        """The line of the largest share."""
+        return int(np.argmax(self.shares))
+
+    @property
+    def share(self) -> float:
+        """The largest share."""
+        return float(self.shares[self.line])
+
+    @property
+    def matters(self) -> bool:
+        """Whether it may decide on what is met."""
+        return self.share >= MATTERS
+
+
+def distorted(
+    silent: Mapping[str, SilentLines], shares: Array, cube: Cubes, of_cube: Callable[[Array], Array]
+) -> Distorted | None:
+    """Return the error of G over what is admitted (L,); None where odd lines have no more than noise.
+
+    Args:
+        shares: by the power at silent lines.
+        of_cube: shares by the cubes of the outputs that have a one in (p,).
+    """
+    power, like = (_of_any(probability) for probability in (silent["odd"].probability, cube.probability))
+    alike = _WAYS * cube.probability.size * cube.probability < _DOUBT
+    cubed = of_cube(alike.astype(float))
+    both = np.maximum(np.where(power < _DOUBT, shares, 0.0), cubed) if alike.any() else shares
+    line, signal = int(np.argmax(both)), ""
+    if cubed[line] > 0.0 and cubed[line] >= both[line]:
+        output = int(np.argmin(cube.probability))
+        source = int(cube.source[output])
+        signal = f"y{output + 1}" if source < 0 else f"u{source + 1}"
+    found = Distorted(np.asarray(both), min(power, like), signal)
+    small = min(_chance(silent, "odd"), like) < _SPEAKS
+    return found if (min(power, like) < _DOUBT if found.matters else small) else None
+
+
+def _of_any(probability: Array) -> float:
+    """Return the probability that noise alone has as much at any output, in either test."""
+    return min(_WAYS * float(probability.min()) * probability.size, 1.0)
+
+
+def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:
+    """Return the probability that any silent line has by noise alone as much as lines of this kind."""
+    tests = sum(found.probability.size for found in silent.values())
+    return min(float(silent[kind].probability.min()) * tests, 1.0)
+
+
+def silent_lines_answer(silent: Mapping[str, SilentLines]) -> list[Finding]:
+    """Return a finding for each kind of lines, odd or even, with more than noise."""
+    return [
+        SILENT_LINES.found(
+            f"the outputs answer at {kind} lines that are not excited (rms "
+            f"{', '.join(f'{value:.3g}' for value in found.rms)}, probability of chance "
+            f"{chance:.2g}). Either "
+            f"a nonlinearity of {kind} degree acts, or an input was not applied as recorded",
+            where=kind,
+            probability=chance,
+            rms=found.rms.tolist(),
+        )
+        for kind, found in silent.items()
+        if (chance := _chance(silent, kind)) < _SPEAKS
+    ]
+
+
+def nonlinear_response(
+    units: Units, found: Distorted | None, w: Array, *, decided: bool = False
+) -> list[Finding]:
+    """Return a finding on the change of a response at lines w (L,), in the unit of the user.
+
+    Args:
+        decided: whether noise alone decides already.
+    """
+    if found is None:
+        return []
+    at, severity = f"at {w[found.line]:.3g} {units.per_time}", Severity.NOTE
+    message = (
+        f"a nonlinearity changes the response by little: about {found.share:.2g} of what is admitted, {at}"
+    )
+    if found.matters:
+        severity = Severity.DOUBT if decided else Severity.UNDECIDED
+        cause = f"the cube of {found.cubed}" if found.cubed else "a nonlinearity"
+        message = (
+            f"{cause} changes the response by about {found.share:.2g} of what is admitted, {at}. "
+            f"Odd lines that "
+            f"are not excited show it (probability of chance {found.probability:.2g}). More periods "
+            f"do not help: "
+            "measure at a smaller amplitude, or with other phases, and see whether the response stays"
+        )
+    return [
+        NONLINEAR.found(
+            message,
+            severity=severity,
+            share=found.share,
+            frequency=float(w[found.line]),
+            cubed=found.cubed or None,
+            probability=found.probability,
+        )
+    ]
