@@ -198,7 +198,7 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
     """
     from inputdesign_cli.questions.exploration.build import model_to_judge, naming_model
     from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
-    from inputdesign_cli.tasks.build.header import build_header
+    from inputdesign_cli.questions.building.header import build_header
     from inputdesign_cli.tasks.build.preparation import Preparation
 
     prepared = preparation or Preparation()

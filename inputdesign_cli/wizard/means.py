@@ -191,7 +191,7 @@ def _at_rest(path: Path, step: float) -> tuple[float, float, str]:
     Rows that are farther apart than samples, or nearer, tell of noise with one pole: its correlation fades
     by the same factor in the same time.
     """
-    from inputdesign_cli.tasks.build.tables import read_samples
+    from inputdesign_cli.questions.building.tables import read_samples
 
     file_of("noise", path)
     with in_their_words({}, "noise"):
@@ -220,7 +220,7 @@ def _seconds_apart(path: Path) -> float | None:
     """The time between the rows of a file, where a column tells it."""
     from inputdesign_cli.tasks.build.columns import time_unit_in
     from inputdesign_cli.tasks.build.files import read_sheet
-    from inputdesign_cli.tasks.build.tables import column_named, columns_of, time_columns
+    from inputdesign_cli.questions.building.tables import column_named, columns_of, time_columns
 
     sheet = read_sheet(path, key="noise")
     for name in time_columns(sheet)[:1]:

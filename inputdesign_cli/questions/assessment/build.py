@@ -34,7 +34,7 @@ from inputdesign_cli.questions.building.system import build_experiment, build_mo
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec, parse_spec
-from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.questions.building.header import build_header
 
 
 def build_identification(spec: Spec) -> Identification:

@@ -17,7 +17,7 @@ from inputdesign_cli.specification.models.spectrum import (
     GivenSpectrum,
     MultisineSpectrum,
 )
-from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.questions.building.header import build_units
 
 # Poles so near to zero are poles there; those of gradients are of no higher order.
 _AT_ZERO, _HIGHEST = 1e-7, 8

@@ -14,8 +14,8 @@ from inputdesign_cli.questions.building.signal_settings import stated_moves, sta
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
-from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.tables import bad_table, read_frequency_table
 
 _KEY = "limits.spectrum"
 

@@ -31,8 +31,8 @@ from inputdesign_cli.questions.building.weights import build_weight, check_finit
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
 
 _KEY = "accuracy.model_error"
 _LOOP = "accuracy.loop"

@@ -23,7 +23,7 @@ from inputdesign_cli.questions.building.parameters import embedded
 from inputdesign_cli.questions.building.weights import build_weight, check_finite
 from inputdesign_cli.questions.common.within_limits import StatedBound
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.questions.building.header import build_units
 
 _RELATIVE_ZERO = 1e-9
 

@@ -10,7 +10,7 @@ from inputdesign_cli.questions.common.simulated_estimates import Simulator
 from inputdesign_cli.questions.common.simulation import Simulation, TrueSystem
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.specification.models.experiment import Noise
-from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.questions.building.header import build_units
 
 
 def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:

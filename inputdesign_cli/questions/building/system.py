@@ -40,8 +40,8 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
 )
 from inputdesign_cli.specification.models.values import depth
-from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import read_frequency_table, read_samples
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 
 # Of pi/sample_time, where a band is proposed.
 _WITHIN = 0.95

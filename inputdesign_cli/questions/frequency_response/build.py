@@ -27,8 +27,8 @@ from inputdesign_cli.questions.frequency_response.solve import KEY, ResponseTask
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import GivenMultisine
-from inputdesign_cli.tasks.build.header import build_header, build_units
-from inputdesign_cli.tasks.build.tables import has_column
+from inputdesign_cli.questions.building.header import build_header, build_units
+from inputdesign_cli.questions.building.tables import has_column
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12

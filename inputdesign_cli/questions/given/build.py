@@ -40,7 +40,7 @@ from inputdesign_cli.specification.models.spectrum import (
     GivenWhite,
 )
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
-from inputdesign_cli.tasks.build.header import build_header, build_units
+from inputdesign_cli.questions.building.header import build_header, build_units
 
 _REFUSED = ("spectrum", "energy")
 _OF_DESIGNS = ("objective", "campaign")

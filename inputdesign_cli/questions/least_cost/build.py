@@ -34,7 +34,7 @@ from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
-from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.questions.building.header import build_header
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 

@@ -27,7 +27,7 @@ from inputdesign_cli.questions.loop_error.signal import LoopErrorSignalSettings
 from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorTask, LossTrial
 from inputdesign_cli.specification import ClosedLoopError, Simulation, Spec
 from inputdesign_cli.specification.models.transfer import Transfer
-from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.questions.building.header import build_header
 
 _GRID = 512
 _CANDIDATES = 20

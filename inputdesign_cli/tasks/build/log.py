@@ -25,7 +25,7 @@ from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import SHORTEST, Preparation
 from inputdesign_cli.tasks.build.signals import check_stated, signals_of, stated_step, typical_step
-from inputdesign_cli.tasks.build.tables import may_be_times, no_column
+from inputdesign_cli.questions.building.tables import may_be_times, no_column
 from inputdesign_cli.tasks.build.without import labels
 from inputdesign_cli.tasks.build.written_apart import joined_rows
 

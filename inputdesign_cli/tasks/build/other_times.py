@@ -7,7 +7,7 @@ import numpy as np
 from inputdesign_cli.tasks.build.columns import time_unit_of
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.naming import time_columns
-from inputdesign_cli.tasks.build.tables import column_named
+from inputdesign_cli.questions.building.tables import column_named
 
 # In steps of time: shifts below the first are none, and shifts that vary by less than the second are one.
 _NONE, _CONSTANT = 0.01, 0.1

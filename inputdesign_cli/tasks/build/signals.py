@@ -25,7 +25,7 @@ from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.sheet import elsewhere
 from inputdesign_cli.tasks.build.other_times import shifted_times
 from inputdesign_cli.tasks.build.preparation import MOST_JITTER, Preparation
-from inputdesign_cli.tasks.build.tables import column_named, columns_of
+from inputdesign_cli.questions.building.tables import column_named, columns_of
 from inputdesign_cli.tasks.build.without import left_out
 
 # Steps of time differ from a round number by less than this share of it by rounding alone.

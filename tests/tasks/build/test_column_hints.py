@@ -10,7 +10,7 @@ from inputdesign_cli.cli.data import named
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.questions.building.tables import read_columns
 
 N = 40
 U, Y = np.random.default_rng(0).standard_normal((2, N))

@@ -9,7 +9,7 @@ import pytest
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.columns import time_unit_of
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.tables import read_columns, read_header, read_samples, time_columns
+from inputdesign_cli.questions.building.tables import read_columns, read_header, read_samples, time_columns
 
 
 def refused(path, wanted=None):

@@ -11,7 +11,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import isolated, read_sheet
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import columns_of, read_columns
+from inputdesign_cli.questions.building.tables import columns_of, read_columns
 from tests.support.logs import ROWS, TIME, U, Y, iddata, save
 
 

@@ -9,7 +9,7 @@ from inputdesign_cli.tasks.build.data import read_data
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import columns_of, read_columns
+from inputdesign_cli.questions.building.tables import columns_of, read_columns
 from tests.support.logs import TIME, U, Y
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.tables import columns_of, read_columns
+from inputdesign_cli.questions.building.tables import columns_of, read_columns
 
 SCRIPTS = ["\u0660", "\u06f0", "\u0966", "\uff10", "\U0001d7ce"]  # zeros; their digits follow them
 

@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.tables import columns_of, read_columns
+from inputdesign_cli.questions.building.tables import columns_of, read_columns
 from tests.support.logs import TIME, U, Y, table
 
 TEXTS = {

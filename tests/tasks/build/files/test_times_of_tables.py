@@ -7,7 +7,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import columns_of
+from inputdesign_cli.questions.building.tables import columns_of
 
 pandas = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")

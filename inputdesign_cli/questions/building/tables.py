@@ -17,7 +17,7 @@ from inputdesign_cli.tasks.build.files.dates import AS_DATES
 from inputdesign_cli.tasks.build.files.layout import BLANK, LEFT_OUT
 from inputdesign_cli.tasks.build.files.naming import named_columns, time_columns
 from inputdesign_cli.tasks.build.files.sheet import Column
-from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.questions.building.header import build_units
 
 Array = NDArray[np.float64]
 
