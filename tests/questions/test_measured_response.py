@@ -11,7 +11,7 @@ from inputdesign_cli.identification.periodic_response import periodic_response
 from inputdesign_cli.questions.frequency_response.build import build_measurement
 from inputdesign_cli.questions.frequency_response.measure import _judged, _silent
 from inputdesign_cli.questions.frequency_response.silent_lines import silent_notes
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 
 TEXT = """
 plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
@@ -47,7 +47,7 @@ def table(u, y):
 
 def data_of(u, y):
     time = np.arange(float(len(u)))
-    return Data(u=u, y=y, r=None, time=time, lengths=(len(u),), files=(), notes=())
+    return Record(u=u, y=y, r=None, time=time, lengths=(len(u),), files=())
 
 
 @pytest.mark.parametrize("text", [TEXT, TWO], ids=["one input", "two inputs"])

@@ -13,7 +13,7 @@ from inputdesign_cli.identification.spikes import Spikes
 from inputdesign_cli.outcome.results import Array
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.frequency_response.silent_lines import MATTERS, Distorted
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def drift_told(units: Units, drift: PeriodDrift, moved: Array, w: Array, *, line
     ), moved
 
 
-def spikes_told(units: Units, found: Sequence[Spikes], data: Data, periods: int) -> tuple[str, ...]:
+def spikes_told(units: Units, found: Sequence[Spikes], data: Record, periods: int) -> tuple[str, ...]:
     """A sentence for every output of which a few samples decide how the periods differ.
 
     Args:

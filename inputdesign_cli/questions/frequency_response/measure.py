@@ -44,8 +44,7 @@ from inputdesign_cli.questions.frequency_response.measured import (
 from inputdesign_cli.questions.frequency_response.silent_lines import Distorted, distorted
 from inputdesign_cli.questions.frequency_response.solve import ResponseTask
 from inputdesign_cli.questions.frequency_response.whole_periods import left_out, whole_periods
-from inputdesign_cli.tasks.build.data import Data, read_data
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, Record, read_data
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
@@ -110,7 +109,7 @@ def measure(
         judged = replace(judged, doubts=doubts)
         lacking = [f"{missing}: {REMEDY}"] if missing else []
         told = [*lacking, *left_out(data, periods), *_unlike(judged)]
-        data = replace(data, notes=(*data.notes, *told))
+        data = replace(data, remarks=(*data.remarks, *told))
     shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
     results = measured_results(
         question.header, found, shown, judged, silent, data, time.perf_counter() - started, assess=assess
@@ -132,7 +131,7 @@ def _doubted(
     question: Measurement,
     task: ResponseTask,
     found: PeriodicResponse,
-    data: Data,
+    data: Record,
     judged: Judged,
     repeats: int,
 ) -> tuple[dict[str, SilentLines], Doubts]:
@@ -183,7 +182,7 @@ def _noise_at_rest(model: Model, task: ResponseTask, judged: Judged) -> Array:
 def _judged(
     task: ResponseTask,
     found: PeriodicResponse,
-    data: Data,
+    data: Record,
     periods: Periods,
     repeats: int,
     excited: NDArray[np.bool_],
@@ -251,7 +250,7 @@ def _averaged(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     return np.asarray((sums[first + window] - sums[first]) / window)
 
 
-def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> dict[str, SilentLines]:
+def _silent(task: ResponseTask, data: Record, periods: Periods, repeats: int) -> dict[str, SilentLines]:
     """What the outputs have at lines of the design that are not excited, odd and even."""
     found = {}
     for kind, harmonics in (("odd", task.grid.odd), ("even", task.grid.even)):
@@ -267,7 +266,7 @@ def _distorted(
     model: Model,
     task: ResponseTask,
     found: PeriodicResponse,
-    data: Data,
+    data: Record,
     judged: Judged,
     silent: Mapping[str, SilentLines],
 ) -> Distorted | None:

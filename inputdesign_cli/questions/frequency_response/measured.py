@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,9 +19,9 @@ from inputdesign_cli.outcome.results import Array, Json, Results, Table, typed
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.frequency_response.doubts import Doubts, bent_told
 from inputdesign_cli.questions.frequency_response.silent_lines import Distorted, silent_entry, silent_notes
+from inputdesign_cli.records import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
-from inputdesign_cli.tasks.build.data import Data
 
 Verdict = Literal["met", "missed", "undecided"]
 REMEDY = "apply the signal.csv of the spec, and record u as it was applied; or is this the record of another?"
@@ -90,7 +90,7 @@ def measured_results(
     shown: tuple[Table, ResponseCurves, MeasuredLines],
     judged: Judged | None,
     silent: Mapping[str, SilentLines],
-    data: Data,
+    data: Record,
     seconds: float,
     *,
     assess: bool,
@@ -144,7 +144,8 @@ def measured_results(
         notes += assessment.get("undecided", [])
     result |= {"notes": notes} if notes else {}
     result["timing_s"] = {"measurement": seconds}
-    return Results(typed(result), header.resolved_spec, units.time_unit, tables, drawn)
+    outcome = replace(typed(result), findings=data.findings or None)
+    return Results(outcome, header.resolved_spec, units.time_unit, tables, drawn)
 
 
 def _deviations(

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 
 
-def whole_periods(stated: Periods, data: Data, name: str, step: float) -> tuple[Data, Periods, int]:
+def whole_periods(stated: Periods, data: Record, name: str, step: float) -> tuple[Record, Periods, int]:
     """The data that count, how they repeat, and how many records of equal length there are.
 
     Records of equal length stay as they are. Of pieces between gaps, and of records of several lengths, the
@@ -44,7 +44,7 @@ def whole_periods(stated: Periods, data: Data, name: str, step: float) -> tuple[
     )
 
 
-def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> tuple[Data, Periods, int]:
+def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> tuple[Record, Periods, int]:
     """One record of the periods without a gap."""
     period, places = stated.period, _places(data, step)
     transient = stated.skip * period
@@ -60,27 +60,15 @@ def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> tuple[D
         taken = begins[places[begins] % period == phase]
     _check(taken.size, taken.size, stated, name)
     samples = (taken[:, None] + np.arange(period)).ravel()
-    ends = np.cumsum([count for _, count in data.files])
-    counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=ends.size)
     note = (
         f"the data have {len(data.lengths)} pieces without gaps: the {taken.size} whole periods of {period} "
         "samples in them count, after the transient"
     )
-    kept = replace(
-        data,
-        u=data.u[samples],
-        y=data.y[samples],
-        r=None if data.r is None else data.r[samples],
-        time=data.time[samples],
-        lengths=(len(samples),),
-        files=tuple((file, int(count)) for (file, _), count in zip(data.files, counts, strict=True)),
-        notes=(*data.notes, note),
-        recorded=None if data.recorded is None else data.recorded.at(samples),
-    )
-    return kept, replace(stated, skip=0), 1
+    kept = data.at(samples, (len(samples),))
+    return replace(kept, remarks=(*data.remarks, note)), replace(stated, skip=0), 1
 
 
-def _places(data: Data, step: float) -> NDArray[np.int64]:
+def _places(data: Record, step: float) -> NDArray[np.int64]:
     """(N,): how many samples after the begin of its file each one was taken."""
     ends = np.cumsum([count for _, count in data.files])[:-1]
     return np.concatenate([np.round((part - part[0]) / step) for part in np.split(data.time, ends)]).astype(
@@ -103,7 +91,7 @@ def _check(each: int, together: int, stated: Periods, name: str) -> None:
         )
 
 
-def left_out(data: Data, periods: Periods) -> Iterator[str]:
+def left_out(data: Record, periods: Periods) -> Iterator[str]:
     """A sentence on samples before the first whole period."""
     samples = data.lengths[0]
     left = samples - periods.each(samples) * periods.blocks * periods.period
