@@ -27,9 +27,8 @@ from inputdesign_cli.explore.division import divided
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions import explore
+from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec
-from inputdesign_cli.tasks.build.log import read_log
-from inputdesign_cli.tasks.build.preparation import Preparation
 
 DATA = Path(__file__).parents[1] / "docs" / "data"
 HIGHEST = 8

@@ -18,8 +18,7 @@ import scipy.signal
 
 from inputdesign_cli.explore import explore_records
 from inputdesign_cli.questions.exploration.beside_shifts import explored_beside_shifts
-from inputdesign_cli.tasks.build.log import read_log
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, read_log
 
 _BANDWIDTH = 0.7  # of the static gain
 

@@ -6,11 +6,13 @@ and exit code follow from the severities, here and nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Literal
+
+import numpy as np
 
 CAUSES = ("unsettled", "contradicted", "unasked", "undetermined", "spikes", "drift", "nonlinearity", "chance")
 """Why nothing is decided: the search, the data, the question at the estimate, other explanations; of a
@@ -119,3 +121,12 @@ def undecided(findings: Iterable[Finding]) -> bool:
 def trusted(findings: Iterable[Finding]) -> bool:
     """Return whether nothing found speaks against trusting a model."""
     return not any(one.severity is not Severity.NOTE for one in findings)
+
+
+def listed(rows: Sequence[int] | np.ndarray, word: str = "row", shown: int = 5) -> str:
+    """Return numbers of rows, in rising order, for a message: `row 5`, `rows 5 to 9, 12, ..`."""
+    numbers = np.asarray(rows, dtype=np.int64)
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    parts = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs[:shown]]
+    more = ", .." if len(runs) > shown else ""
+    return f"{word}{'s' * (len(numbers) > 1)} {', '.join(parts)}{more}"

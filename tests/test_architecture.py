@@ -20,7 +20,7 @@ ORDER = [
     {"outcome"},
     {"monte_carlo"},
     {"findings"},
-    {"tasks"},
+    {"records"},
     {"questions"},
     {"sweeps", "figures", "wizard"},
     {"report"},
@@ -164,7 +164,7 @@ def builds(path: Path) -> bool:
     """Whether a file turns parts of a spec into objects: `building/`, and `build*.py` of a question."""
     inside = path.relative_to(ROOT).as_posix()
     of_question = inside.startswith("questions/") and path.name.startswith("build")
-    return of_question or inside.startswith(("questions/building/", "tasks/build/"))
+    return of_question or inside.startswith("questions/building/")
 
 
 def named_in(annotation: ast.expr | None) -> set[str]:

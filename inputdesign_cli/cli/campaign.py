@@ -9,10 +9,11 @@ from typing import Annotated
 import typer
 
 from inputdesign_cli.cli.computing import computing
-from inputdesign_cli.cli.data import levels, named
+from inputdesign_cli.cli.data import levels, named, written
 from inputdesign_cli.cli.options import (
     Columns,
     Confine,
+    Decimal,
     Figures,
     Json,
     OperatingPoint,
@@ -20,7 +21,9 @@ from inputdesign_cli.cli.options import (
     Overrides,
     Overwrite,
     Quiet,
+    Separator,
     SpecFile,
+    TimeFormat,
 )
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep, renew
@@ -89,6 +92,9 @@ def proceed(
     regardless: Regardless = False,
     columns: Columns = "",
     operating_point: OperatingPoint = "",
+    separator: Separator = None,
+    decimal: Decimal = None,
+    time_format: TimeFormat = None,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -109,8 +115,8 @@ def proceed(
         from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
         from inputdesign_cli.questions.campaign.pictures import with_earlier_pictures
+        from inputdesign_cli.records import Preparation
         from inputdesign_cli.specification import parse_spec
-        from inputdesign_cli.tasks.build.preparation import Preparation
 
     with held(directory):
         with computing(directory, quiet=quiet):
@@ -126,6 +132,7 @@ def proceed(
                 taken = Preparation(
                     columns=named(columns, "--columns", "u1=Heater 1,y1=4"), operating_point=point
                 )
+                taken = written(taken, separator, decimal, time_format)
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
             if not figures:

@@ -6,6 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ from inputdesign_cli.cli.options import (
     Columns,
     Confine,
     DataFiles,
+    Decimal,
     DetrendWord,
     EstimateOutput,
     FigureFormat,
@@ -29,9 +31,11 @@ from inputdesign_cli.cli.options import (
     Quiet,
     Resample,
     SampleTime,
+    Separator,
     Skip,
     Span,
     SpecFile,
+    TimeFormat,
     TimeUnit,
     VerdictOutput,
     Without,
@@ -41,7 +45,7 @@ from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 
 if TYPE_CHECKING:
-    from inputdesign_cli.tasks.build.preparation import Preparation, Run
+    from inputdesign_cli.records import Preparation, Run
 
 _ROWS = re.compile(r"(?:(.+):)?\s*((\d+)(?:\s*-\s*(\d+))?)\s*", re.DOTALL)
 _CHANNEL = re.compile(r"[uyr]([1-9]\d*)?|time", re.ASCII)
@@ -68,6 +72,9 @@ def identify(
     skip: Skip = 0,
     span: Span = "",
     without: Without = None,
+    separator: Separator = None,
+    decimal: Decimal = None,
+    time_format: TimeFormat = None,
     frequency_response: Annotated[
         bool,
         typer.Option(
@@ -104,8 +111,11 @@ def identify(
             data,
             remove_means=remove_means,
             operating_point=levels(operating_point),
-            preparation=preparation(
-                columns, sample_time, time_unit, resample, detrend, skip, span, without, data
+            preparation=written(
+                preparation(columns, sample_time, time_unit, resample, detrend, skip, span, without, data),
+                separator,
+                decimal,
+                time_format,
             ),
             frequency_response=frequency_response,
         )
@@ -130,6 +140,9 @@ def assess(
     skip: Skip = 0,
     span: Span = "",
     without: Without = None,
+    separator: Separator = None,
+    decimal: Decimal = None,
+    time_format: TimeFormat = None,
     figures: Figures = True,
     figure_format: FigureFormat = "png",
     json_output: Json = False,
@@ -155,8 +168,11 @@ def assess(
             data,
             remove_means=remove_means,
             operating_point=levels(operating_point),
-            preparation=preparation(
-                columns, sample_time, time_unit, resample, detrend, skip, span, without, data
+            preparation=written(
+                preparation(columns, sample_time, time_unit, resample, detrend, skip, span, without, data),
+                separator,
+                decimal,
+                time_format,
             ),
         )
     keep(
@@ -229,8 +245,8 @@ def preparation(
     Raises:
         typer.BadParameter: One of them cannot be read.
     """
-    from inputdesign_cli.tasks.build.columns import TIME_UNITS
-    from inputdesign_cli.tasks.build.preparation import DETRENDS, Preparation
+    from inputdesign_cli.records import DETRENDS, Preparation
+    from inputdesign_cli.records.naming import TIME_UNITS
 
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise typer.BadParameter("it is a positive number", param_hint="--sample-time")
@@ -246,6 +262,27 @@ def preparation(
         span=_limits(span) if span else None,
         without=tuple(run for text in without or () for run in _runs(text, data)),
     )
+
+
+def written(
+    taken: Preparation, separator: str | None, decimal: str | None, time_format: str | None
+) -> Preparation:
+    """Return the preparation of files that are written as the options say.
+
+    Raises:
+        typer.BadParameter: One of them cannot be read.
+    """
+    if separator is not None and not (separator in ("tab", "\\t", "blank") or len(separator) == 1):
+        raise typer.BadParameter("it is one character, or tab, or blank", param_hint="--sep")
+    if separator is not None and (separator.isalnum() or separator in "\"'+-\r\n") and len(separator) == 1:
+        raise typer.BadParameter("it is a mark that numbers do not have", param_hint="--sep")
+    if decimal is not None and decimal not in (".", ","):
+        raise typer.BadParameter("it is . or ,", param_hint="--decimal")
+    if decimal is not None and decimal == separator:
+        raise typer.BadParameter("it is the mark that separates columns, too", param_hint="--decimal")
+    if time_format is not None and "%" not in time_format:
+        raise typer.BadParameter("write it as in %d.%m.%Y %H:%M:%S", param_hint="--time-format")
+    return replace(taken, separator=separator, decimal=decimal, time_format=time_format)
 
 
 def _runs(text: str, data: Sequence[Path]) -> Iterator[Run]:

@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from inputdesign_cli.cli.computing import computing
-from inputdesign_cli.cli.data import preparation
+from inputdesign_cli.cli.data import preparation, written
 from inputdesign_cli.cli.options import (
     Columns,
     DataFiles,
+    Decimal,
     DetrendWord,
     ExplorationOutput,
     FigureFormat,
@@ -22,8 +23,10 @@ from inputdesign_cli.cli.options import (
     Quiet,
     Resample,
     SampleTime,
+    Separator,
     Skip,
     Span,
+    TimeFormat,
     TimeUnit,
     Without,
 )
@@ -46,6 +49,9 @@ def explore(
     skip: Skip = 0,
     span: Span = "",
     without: Without = None,
+    separator: Separator = None,
+    decimal: Decimal = None,
+    time_format: TimeFormat = None,
     output: ExplorationOutput = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
@@ -67,6 +73,7 @@ def explore(
         from inputdesign_cli import questions
 
         prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span, without, data)
+        prepared = written(prepared, separator, decimal, time_format)
         model = None if validate is None else read_spec(validate, None, None, design=False)
         place = place.checked(model)
         found = questions.explore(data, prepared, model=model)

@@ -85,7 +85,7 @@ Resample = Annotated[
     bool,
     typer.Option(
         "--resample",
-        help="Even out times that jitter by more than 10 % of the sample time, too; join columns that were "
+        help="Even out times that jitter by more than 25 % of the sample time, too; join columns that were "
         "written at different times.",
     ),
 ]
@@ -106,6 +106,25 @@ Without = Annotated[
         metavar="ROWS",
         help="Leave out these rows, as notes number them, such as 183-240,310; the record is cut there. Of "
         "several files: log1.csv:183-240. Repeatable.",
+    ),
+]
+Separator = Annotated[
+    str | None,
+    typer.Option(
+        "--sep",
+        metavar="MARK",
+        help="What separates the columns of a text file: , ; tab blank or another mark.",
+    ),
+]
+Decimal = Annotated[
+    str | None, typer.Option("--decimal", metavar="MARK", help="The decimal mark of the file: . or ,")
+]
+TimeFormat = Annotated[
+    str | None,
+    typer.Option(
+        "--time-format",
+        metavar="FORM",
+        help="How dates and times are written, as %d.%m.%Y %H:%M:%S or %Y%m%d%H%M%S.",
     ),
 ]
 Overrides = Annotated[

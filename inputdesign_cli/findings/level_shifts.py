@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.finding import Finding, FindingKind, Severity
-from inputdesign_cli.findings.places import Logged, Samples, file_of, of_file, without_option
+from inputdesign_cli.findings.places import Samples, file_of, of_file, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.shares import chance
@@ -41,14 +41,17 @@ def shifted_levels(estimate: Estimate, data: Samples, time_unit: str) -> list[Fi
     ]
 
 
-def left_out(log: Logged, shifts: Sequence[LevelShift], samples: NDArray[np.int64], *, short: int) -> str:
+def left_out(
+    log: Samples, shifts: Sequence[LevelShift], samples: NDArray[np.int64], time_unit: str, *, short: int
+) -> str:
     """Return the step of preparation that leaves shifts out of a log.
 
     Args:
         samples: where the samples that the shifts count stand in the log.
         short: how many samples went with them, since what stood beside them was too short.
     """
-    what, runs = _described(shifts, log, log.recorded.rows, samples, log.time_unit)
+    rows = np.arange(len(log.y)) if log.recorded is None else log.recorded.rows
+    what, runs = _described(shifts, log, rows, samples, time_unit)
     listed = " and ".join(f"{first} to {last}{f' of {name}' if name else ''}" for name, first, last in runs)
     besides = f", with {short} samples beside them that are too few for a segment" if short else ""
     return (

@@ -140,17 +140,17 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
 
 
 def repetitions(
-    estimate: Estimate, files: Sequence[tuple[str, int]], copies: Iterable[str] = ()
+    estimate: Estimate, files: Sequence[tuple[str, int]], copies: Iterable[Finding] = ()
 ) -> list[Finding]:
     """Return a finding where samples seem to be given twice.
 
     Args:
         files: names and samples, if known.
-        copies: sentences on files that have samples in common.
+        copies: findings of files that have samples in common.
     """
     repeated = estimate.repeated
     if repeated is None:
-        return [SAMPLES_REPEATED.found(one) for one in copies]
+        return list(copies)
     files = files or [("the record", repeated.second + repeated.length)]
     ends = np.cumsum([samples for _, samples in files])
     # By their middle: the ends are not sharp.

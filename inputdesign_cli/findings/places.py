@@ -65,18 +65,6 @@ class Samples(Protocol):
         """What is known of the files."""
 
 
-class Logged(Samples, Protocol):
-    """Records of a log, whose rows and unit of time are known."""
-
-    @property
-    def time_unit(self) -> str:
-        """The unit of its times."""
-
-    @property
-    def recorded(self) -> Recorded:
-        """The outputs as they stand in the files."""
-
-
 def file_of(files: Sequence[tuple[str, int]], at: int) -> str:
     """Return the file of a sample, empty where there is one alone; `files` are names and samples."""
     ends = np.cumsum([samples for _, samples in files])

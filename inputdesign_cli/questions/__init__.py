@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from inputdesign_cli.questions.assessment.assess import Assessment
     from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
     from inputdesign_cli.questions.exploration.explore import Exploration
-    from inputdesign_cli.tasks.build.preparation import Preparation
+    from inputdesign_cli.records import Preparation
 
 Files = str | Path | Sequence[str | Path]
 
@@ -197,10 +197,10 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
         DataError: the log cannot be used, or tells no model at all.
         InaccurateError: the numbers of the log leave the range of double precision.
     """
+    from inputdesign_cli.questions.building.header import build_header
     from inputdesign_cli.questions.exploration.build import model_to_judge, naming_model
     from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
-    from inputdesign_cli.tasks.build.header import build_header
-    from inputdesign_cli.tasks.build.preparation import Preparation
+    from inputdesign_cli.records import Preparation
 
     prepared = preparation or Preparation()
     if model is None:
@@ -244,7 +244,7 @@ def _paths(data: Files) -> list[Path]:
 def _prepared(
     preparation: Preparation | None, operating_point: Mapping[str, float] | None, remove_means: bool
 ) -> Preparation:
-    from inputdesign_cli.tasks.build.preparation import Preparation
+    from inputdesign_cli.records import Preparation
 
     given = preparation or Preparation()
     point = {**given.operating_point, **(operating_point or {})}

@@ -191,7 +191,7 @@ def _at_rest(path: Path, step: float) -> tuple[float, float, str]:
     Rows that are farther apart than samples, or nearer, tell of noise with one pole: its correlation fades
     by the same factor in the same time.
     """
-    from inputdesign_cli.tasks.build.tables import read_samples
+    from inputdesign_cli.questions.building.tables import read_samples
 
     file_of("noise", path)
     with in_their_words({}, "noise"):
@@ -218,13 +218,14 @@ def _at_rest(path: Path, step: float) -> tuple[float, float, str]:
 
 def _seconds_apart(path: Path) -> float | None:
     """The time between the rows of a file, where a column tells it."""
-    from inputdesign_cli.tasks.build.columns import time_unit_in
-    from inputdesign_cli.tasks.build.files import read_sheet
-    from inputdesign_cli.tasks.build.tables import column_named, columns_of, time_columns
+    from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.columns import column_named, columns_of
+    from inputdesign_cli.records.naming import time_columns
+    from inputdesign_cli.records.signals import time_unit_in
 
     sheet = read_sheet(path, key="noise")
     for name in time_columns(sheet)[:1]:
-        unit = "s" if column_named(sheet, name).dated else time_unit_in(sheet, name) or "s"
+        unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
         apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"])))
         return seconds(f"{apart!r} {unit}", "noise") if apart > 0.0 else None
     return None

@@ -147,7 +147,7 @@ def _of_numbers(text: str) -> PlantAnswer:
 def _stepped(path: Path, stem: str) -> PlantAnswer:
     """Gain, time constant and dead time estimated from a record that begins at rest."""
     from inputdesign_cli import parse_spec, questions
-    from inputdesign_cli.tasks.build.tables import read_columns
+    from inputdesign_cli.questions.building.tables import read_columns
 
     found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
     t, u, y = found["time"], found["u"], found["y"]

@@ -16,7 +16,7 @@ from inputdesign_cli.questions.campaign.plans import ratio_of, standing
 from inputdesign_cli.questions.campaign.rounds import continued
 from inputdesign_cli.questions.campaign.schedule import Schedule, Standing
 from inputdesign_cli.questions.campaign.study import ways_of
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 from tests.support.campaigns import SPEC, planner, record
 
 
@@ -200,7 +200,7 @@ def test_records_whose_times_go_on_are_one():
     units = Units("s", 0.5, True, False, 1, 1)
     times = np.concatenate([0.5 * np.arange(4), 0.5 * np.arange(4, 7), 0.5 * np.arange(3)])
     signal = np.zeros((10, 1))
-    data = Data(signal, signal, None, times, (4, 3, 3), (("a", 4), ("b", 3), ("c", 3)), ())
+    data = Record(signal, signal, None, times, (4, 3, 3), (("a", 4), ("b", 3), ("c", 3)))
     assert continued(data, units.sample_time).lengths == (7, 3)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, questions
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation
 
 SPEC = "plant: {B: [0, 0.3], F: [1, -0.7]}\nnoise: {C: [1, 0.4], variance: 0.01}\n"
 

@@ -15,9 +15,8 @@ from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.questions import explore, identify, solve
+from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
-from inputdesign_cli.tasks.build.log import read_log
-from inputdesign_cli.tasks.build.preparation import Preparation
 from tests.support.logs import lag_log
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
@@ -238,9 +237,9 @@ def test_many_spikes_are_told(tmp_path):
     for row in rng.choice(np.arange(5, 395, 6), 32, replace=False):
         time, u, y = lines[row].split(",")
         lines[row] = f"{time},{u},{float(y) + 15.0}"
-    assert not any("spikes" in step for step in read_log(path, Preparation()).steps)
+    assert not any("spikes" in step for step in read_log(path, Preparation()).notes)
     path.write_text("\n".join(lines))
-    (told,) = [step for step in read_log(path, Preparation()).steps if "spikes" in step]
+    (told,) = [step for step in read_log(path, Preparation()).notes if "spikes" in step]
     assert told.startswith("y has 32 values (8 %) far from their neighbours")
 
 

@@ -5,8 +5,7 @@ import pytest
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.questions import explore
-from inputdesign_cli.tasks.build.log import read_log
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, read_log
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import assess, identify, parse_spec
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation
 from tests.questions.test_repeated_samples import SPEC, rows_of
 
 FIRST, LAST = 200, 259

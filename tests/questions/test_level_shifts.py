@@ -13,8 +13,7 @@ from inputdesign_cli.identification import LevelShift
 from inputdesign_cli.identification.adequacy import ScoreTest
 from inputdesign_cli.questions import explore
 from inputdesign_cli.questions.exploration import beside_shifts
-from inputdesign_cli.tasks.build.log import read_log
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, read_log
 
 K, T = 2.0, 12.0
 SPEC = f"""
@@ -148,6 +147,6 @@ def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths):
     rest, found = beside_shifts.explored_beside_shifts(log, loop=False)
     assert rest.lengths == lengths
     assert found is answers[-1]
-    told = " ".join(rest.steps)
+    told = " ".join(rest.notes)
     assert bool(shifts_in([told])) == (rest.lengths != (100,))
     assert ("too few for a segment" in told) == (len(answers[0].estimate.shifted) == 2 and lengths[0] == 49)

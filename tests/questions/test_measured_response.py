@@ -12,7 +12,7 @@ from inputdesign_cli.identification.periodic_response import periodic_response
 from inputdesign_cli.questions.frequency_response.build import build_measurement
 from inputdesign_cli.questions.frequency_response.measure import judge_lines, silent_of
 from inputdesign_cli.questions.frequency_response.whole_periods import Counted
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 
 TEXT = """
 plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
@@ -52,7 +52,7 @@ def table(u, y):
 
 def data_of(u, y):
     time = np.arange(float(len(u)))
-    return Data(u=u, y=y, r=None, time=time, lengths=(len(u),), files=(), notes=())
+    return Record(u=u, y=y, r=None, time=time, lengths=(len(u),), files=())
 
 
 @pytest.mark.parametrize("text", [TEXT, TWO], ids=["one input", "two inputs"])

@@ -6,9 +6,9 @@ import scipy.signal
 
 from inputdesign_cli import assess, parse_spec
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.copied_samples import shared
 from inputdesign_cli.questions import explore
-from inputdesign_cli.tasks.build.copies import shared
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation
 
 SPEC = """
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -83,7 +83,7 @@ def test_a_part_with_empty_cells_leaves_the_verdict_open(saved):
     second[200:400] = with_empty_cells(first, 25)[100:300]
     found = assess(parse_spec(SPEC), [saved("a.csv", first), saved("b.csv", second)])
     assert found.verdict == "undecided"
-    (told, *_) = [r for r in found.results.result["assessment"]["undecided"] if "stand in a.csv too" in r]
+    (told, *_) = [r for r in found.results.result["assessment"]["undecided"] if "stand in a.csv as well" in r]
     assert told.startswith("192 of 492 samples of b.csv")
 
 

@@ -6,7 +6,7 @@ import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.questions.frequency_response.build import build_measurement
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation
 
 TEXT = """
 plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}

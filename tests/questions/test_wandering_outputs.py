@@ -5,8 +5,8 @@ import pytest
 
 from inputdesign_cli.questions import explore, solve
 from inputdesign_cli.questions.exploration.build import _inside
+from inputdesign_cli.records import Preparation
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.preparation import Preparation
 from tests.explore.test_integrated import GAIN, LAG, LATE, lagged, steps, walk
 
 

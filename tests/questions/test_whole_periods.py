@@ -11,7 +11,7 @@ from inputdesign_cli import identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.questions.frequency_response.whole_periods import whole_periods
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 
 PERIOD = 20
 
@@ -22,7 +22,7 @@ def record(pieces, *, step=1.0, files=1):
     lengths = tuple(last - first for first, last in pieces) * files
     named = tuple((f"{i}.csv", len(at) // files) for i in range(files))
     u = at[:, None].astype(float)
-    return Data(u=u, y=u**2, r=None, time=7.0 + step * at, lengths=lengths, files=named, notes=())
+    return Record(u=u, y=u**2, r=None, time=7.0 + step * at, lengths=lengths, files=named)
 
 
 def most_by_trial(pieces, skip):

@@ -40,7 +40,7 @@ from inputdesign_cli.questions.assessment.identify import (
 )
 from inputdesign_cli.questions.assessment.responses import response_of_data
 from inputdesign_cli.questions.least_cost.outcome import requirement_entry
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.

@@ -14,6 +14,7 @@ from inputdesign_cli.identification import Earlier
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
+from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.knowledge import (
     build_foreseen,
     build_knowledge,
@@ -32,7 +33,6 @@ from inputdesign_cli.questions.building.system import build_experiment, build_mo
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.header import build_header
 
 
 def build_identification(spec: Spec) -> Identification:

@@ -14,8 +14,8 @@ from inputdesign_cli.outcome.estimate import PriorAgreement, Test
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
+from inputdesign_cli.records import Preparation
 from inputdesign_cli.specification import is_prior
-from inputdesign_cli.tasks.build.preparation import Preparation
 
 
 def identification_entry(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
 from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.errors import DataError, IdesignError
+from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, Location, SpecError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.estimates import band_limited, near_zero, on_the_circle, started, unasked
 from inputdesign_cli.findings.faults import faults, loop_faults
@@ -33,8 +34,7 @@ from inputdesign_cli.questions.assessment.estimate_curves import bound_of_data, 
 from inputdesign_cli.questions.assessment.estimates import identification_entry, information_entry, model_text
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge, that_agrees
-from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, Record, read_data
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Identified:
 
     estimate: Estimate
     model: Model
-    data: Data
+    data: Record
     preparation: Preparation
     question: ModelQuestion | None
     unasked: str = ""
@@ -132,7 +132,7 @@ def identified(task: Identification, paths: Sequence[Path], preparation: Prepara
     return estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
 
 
-def estimated(task: Identification, data: Data, first: Path, taken: Preparation) -> Identified:
+def estimated(task: Identification, data: Record, first: Path, taken: Preparation) -> Identified:
     """The same from data that have been read.
 
     Args:
@@ -159,7 +159,7 @@ def estimated(task: Identification, data: Data, first: Path, taken: Preparation)
             ramp=data.lined,
         )
 
-    with blaming_columns(first):
+    with blaming_columns(first, data):
         likeliest = from_start(nominal.theta, False)
         estimate, ruled_out = that_agrees(task.knowledge, likeliest, partial(from_start, near=True))
     if task.earlier is not None and task.earlier.is_of_these_data(estimate.theta, estimate.factor):
@@ -248,6 +248,7 @@ def identification_results(task: Identification, found: Identified, began: float
         information=information_entry(estimate),
         model_error=bound,
         notes=found.data.notes or None,
+        findings=found.data.findings or None,
     ).saying(findings_of(task, found))
     outcome = replace(outcome, timing_s={"identification": time.perf_counter() - began})
     files = {"model.yaml": model_text(header.units, found.model, estimate).encode()}
@@ -262,3 +263,24 @@ def identify(task: Identification, paths: Sequence[Path], preparation: Preparati
     """
     began = time.perf_counter()
     return identification_results(task, identified(task, paths, preparation), began)
+
+
+@contextmanager
+def blaming_columns(path: Path, record: Record) -> Iterator[None]:
+    """Point at the column of the first file that an estimator objects to.
+
+    Raises:
+        DataError: in place of the estimator's `SpecError`.
+    """
+    try:
+        yield
+    except SpecError as error:
+        header = list(record.header)
+
+        def placed(diagnostic: Diagnostic) -> Diagnostic:
+            named = [name for name in header if name.startswith(diagnostic.key or "u")]
+            before = header[: header.index(named[0])] if named else []
+            column = 1 + sum(len(name) + 1 for name in before)
+            return replace(diagnostic, location=Location(str(path), 1, column, ",".join(header)))
+
+        raise DataError([placed(diagnostic) for diagnostic in error.diagnostics]) from error

@@ -6,9 +6,9 @@ import numpy as np
 
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.questions.building.for_nothing import ForNothing, counted_powers, told_for_nothing
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.common.reach import Reach
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.header import build_units
 
 # Of the band, what is left out beside each of the frequencies.
 _MARGIN = 0.01

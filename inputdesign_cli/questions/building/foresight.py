@@ -9,12 +9,12 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.knowledge import build_knowledge
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.prior import build_earlier
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.header import build_units
 
 # Filtered noise: power between the lines of a multisine, where whole periods of them differ.
 _ORDERS = (12, 60)

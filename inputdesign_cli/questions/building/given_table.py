@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
-from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
 
 _KEY = "spectrum.given.file"
 _NEGATIVE = -1e-9

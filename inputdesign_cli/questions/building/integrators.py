@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Experiment
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
@@ -17,7 +18,6 @@ from inputdesign_cli.specification.models.spectrum import (
     GivenSpectrum,
     MultisineSpectrum,
 )
-from inputdesign_cli.tasks.build.header import build_units
 
 # Poles so near to zero are poles there; those of gradients are of no higher order.
 _AT_ZERO, _HIGHEST = 1e-7, 8

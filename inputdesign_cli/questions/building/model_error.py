@@ -25,14 +25,14 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
 from inputdesign_cli.plant import Model, Rational, ScalarTransfer
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_loop
+from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.questions.building.tuning import loop_controller
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
 
 _KEY = "accuracy.model_error"
 _LOOP = "accuracy.loop"

@@ -13,6 +13,7 @@ from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import (
     build_model_errors,
     check_bounded,
@@ -23,7 +24,6 @@ from inputdesign_cli.questions.building.parameters import embedded
 from inputdesign_cli.questions.building.weights import build_weight, check_finite
 from inputdesign_cli.questions.common.within_limits import StatedBound
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.header import build_units
 
 _RELATIVE_ZERO = 1e-9
 

@@ -7,13 +7,13 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.questions.building.demand import check_record, longest_record
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest
 from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.units import SECONDS
-from inputdesign_cli.tasks.build.header import build_units
 
 # Shared by the inputs: each adds a period to a record, which varies the less and takes the longer.
 _CANDIDATES, _FEWEST = 20, 4

@@ -23,10 +23,12 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.demand import check_effects, check_model
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.integrators import on_finite_information
 from inputdesign_cli.questions.building.parameters import degrees_of, delays_of, reparametrised
 from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
 from inputdesign_cli.questions.building.state_space import state_space_model
+from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
@@ -40,8 +42,6 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
 )
 from inputdesign_cli.specification.models.values import depth
-from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import read_frequency_table, read_samples
 
 # Of pi/sample_time, where a band is proposed.
 _WITHIN = 0.95

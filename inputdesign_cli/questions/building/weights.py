@@ -6,9 +6,9 @@ import numpy as np
 
 from inputdesign_cli.arrays import ComplexArray
 from inputdesign_cli.plant import ContinuousRational, Rational, ScalarTransfer, zero_order_hold
+from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
-from inputdesign_cli.tasks.build.header import build_units
 
 # So near to the stability limit a root is on it; so near to an end of the band, as a share, within it.
 _ON_THE_LIMIT, _EDGE = 1e-9, 1e-9

@@ -31,8 +31,7 @@ from inputdesign_cli.questions.assessment.identify import (
 )
 from inputdesign_cli.questions.campaign.plans import Planner, standing
 from inputdesign_cli.questions.campaign.schedule import Planned, Rules, Standing
-from inputdesign_cli.tasks.build.data import Data, read_data
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, Record, read_data
 
 _ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided": "undecided"}
 # Data that say nothing yet; more of them will.
@@ -231,7 +230,7 @@ def _found(task: Rounds, records: Sequence[Path]) -> Identified:
     return estimated(identification, continued(data, step), records[0], taken)
 
 
-def continued(data: Data, step: float) -> Data:
+def continued(data: Record, step: float) -> Record:
     """Join files whose times continue the times of the file before into one record.
 
     Args:

@@ -12,13 +12,13 @@ import numpy as np
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.explore import Found, explore_records
 from inputdesign_cli.findings.level_shifts import left_out
-from inputdesign_cli.tasks.build.log import Log
+from inputdesign_cli.records import Record
 
 # Where more appear, once these are left out so often, the plant is another than any that is looked for.
 _MOST = 2
 
 
-def explored_beside_shifts(log: Log, *, loop: bool) -> tuple[Log, Found]:
+def explored_beside_shifts(log: Record, *, loop: bool) -> tuple[Record, Found]:
     """The model that a log speaks for, and the log without the samples in which outputs shift.
 
     Nothing is left out where the rest does not tell a model, and judge it.
@@ -30,7 +30,7 @@ def explored_beside_shifts(log: Log, *, loop: bool) -> tuple[Log, Found]:
         SpecError: see `explore_records`.
     """
 
-    def found_in(part: Log, *, unless_shifted: bool) -> Found:
+    def found_in(part: Record, *, unless_shifted: bool) -> Found:
         return explore_records(
             part.parts, feedback=loop, step=part.step, ramp=part.lined, unless_shifted=unless_shifted
         )
@@ -48,8 +48,9 @@ def explored_beside_shifts(log: Log, *, loop: bool) -> tuple[Log, Found]:
             break
         if another.split == "none" != found.split:
             break
-        told = left_out(rest, shifts, found.samples, short=len(rest.y) - len(less.y) - len(shifting))
-        rest, found = replace(less, steps=(*rest.steps, told)), another
+        short = len(rest.y) - len(less.y) - len(shifting)
+        told = left_out(rest, shifts, found.samples, rest.time_unit, short=short)
+        rest, found = replace(less, remarks=(*rest.remarks, told)), another
     else:
         if not found.estimate.shifted:
             return rest, found

@@ -19,8 +19,8 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.assessment.identify import Identification
 from inputdesign_cli.questions.building.system import build_model
+from inputdesign_cli.records import Record
 from inputdesign_cli.specification import Spec, parse_spec
-from inputdesign_cli.tasks.build.log import Log
 
 _MOST_SAMPLES = 100_000
 _DIGITS = 6
@@ -28,7 +28,7 @@ _DIGITS = 6
 _DOUBTED = '"On a model that deserves no trust: '
 
 
-def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
+def spec_text(log: Record, found: Found, sources: Sequence[Path]) -> str:
     """A spec that `idesign solve` accepts: the model, and the most informative input of that power."""
     power = [float(x) for x in np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)]
     most = max(power)

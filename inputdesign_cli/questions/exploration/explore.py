@@ -29,6 +29,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import (
     Identification,
     Identified,
+    blaming_columns,
     identification_results,
     told,
 )
@@ -45,10 +46,7 @@ from inputdesign_cli.questions.exploration.outcome import (
     without_drift,
 )
 from inputdesign_cli.questions.frequency_response.measured import silent_entry
-from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
-from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.log import Log, read_logs, with_channels
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, Record, read_data, read_logs, read_sheet, with_channels
 
 # Past inputs explain what a judged model leaves: by chance alone, so seldom.
 _SURELY = 1e-6
@@ -73,7 +71,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     log = read_logs(paths, preparation)
     loops = answers_output(log.parts)
     undriven = undriven_inputs(log)
-    with blaming_columns(paths[0]):
+    with blaming_columns(paths[0], log):
         try:
             log, found = explored_beside_shifts(log, loop=bool(loops))
         except SpecError as error:
@@ -85,16 +83,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
-    data = Data(
-        u,
-        y,
-        None,
-        log.time[found.samples],
-        lengths,
-        log.files_of(found.samples),
-        (),
-        recorded=log.recorded.at(found.samples),
-    )
+    own = log.at(found.samples, lengths)
+    data = replace(own, u=u, y=y, r=None, findings=(), remarks=(), means=None, repeated=(), lined=False)
     response = _without_model(task.header.units, log, found, loop=bool(loops))
     doubts = (
         *biasing(task.header.units, found.estimate, data, found.validation.simulation),
@@ -103,12 +93,10 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     doubtful = [one.message for one in doubts]
     reasons = distrusted(measured, found, undriven, doubtful, loop=bool(loops))
     heard = exploration_notes(log, found, loops)
-    notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
+    heard = [*log.remarks, *heard, *(f"no trust: {reason}" for reason in reasons)]
+    noted = replace(data, findings=log.findings, remarks=tuple(heard))
     identified = _asked(
-        task,
-        Identified(
-            found.estimate, found.model, replace(data, notes=notes), preparation, None, loop_told=bool(loops)
-        ),
+        task, Identified(found.estimate, found.model, noted, preparation, None, loop_told=bool(loops))
     )
     results = identification_results(task, identified, started)
     result = {
@@ -167,7 +155,7 @@ class _Response:
         )
 
 
-def _without_model(units: Units, log: Log, found: Found, *, loop: bool) -> _Response | None:
+def _without_model(units: Units, log: Record, found: Found, *, loop: bool) -> _Response | None:
     """The frequency response of the data alone, where it can be had.
 
     Args:
@@ -213,14 +201,15 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     """
     started = time.perf_counter()
     counts = {"u": header.units.inputs, "y": header.units.outputs}
+    sheet = read_sheet(paths[0], written=preparation.written)
     own = {
         name: column
-        for name, column in with_channels(read_sheet(paths[0], key=""), preparation.columns).items()
+        for name, column in with_channels(sheet, preparation.columns).items()
         if name in preparation.columns or int(name[1:]) <= counts[name[0]]
     }
     preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
-    with blaming_columns(paths[0]):
+    with blaming_columns(paths[0], data):
         check_varying((), data.u[:, :0], data.y)
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
@@ -236,8 +225,9 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         "notes": [*data.notes, *(f"no trust: {reason}" for reason in reasons)],
         "timing_s": {"validation": time.perf_counter() - started},
     }
+    outcome = replace(typed(result), findings=data.findings or None)
     return Exploration(
-        Results(typed(result), header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
+        Results(outcome, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
         reasons,
     )
 
@@ -261,7 +251,7 @@ def _too_little(found: Fits) -> tuple[str, ...]:
     return tuple(told)
 
 
-def _explained_by_inputs(found: Fits, data: Data) -> tuple[str, ...]:
+def _explained_by_inputs(found: Fits, data: Record) -> tuple[str, ...]:
     """Outputs of which a model that is judged explains less than half, where past inputs explain the rest.
 
     A poor fit alone is no fault of the model: the noise may be strong.

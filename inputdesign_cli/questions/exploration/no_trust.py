@@ -22,7 +22,7 @@ from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.questions.exploration.at_once import like_inverses
 from inputdesign_cli.questions.exploration.integrating import CONTROLLER, clock_of, like_integrators
 from inputdesign_cli.questions.exploration.unidentified import rivalled, unidentified
-from inputdesign_cli.tasks.build.log import Log
+from inputdesign_cli.records import Record
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
 
@@ -41,7 +41,7 @@ _KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residua
 
 
 def distrusted(
-    log: Log, found: Found, undriven: Sequence[str], doubts: Sequence[str], *, loop: bool
+    log: Record, found: Found, undriven: Sequence[str], doubts: Sequence[str], *, loop: bool
 ) -> tuple[str, ...]:
     """A sentence for every reason; none where a model deserves trust.
 
@@ -138,7 +138,7 @@ def _unrelated(found: Found) -> tuple[str, ...]:
     )
 
 
-def _interpolated(log: Log) -> tuple[str, ...]:
+def _interpolated(log: Record) -> tuple[str, ...]:
     """Outputs that a historian has drawn between the values that it keeps."""
     return tuple(
         f"{signal_name('y', i, log.y.shape[1])} is a straight line between some of its samples: it was "
@@ -148,7 +148,7 @@ def _interpolated(log: Log) -> tuple[str, ...]:
     )
 
 
-def _cycling(found: Found, log: Log) -> tuple[str, ...]:
+def _cycling(found: Found, log: Record) -> tuple[str, ...]:
     """Outputs that follow a cycle of their own."""
     estimate = found.estimate
     told = []
@@ -206,7 +206,7 @@ def _refuted(found: Found) -> tuple[str, ...]:
     )
 
 
-def _unstable(log: Log) -> tuple[str, ...]:
+def _unstable(log: Record) -> tuple[str, ...]:
     """Outputs of a plant that is unstable, and goes on only as it is in a loop."""
     outputs, told = log.y.shape[1], []
     clock = clock_of(log.step, log.time_unit)
@@ -226,7 +226,7 @@ def _unstable(log: Log) -> tuple[str, ...]:
     return tuple(told)
 
 
-def undriven_inputs(log: Log) -> tuple[str, ...]:
+def undriven_inputs(log: Record) -> tuple[str, ...]:
     """Inputs that only answer the outputs."""
     return tuple(
         f"{signal_name('u', j, log.u.shape[1])} follows from the outputs and its own past: data from a loop "

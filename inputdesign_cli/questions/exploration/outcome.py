@@ -14,8 +14,7 @@ from inputdesign_cli.outcome.results import Json, Table
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.exploration.unidentified import untold_parameters
-from inputdesign_cli.tasks.build.data import Data
-from inputdesign_cli.tasks.build.log import Log
+from inputdesign_cli.records import Record
 
 # An input that changes no more often excites little but its steps.
 _FEW_CHANGES = 10
@@ -34,7 +33,7 @@ def _finite(values: Sequence[float]) -> Json:
     return listed[0] if len(listed) == 1 else listed
 
 
-def without_drift(log: Log, found: Found) -> Log:
+def without_drift(log: Record, found: Found) -> Record:
     """The log without the lines that were found to be no work of the inputs, which its steps tell."""
     if found.slopes is None:
         return log
@@ -52,11 +51,11 @@ def without_drift(log: Log, found: Found) -> Log:
         if slope
     ]
     outputs = [y for _, y in levelled(log.parts, found.slopes)]
-    return replace(log, y=np.concatenate(outputs), steps=(*log.steps, *told))
+    return replace(log, y=np.concatenate(outputs), remarks=(*log.remarks, *told))
 
 
 def exploration_entry(
-    log: Log, found: Found, loops: Sequence[tuple[int, float]], reasons: Sequence[str]
+    log: Record, found: Found, loops: Sequence[tuple[int, float]], reasons: Sequence[str]
 ) -> dict[str, Json]:
     """`exploration` of `result.json`."""
     return {
@@ -65,7 +64,7 @@ def exploration_entry(
         "time_unit": log.time_unit,
         "samples": len(log.y),
         "segments": list(log.lengths),
-        "steps": list(log.steps),
+        "steps": list(log.notes),
         "split": found.split,
         "loop": [{"input": f"u{j + 1}", "probability": p} for j, p in loops],
         "outputs": [
@@ -107,7 +106,7 @@ def _structure(candidate: Candidate) -> dict[str, Json]:
     }
 
 
-def exploration_notes(log: Log, found: Found, loops: Sequence[tuple[int, float]]) -> list[str]:
+def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> list[str]:
     """What a user should know of the record and of how the model was chosen."""
     single, alone = found.model.outputs == 1, found.model.inputs == 1
     notes = []
@@ -177,7 +176,7 @@ def _beside_the_best(found: Found, chosen: Chosen, taken: Candidate) -> str:
     return f"of which the best simulates {judge} by {better:.2g} points better"
 
 
-def _least_moved(log: Log, found: Found) -> str:
+def _least_moved(log: Record, found: Found) -> str:
     """The input that changes in the fewest samples, of several, where these are few."""
     if len(found.moving) < 2:
         return ""
@@ -208,7 +207,7 @@ def structure_curves(found: Found) -> dict[str, Curves]:
     return curves
 
 
-def validation_curves(units: Units, data: Data, found: Fits) -> tuple[Table, FitCurves]:
+def validation_curves(units: Units, data: Record, found: Fits) -> tuple[Table, FitCurves]:
     """fit.csv with its figure: a given model against data. In the figure files follow each other."""
     u, y, lengths = data.u, data.y, data.lengths
     columns = {units.time_header: data.time}

@@ -12,11 +12,13 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.build import operating_point
+from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
 from inputdesign_cli.questions.building.model_error import positive_table
 from inputdesign_cli.questions.building.signal_settings import build_record_request
 from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.system import build_cost, build_model
+from inputdesign_cli.questions.building.tables import has_column
 from inputdesign_cli.questions.frequency_response.build_lines import (
     build_grid,
     build_periods,
@@ -28,8 +30,6 @@ from inputdesign_cli.questions.frequency_response.terms import KEY, ResponseTerm
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import GivenMultisine
-from inputdesign_cli.tasks.build.header import build_header, build_units
-from inputdesign_cli.tasks.build.tables import has_column
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12

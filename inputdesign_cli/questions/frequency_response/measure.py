@@ -40,8 +40,7 @@ from inputdesign_cli.questions.assessment.responses import response_of_data
 from inputdesign_cli.questions.frequency_response.measured import Judged, measured_results
 from inputdesign_cli.questions.frequency_response.terms import ResponseTerms
 from inputdesign_cli.questions.frequency_response.whole_periods import Counted, whole_periods
-from inputdesign_cli.tasks.build.data import Data, read_data
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.records import Preparation, Record, read_data
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
@@ -67,7 +66,7 @@ class Measurement:
 class _Measured:
     """A response with the data that count for it; with lines of a spec also how it compares."""
 
-    data: Data
+    data: Record
     response: FrequencyResponse
     judged: Judged | None = None
     findings: tuple[Finding, ...] = ()
@@ -109,7 +108,7 @@ def measure(
     )
 
 
-def _without_lines(question: Measurement, data: Data, name: str) -> _Measured:
+def _without_lines(question: Measurement, data: Record, name: str) -> _Measured:
     """Return the response where the data excite it."""
     delays = partial(response_delays, question.model, step=question.header.units.step)
     found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)

@@ -22,9 +22,9 @@ from inputdesign_cli.outcome.response import SilentLine
 from inputdesign_cli.outcome.results import Array, Results, Table
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.frequency_response.terms import deviation_curves
+from inputdesign_cli.records import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
-from inputdesign_cli.tasks.build.data import Data
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Judged:
 
 def measured_results(
     header: Header,
-    data: Data,
+    data: Record,
     table: Table,
     curves: ResponseCurves,
     response: MeasuredLines,
@@ -149,6 +149,7 @@ def measured_results(
         identification=Identification(method=response.method),
         frequency_response=replace(response, blocks=1 if judged is None else judged.periods.blocks),
         assessment=assessment,
+        findings=data.findings or None,
         notes=data.notes or None,
         timing_s={"measurement": seconds},
     )

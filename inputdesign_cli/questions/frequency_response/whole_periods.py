@@ -11,14 +11,14 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.counted_periods import periods_between_gaps, samples_before_periods
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.records import Record
 
 
 @dataclass(frozen=True)
 class Counted:
-    """Data that count, how they repeat, the number of records of equal length, and what is left out."""
+    """Record that count, how they repeat, the number of records of equal length, and what is left out."""
 
-    data: Data
+    data: Record
     periods: Periods
     repeats: int
     findings: tuple[Finding, ...] = ()
@@ -29,7 +29,7 @@ class Counted:
         return self.repeats * self.periods.kept(self.data.lengths[0])
 
 
-def whole_periods(stated: Periods, data: Data, name: str, step: float) -> Counted:
+def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Counted:
     """Return the data that count.
 
     Records of equal length stay as they are. Of pieces between gaps, and of records of several lengths, the
@@ -60,7 +60,7 @@ def whole_periods(stated: Periods, data: Data, name: str, step: float) -> Counte
     )
 
 
-def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> Counted:
+def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> Counted:
     """Return one record of the periods without a gap."""
     period, places = stated.period, _places(data, step)
     transient = stated.skip * period
@@ -76,23 +76,12 @@ def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> Counted
         taken = begins[places[begins] % period == phase]
     _check(taken.size, taken.size, stated, name)
     samples = (taken[:, None] + np.arange(period)).ravel()
-    ends = np.cumsum([count for _, count in data.files])
-    counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=ends.size)
-    kept = replace(
-        data,
-        u=data.u[samples],
-        y=data.y[samples],
-        r=None if data.r is None else data.r[samples],
-        time=data.time[samples],
-        lengths=(len(samples),),
-        files=tuple((file, int(count)) for (file, _), count in zip(data.files, counts, strict=True)),
-        recorded=None if data.recorded is None else data.recorded.at(samples),
-    )
+    kept = data.at(samples, (len(samples),))
     left_out = periods_between_gaps(len(data.lengths), taken.size, period)
     return Counted(kept, replace(stated, skip=0), 1, (left_out,))
 
 
-def _places(data: Data, step: float) -> NDArray[np.int64]:
+def _places(data: Record, step: float) -> NDArray[np.int64]:
     """(N,): the number of samples between the begin of a file and each of its samples."""
     ends = np.cumsum([count for _, count in data.files])[:-1]
     return np.concatenate([np.round((part - part[0]) / step) for part in np.split(data.time, ends)]).astype(

@@ -11,6 +11,7 @@ from inputdesign_cli.findings.limits_not_kept import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.given_table import read_given_spectrum
+from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits
 from inputdesign_cli.questions.building.model_error import (
     build_calibration,
@@ -40,7 +41,6 @@ from inputdesign_cli.specification.models.spectrum import (
     GivenWhite,
 )
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
-from inputdesign_cli.tasks.build.header import build_header, build_units
 
 _REFUSED = ("spectrum", "energy")
 _OF_DESIGNS = ("objective", "campaign")

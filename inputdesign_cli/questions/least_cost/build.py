@@ -12,6 +12,7 @@ from inputdesign_cli.questions.building.demand import check_design
 from inputdesign_cli.questions.building.endless import check_reach
 from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.free_directions import check_every_direction_counts
+from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.questions.building.model_error import (
     build_calibration,
@@ -34,7 +35,6 @@ from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
-from inputdesign_cli.tasks.build.header import build_header
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 

@@ -19,6 +19,7 @@ from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
 from inputdesign_cli.questions.building.demand import check_record
+from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.signal_settings import build_bounds, stated_moves, stated_peaks
 from inputdesign_cli.questions.building.weights import held, rational
 from inputdesign_cli.questions.loop_error.build_plant import estimated_model, matrix_plant
@@ -27,7 +28,6 @@ from inputdesign_cli.questions.loop_error.signal import LoopErrorSignalSettings
 from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorTask, LossTrial
 from inputdesign_cli.specification import ClosedLoopError, Simulation, Spec
 from inputdesign_cli.specification.models.transfer import Transfer
-from inputdesign_cli.tasks.build.header import build_header
 
 _GRID = 512
 _CANDIDATES = 20

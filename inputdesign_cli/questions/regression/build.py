@@ -10,11 +10,11 @@ from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
+from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.regression.outcome import RegressionTerms
 from inputdesign_cli.questions.regression.regressors import RegressorSettings
 from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, TrueNoise
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
-from inputdesign_cli.tasks.build.header import build_header
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
 _STRUCTURED_TOLERANCE = 1e-6

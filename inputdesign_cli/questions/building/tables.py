@@ -1,0 +1,108 @@
+"""Data files that a spec names: columns of numbers, read with diagnostics that name the line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.records import read_sheet
+from inputdesign_cli.records.columns import columns_of
+from inputdesign_cli.records.signals import check_range
+from inputdesign_cli.records.text import BLANK, COMMENT
+from inputdesign_cli.specification import Spec
+
+_LARGEST = 1e40  # as of other numbers in a spec
+
+
+def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
+    """Return the wanted columns of a data file: role -> (n,), without gaps.
+
+    Args:
+        wanted: role -> its header, or how that begins; `frequency` also finds `frequency_rad_per_s`.
+        key: the key of the spec that names the file, for diagnostics.
+
+    Raises:
+        DataError: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
+    """
+    sheet = read_sheet(path, key=key)
+    found = columns_of(sheet, wanted)
+    for role, numbers in found.items():
+        missing = np.flatnonzero(np.isnan(numbers))
+        if missing.size:
+            message = f"a number is missing in column {wanted[role]}"
+            hint = "write plain numbers with a decimal point, one row a line"
+            raise sheet.error("data-not-a-number", message, hint, int(missing[0]))
+    return found
+
+
+def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
+    """Return the wanted columns of a signal, in which no sample may be missing, not even between its rows.
+
+    Raises:
+        DataError: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in between;
+            `beyond-precision`.
+    """
+    sheet = read_sheet(path, key=key)
+    for line, kind in sheet.passed:
+        if kind != COMMENT:
+            what = "is blank" if kind == BLANK else "is commented out"
+            message = f"line {line} of {path.name} {what}: is a sample missing between the rows about it?"
+            row = int(np.searchsorted(sheet.lines, line)) - 1
+            raise sheet.error("data-not-a-number", message, "take the line out of the file", row)
+    found = read_columns(path, wanted, key=key)
+    for role, numbers in found.items():
+        check_range(sheet, wanted[role], numbers)
+    return found
+
+
+def read_header(path: Path, *, key: str) -> list[str]:
+    """Return the names of the columns of a data file, in small letters.
+
+    Raises:
+        DataError: `data-unreadable`.
+    """
+    return read_sheet(path, key=key).header
+
+
+def has_column(path: Path, start: str, *, key: str) -> bool:
+    """Return whether some header of a data file begins like this.
+
+    Raises:
+        DataError: `data-unreadable`.
+    """
+    return any(name.startswith(start) for name in read_header(path, key=key))
+
+
+def read_frequency_table(
+    spec: Spec, name: str, columns: Sequence[str], key: str, *, least: int = 2
+) -> dict[str, Array]:
+    """Return columns `frequency`, in the unit of the experiment, and `columns`, of `least` rows or more.
+
+    Raises:
+        DataError: the file cannot be read, or its frequencies do not rise from zero or more (`bad-table`).
+    """
+    wanted = {"frequency": "frequency", **{column: column for column in columns}}
+    found = read_columns(spec.resolve_path(name), wanted, key=key)
+    frequency = found["frequency"]
+    if frequency.size < least or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
+        message = "the frequencies must be nonnegative and increase from row to row"
+        hint = f"sort the rows; there must be {'one' if least == 1 else 'two'} at least"
+        raise bad_table(spec, name, message, hint, key)
+    for column, values in found.items():
+        size = np.abs(values)
+        beyond = np.flatnonzero((size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0)))
+        if beyond.size:
+            message = f"{column} is {values[beyond[0]]:g} in row {beyond[0] + 2}"
+            hint = f"numbers other than zero lie between {1.0 / _LARGEST:g} and {_LARGEST:g}"
+            raise bad_table(spec, name, message, hint, key)
+    return found | {"frequency": frequency * build_units(spec).frequency}
+
+
+def bad_table(spec: Spec, name: str, message: str, hint: str, key: str) -> DataError:
+    """Return the error about a table that can be read but not used."""
+    return DataError.because("bad-table", f"{spec.resolve_path(name).name}: {message}", hint, key)

@@ -1,0 +1,193 @@
+"""Arrays of NumPy (.npz) and of MATLAB (.mat, up to version 7) as columns."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.records.cells import is_number, written_out
+from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.text import sheet_of
+
+MOST_UNPACKED = 2**30
+_MOST_DENSE = 10_000_000
+_NUMPY = "write it with numpy.savez(file, u=.., y=..)"
+_MATLAB = (
+    "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  "
+    "then: save('data.mat', '-struct', 's', '-v7')"
+)
+# The fields of a saved iddata, and how its columns are called here.
+_IDDATA = {"InputData": "u", "OutputData": "y", "SamplingInstants": "time"}
+_SAMPLE_TIMES, _TIME_UNITS = ("ts", "sample_time", "dt"), ("timeunit", "time_unit")
+# Types of the elements of MATLAB's files: numbers and texts, arrays, and compressed elements.
+_PLAIN, _ARRAY, _COMPRESSED = {*range(1, 8), 9, 12, 13, 16, 17, 18}, 14, 15
+_DEEPEST = 30
+
+
+def read_npz(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+    """Return the arrays of an .npz file by their names, or only the one that is `named`.
+
+    Raises:
+        DataError: `data-unreadable`.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            large = sum(entry.file_size for entry in archive.infolist()) > MOST_UNPACKED
+        arrays: dict[str, Any] = {}
+        with np.load(io.BytesIO(raw), allow_pickle=False) as found:
+            for name in [] if large else found.files:
+                try:
+                    arrays[name] = found[name]
+                except ValueError:  # objects of Python are never unpickled
+                    arrays[name] = np.array([None])
+    except Exception:  # a broken archive makes its reader raise anything
+        raise unreadable(path, key, "is no .npz file of numbers", _NUMPY) from None
+    if large:
+        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
+    return _sheet(path, key, arrays, named, written, _NUMPY)
+
+
+def read_mat(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+    """Return the arrays of a .mat file, or the signals of an iddata that was saved as a struct.
+
+    Raises:
+        DataError: `data-unreadable`; of an object that only MATLAB reads, with the lines that convert it.
+    """
+    import warnings
+
+    import scipy.io
+
+    try:
+        if raw[:4].count(0) == 0 and raw[124:126] != b"\x00\x02":  # version 4 begins with zeros, 7.3 is HDF5
+            _check_elements(raw[128:], "<" if raw[126:128] == b"IM" else ">", MOST_UNPACKED)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = scipy.io.loadmat(io.BytesIO(raw), simplify_cells=True)
+    except NotImplementedError:
+        hint = "in MATLAB: save('data.mat', 'u', 'y', '-v7')"
+        raise unreadable(path, key, "is a .mat file of version 7.3", hint) from None
+    except Exception:  # a broken file makes its reader raise anything
+        raise unreadable(path, key, "is no .mat file that can be read", "save it in MATLAB anew") from None
+    return _sheet(
+        path, key, {name: x for name, x in found.items() if name[:2] != "__"}, named, written, _MATLAB
+    )
+
+
+def _check_elements(data: bytes, order: str, most: int, depth: int = 0) -> int:
+    """Return how many of `most` bytes are left; at a damaged file SciPy's reader may end the program."""
+    at = 0
+    while at + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, at)
+        small = kind >> 16
+        kind, size, start = (kind & 0xFFFF, small, at + 4) if small else (kind, size, at + 8)
+        at = at + 8 if small else start + (size if kind == _COMPRESSED else -(-size // 8) * 8)
+        content = data[start : start + size]
+        if len(content) < size or depth > _DEEPEST or small > 4:
+            raise ValueError("sizes do not fit")
+        if kind == _COMPRESSED:
+            unpacker = zlib.decompressobj()
+            content = unpacker.decompress(content, most)
+            most -= len(content)
+            if not unpacker.eof:
+                raise ValueError("too large, or cut off")
+        if kind in (_COMPRESSED, _ARRAY):
+            most = _check_elements(content, order, most, depth + 1)
+        elif kind not in _PLAIN and (kind, size) != (0, 0):
+            raise ValueError("no known type")
+    return most
+
+
+def _sheet(path: Path, key: str, values: Mapping[str, Any], named: str, written: Written, hint: str) -> Sheet:
+    """The columns in named values, or in the one that is `named`; fields of structs have their own names."""
+    if named and named not in values:
+        raise unreadable(path, key, "has no such variable", f"it holds {', '.join(values)}")
+    arrays: dict[str, tuple[str, NDArray]] = {}
+    left_out: dict[str, str] = {}
+    steps: list[float] = []
+    units: list[str] = []
+    for owner, value in values.items():
+        for name, array in _flat(owner, value) if named in ("", owner) else ():
+            wrong = _wrong(array)
+            if wrong == "text" and array.size == 1 and name.lower() in _TIME_UNITS:
+                units.append(str(array.item()))
+            elif array.size == 1 and name.lower() in _SAMPLE_TIMES:
+                text = str(array.item())
+                steps.append(float(text) if array.dtype.kind in "fiuSU" and is_number(text) else np.nan)
+            elif wrong or array.size == 1:
+                left_out[name] = wrong or "a single number"
+            elif name in arrays and not np.array_equal(arrays[name][1], array):
+                what = f"holds {arrays[name][0]} and {owner}, each with a {name} of its own"
+                file = path.name.partition("#")[0]
+                raise unreadable(path, key, what, f"name one: '{file}#{arrays[name][0]}' or '{file}#{owner}'")
+            else:
+                arrays[name] = owner, array
+    if len({*steps}) > 1 or not all(0.0 < step < np.inf for step in steps):
+        raise unreadable(path, key, f"states no clear sample time: {steps}", "keep one, a positive number")
+    held = "; ".join(f"{name} holds {what}" for name, what in list(left_out.items())[:5])
+    if not arrays:
+        raise unreadable(path, key, f"holds no arrays of numbers{f' ({held})' if held else ''}", hint)
+    names: list[str] = []
+    columns: list[list[str]] = []
+    for name, (_, array) in arrays.items():
+        wide = array[:, None] if array.ndim == 1 else array
+        wide = wide.T if wide.shape[0] == 1 else wide
+        names += [name if wide.shape[1] == 1 else f"{name}{i + 1}" for i in range(wide.shape[1])]
+        columns += [written_out(x) for x in wide.T]
+    if len({len(column) for column in columns}) > 1:
+        shapes = ", ".join(
+            f"{name} {' x '.join(map(str, array.shape))}" for name, (_, array) in arrays.items()
+        )
+        more = "keep the signals of one experiment in a file, all of one length, a sample in each row"
+        raise unreadable(path, key, f"holds arrays of different lengths ({shapes})", more)
+    rows = [(line, list(row)) for line, row in enumerate(zip(*columns, strict=True), start=1)]
+    sheet = sheet_of(path, key, (1, ", ".join(names)), names, rows, replace(written, decimal="."))
+    step, unit = steps[0] if steps else None, units[0] if units else None
+    return replace(sheet, texts=(), sample_time=step, time_unit=unit)
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, NDArray]]:
+    """The arrays in a value by their names, of a struct by those of its fields."""
+    if hasattr(value, "toarray"):
+        value.check_format(full_check=True)
+        value = value.toarray() if value.shape[0] * value.shape[1] <= _MOST_DENSE else [None]
+    if not isinstance(value, Mapping):
+        array = np.asarray(value) if not isinstance(value, list) else np.empty(len(value), dtype=object)
+        if isinstance(value, list):
+            array[:] = value
+        if not array.dtype.names:
+            while array.ndim > 2 and array.shape[-1] == 1:
+                array = array[..., 0]
+            yield name, array.real if array.dtype.kind == "c" and not np.any(array.imag) else array
+            return
+        value = {own: array[own] for own in array.dtype.names}
+    for own, inner in value.items():
+        if own not in _IDDATA or np.size(inner):
+            yield from _flat(_IDDATA.get(own, own), inner)
+
+
+def _wrong(array: NDArray) -> str:
+    """What an array holds that is no column of numbers; nothing where it is one."""
+    kind = array.dtype.kind
+    if array.size == 0:
+        return "nothing"
+    if kind in "SU" or (kind == "O" and any(isinstance(item, str) for item in array.ravel())):
+        return "text"
+    if kind == "O":
+        several = any(np.size(item) > 1 for item in array.ravel())
+        return (
+            f"cells, as of several experiments (in MATLAB: getexp(data, 1)), or an object ({_MATLAB})"
+            * several
+            or "objects"
+        )
+    if kind not in "fiubmM":
+        return "complex numbers" if kind == "c" else f"numbers of the kind {array.dtype}"
+    return f"an array of {array.ndim} dimensions" if array.ndim > 2 else ""

@@ -1,0 +1,252 @@
+"""Which column of a file is which channel; where that is not clear, an option that can be pasted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.findings.record_columns import name_and_unit
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.records.naming import named_columns, roles_of, time_columns
+from inputdesign_cli.records.sheet import Column, Sheet
+
+NO_TIMES = "none"
+_CHANNELS = {
+    "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
+    "y": re.compile(r"(y|output)[ _]?(\d*)(?![a-z0-9]).*"),
+}
+# What separates entries of the option, or quotes it.
+_SEPARATORS = frozenset(',="')
+
+
+def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
+    """Return the wanted columns: role -> (n,), NaN where a cell is empty.
+
+    Args:
+        wanted: role -> its header, or how that begins; `frequency` also finds `frequency_rad_per_s`.
+
+    Raises:
+        DataError: `data-missing-column` or `data-not-a-number`.
+    """
+    found = {role: named_columns(sheet, start.strip().lower()) for role, start in wanted.items()}
+    for what, missing in (
+        ("no column", [role for role, at in found.items() if not at]),
+        ("several columns", [role for role, at in found.items() if len(at) > 1]),
+    ):
+        if missing:
+            raise _unclear(sheet, what, missing, wanted)
+    for role, (at,) in found.items():
+        column, same = sheet.columns[at], [other for other in found if found[other] == [at]]
+        if len(same) > 1:
+            message = f"{' and '.join(same)} are the same column of {sheet.path.name}: {sheet.name_of(at)}"
+            rest = {other: name for other, name in wanted.items() if other not in same[1:]}
+            hint = f"name another one for one of them: {columns_option(sheet, rest, same[1:])}"
+            raise sheet.error("data-missing-column", message, hint)
+        if column.fault is not None:
+            row, text = column.fault
+            message = f"{repr(text) if sheet.shown else 'a value'} in column {wanted[role]} {column.wrong}"
+            raise sheet.error("data-not-a-number", message, column.hint, row)
+    return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
+
+
+def _unclear(sheet: Sheet, what: str, missing: Sequence[str], wanted: Mapping[str, str]) -> DataError:
+    """The error about roles of which there is no column, or several."""
+    starts = [wanted[role] for role in missing]
+    names = [
+        wanted[role] if role.startswith(wanted[role]) else f"{wanted[role]} ({role})" for role in missing
+    ]
+    message = f"{sheet.path.name} has {what} for {', '.join(names)} ({_contents(sheet)})"
+    if starts == ["frequency"]:
+        return sheet.error("data-missing-column", message, "name a column frequency, or frequency_rad_per_s")
+    hint = f"name one column {' and one '.join(starts)}"
+    if not sheet.key:
+        kept = {role: name for role, name in wanted.items() if role not in missing}
+        hint += f", or say which it is: {columns_option(sheet, kept, missing)}"
+    return sheet.error("data-missing-column", message, hint)
+
+
+def _contents(sheet: Sheet) -> str:
+    """The header of a file for messages, if it may be shown."""
+    count = f"{len(sheet.columns)} columns"
+    if not sheet.shown:
+        return count
+    header = f"its header is: {', '.join(map(str.strip, sheet.names))}" if sheet.names else "it has no header"
+    return f"{header}; {count}"
+
+
+def column_named(sheet: Sheet, name: str) -> Column:
+    """Return the first column of a name, or that of a number."""
+    return sheet.columns[named_columns(sheet, name.strip().lower())[0]]
+
+
+def channel_columns(letter: str, count: int, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+    """Return channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user says.
+
+    Raises:
+        DataError: `data-missing-column`, a single channel has a column of either name.
+    """
+    if count > 1 or f"{letter}1" in columns:
+        channels = [f"{letter}{i + 1}" for i in range(count)]
+        return {channel: columns.get(channel, channel) for channel in channels}
+    plain, numbered = (
+        [header for header in sheet.header if re.match(rf"{start}(?![a-z0-9])", header)]
+        for start in (letter, f"{letter}1")
+    )
+    if plain and numbered:
+        shown = f": {', '.join([*plain, *numbered])}" if sheet.shown else ""
+        message = f"{sheet.path.name} has several columns that may be {letter}1{shown}"
+        hint = f"say which one counts: --columns {letter}1={plain[0] if sheet.shown else 'NAME'}"
+        raise sheet.error("data-missing-column", message, hint)
+    begun = any(header.startswith(f"{letter}1") for header in sheet.header)
+    return {f"{letter}1": f"{letter}1" if begun else letter}
+
+
+def time_column(sheet: Sheet, columns: Mapping[str, str]) -> str:
+    """Return the name of the column of times; empty without one, or if the user says `time=none`.
+
+    Raises:
+        DataError: `data-missing-column`, there are several.
+    """
+    if "time" in columns:
+        return "" if without_times(sheet, columns) else columns["time"]
+    claimed = {column.strip().lower() for column in columns.values()}
+    timed = [name for name in time_columns(sheet) if name not in claimed]
+    if len(timed) > 1:
+        shown = f": {', '.join(timed)}" if sheet.shown else ""
+        which = timed[0] if timed.count(timed[0]) == 1 else str(sheet.header.index(timed[0]) + 1)
+        hint = f"say which one counts: --columns time={which if sheet.shown else 'NAME'}"
+        message = f"{sheet.path.name} has several columns of times{shown}"
+        raise sheet.error("data-missing-column", message, hint)
+    return timed[0] if timed else ""
+
+
+def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
+    """Return whether the user says that no column holds the times: `time=none`, unless one is called so."""
+    return columns.get("time", "").strip().lower() == NO_TIMES and NO_TIMES not in sheet.header
+
+
+def reference_columns(
+    inputs: int, sheet: Sheet, columns: Mapping[str, str], *, clean: bool
+) -> dict[str, str]:
+    """Return `r1` -> the column of the reference that is added to an input, if every input has one.
+
+    Args:
+        columns: by channel, those that the user names.
+        clean: whether columns that nobody names count only if they hold numbers alone.
+
+    Raises:
+        DataError: `data-missing-column`, only some are named.
+    """
+    channels = [f"r{i + 1}" for i in range(inputs)]
+    named = [name for name in channels if name in columns]
+    found = {name: columns.get(name, name) for name in channels if name in columns or name in sheet.header}
+    if inputs == 1 and not found and "r" in sheet.header:
+        found = {"r1": "r"}
+    if len(found) < inputs and named:
+        missing = next(name for name in channels if name not in found)
+        message = f"--columns names {', '.join(named)}, and {sheet.path.name} has no column for {missing}"
+        hint = f"name the reference of every input, or none: --columns {missing}=NAME"
+        raise sheet.error("data-missing-column", message, hint)
+    own = [column_named(sheet, name) for name in found.values()] if clean and not named else []
+    usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
+    return found if len(found) == inputs and usable else {}
+
+
+def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
+    """Return the columns that are named and, of inputs or outputs if none is named, those called u, y1, .."""
+    found = {}
+    for letter, pattern in _CHANNELS.items():
+        for name in sheet.header:
+            matched = pattern.fullmatch(name)
+            if matched and not any(other.startswith(letter) for other in named):
+                found[f"{letter}{matched[2] or 1}"] = name
+    return {**found, **named}
+
+
+def with_names_of(units: Units, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+    """Return the named columns, and those that are called as the spec calls a channel."""
+    found = {}
+    for channel, (name, _) in units.channels.items():
+        same = [header for header in sheet.names if name_and_unit(header)[0].lower() == name.lower()]
+        taken = any(re.match(rf"{channel[0]}\d*(?![a-z0-9])", header) for header in sheet.header)
+        if name and len(same) == 1 and not taken:
+            found[channel] = same[0]
+    return {**found, **columns}
+
+
+def with_headers(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+    """Return named columns by their whole names, which state units."""
+    whole = {}
+    for channel, column in columns.items():
+        unread = channel == "time" and without_times(sheet, columns)
+        at = [] if unread else named_columns(sheet, column.strip().lower())
+        name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names and sheet.shown else ""
+        whole[channel] = name if sheet.header.count(name.lower()) == 1 else column
+    return whole
+
+
+def count_of(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
+    """Return how many inputs or outputs are named; they are numbered from one on.
+
+    Raises:
+        DataError: `data-missing-column`, there is none, or a number is left out.
+    """
+    named = [name for name in columns if name.startswith(letter)]
+    if named and set(named) == {f"{letter}{i + 1}" for i in range(len(named))}:
+        return len(named)
+    what = "input" if letter == "u" else "output"
+    message = f"which column of {sheet.path.name} is the {what}? ({_contents(sheet)})"
+    if named:
+        message = (
+            f"the {what}s are {', '.join(sorted(named))}, but they are numbered {letter}1, {letter}2, .."
+        )
+    first = [f"{x}{i + 1}" for x in "uy" for i in range(max(sum(name[0] == x for name in columns), 1))]
+    kept = {channel: name for channel, name in columns.items() if channel in ("time", *first)}
+    option = columns_option(sheet, kept, [channel for channel in first if channel not in columns])
+    raise sheet.error("data-missing-column", message, f"name them, or give their numbers, such as {option}")
+
+
+def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) -> str:
+    """Return `--columns "time=1,u1=2,y1=3"`: what is named, the times, and columns of numbers for `wanted`.
+
+    Columns that are called as inputs or outputs are come first.
+    """
+    taken = {at for column in named.values() for at in named_columns(sheet, column.strip().lower())}
+    timed = time_columns(sheet)
+    times = [i for i, name in enumerate(sheet.header) if name in timed] or rising(sheet)
+    times = [] if "time" in named else [i for i in times if i not in taken][:1]
+    free = [
+        i
+        for i, column in enumerate(sheet.columns)
+        if i not in (*taken, *times) and column.fault is None and not np.isnan(column.numbers).all()
+    ]
+    roles = roles_of(sheet.names or [""] * len(sheet.columns))
+    found = {"time": called(sheet, times[0])} if times else {}
+    found |= {channel: name for channel, name in named.items() if channel[0] in "uyt"}
+    left = sorted(set(wanted) - found.keys() - {"time"})
+    for suiting in (lambda letter: (letter,), lambda _: ("",), lambda _: ("", "u", "y", "r")):
+        for channel in left:
+            fit = [i for i in free if sheet.shown and roles[i] in suiting(channel[0])]
+            if fit and channel not in found:
+                found[channel] = called(sheet, fit[0])
+                free.remove(fit[0])
+    found |= {channel: "NAME" for channel in left if channel not in found}
+    in_order = sorted(found, key=lambda channel: (channel != "time", channel))
+    return f'--columns "{",".join(f"{channel}={found[channel]}" for channel in in_order)}"'
+
+
+def called(sheet: Sheet, at: int) -> str:
+    """Return how an option calls a column: by a name that names no other one, else by its number."""
+    name = sheet.names[at].strip() if at < len(sheet.names) and sheet.shown else ""
+    plain = bool(name) and not _SEPARATORS & set(name) and named_columns(sheet, name.lower()) == [at]
+    return name if plain else str(at + 1)
+
+
+def rising(sheet: Sheet) -> list[int]:
+    """Return where columns are whose numbers rise from row to row, as times do."""
+    numbers = [column.numbers[~np.isnan(column.numbers)] for column in sheet.columns]
+    return [i for i, x in enumerate(numbers) if x.size > 1 and np.all(np.diff(x) > 0.0)]

@@ -1,0 +1,186 @@
+"""A file of data becomes a sheet: its ending says the kind."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from inputdesign_cli.errors import STANDARD_STREAM, DataError
+from inputdesign_cli.records.arrays import MOST_UNPACKED, read_mat, read_npz
+from inputdesign_cli.records.cells import written_out
+from inputdesign_cli.records.moments import with_days
+from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.text import decoded, read_text, sheet_of
+from inputdesign_cli.regular_file import read_regular
+
+_MOST_BYTES = 100 * 2**20
+PARQUET = (".parquet", ".pq")
+EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
+_OF_VARIABLES = (".mat", ".npz")
+_ZIP, _OLE, _ARRAY = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x93NUMPY"
+# How compressed files begin.
+_COMPRESSED = {
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ\x00": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"7z\xbc\xaf\x27\x1c": "7z",
+}
+# What the workbooks of Excel have inside, and those of ODF.
+_WORKBOOK = ("[Content_Types].xml", "xl/", "content.xml")
+
+
+def read_sheet(path: Path, *, key: str = "", written: Written | None = None) -> Sheet:
+    """Return the columns of a data file, times of a day with their days.
+
+    Args:
+        key: the key of the spec that names the file, for diagnostics.
+        written: how it is written, where the user says so.
+
+    Raises:
+        DataError: `data-unreadable`, `data-extra-field`.
+    """
+    return with_days(_read(path, key, written or Written()))
+
+
+def _read(path: Path, key: str, written: Written) -> Sheet:
+    file, _, named = path.name.partition("#")
+    kind = Path(file).suffix.lower()
+    if kind not in (*EXCEL, *_OF_VARIABLES):  # only their sheets and variables have names
+        kind, named = path.suffix.lower(), ""
+    raw = _bytes(path.with_name(file) if named else path, key)
+    if len(raw) > _MOST_BYTES:
+        raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
+    if kind == ".npz":  # an archive itself
+        return read_npz(path, key, raw, named, written)
+    _check_unpacked(path, key, raw, workbook=kind in EXCEL)
+    if kind == ".mat":
+        return read_mat(path, key, raw, named, written)
+    if kind in PARQUET:
+        return _read_parquet(path, key, raw, written)
+    if kind in EXCEL:
+        return _read_workbook(path, key, raw, named, written)
+    return read_text(path, key, decoded(path, key, raw), written)
+
+
+def _bytes(path: Path, key: str) -> bytes:
+    try:
+        return read_regular(path, _MOST_BYTES + 1)
+    except FileNotFoundError:
+        what, hint = "does not exist", "check the name and the folder"
+        if str(path) == STANDARD_STREAM:
+            what += ": data are not read from standard input"
+            hint = "write them to a file, whose ending shows its kind, and name that"
+        elif key:
+            hint = "paths are relative to the folder of the spec"
+        raise unreadable(path, key, what, hint) from None
+    except IsADirectoryError:
+        raise unreadable(path, key, "is a folder", "name a CSV file") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file") from None
+
+
+def _check_unpacked(path: Path, key: str, raw: bytes, *, workbook: bool) -> None:
+    """Raise `DataError` (`data-unreadable`) for compressed files, and for endings of another kind."""
+    for mark, kind in _COMPRESSED.items():
+        if raw.startswith(mark) and not (mark == b"BZh" and not raw[3:4].isdigit()):
+            raise _compressed(path, key, kind)
+    if raw.startswith(_ARRAY):
+        raise unreadable(
+            path, key, "holds an array of NumPy without names", "write numpy.savez('data.npz', u=.., y=..)"
+        )
+    if raw.startswith(_ZIP):
+        names, size = _contents(raw)
+        if size > MOST_UNPACKED:
+            raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
+        if names and all(name.endswith(".npy") for name in names):
+            raise unreadable(
+                path, key, "holds arrays of NumPy under another ending", "give it the ending .npz"
+            )
+        if names and not any(name.startswith(_WORKBOOK) for name in names):
+            raise _compressed(path, key, "zip")
+        if not names and not workbook:
+            hint = "write or copy it anew, and unpack it where it is an archive"
+            raise unreadable(path, key, "is a damaged zip archive or workbook", hint)
+    if raw.startswith((_ZIP, _OLE)) and not workbook:
+        hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
+        raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
+
+
+def _contents(raw: bytes) -> tuple[list[str], int]:
+    """The names in an archive and the bytes that it unpacks to; nothing where it cannot be read."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            return archive.namelist(), sum(entry.file_size for entry in archive.infolist())
+    except Exception:  # a broken archive makes its reader raise anything
+        return [], 0
+
+
+def _compressed(path: Path, key: str, kind: str) -> DataError:
+    return unreadable(path, key, f"is compressed ({kind})", "unpack it, and name the file that it holds")
+
+
+def _read_parquet(path: Path, key: str, raw: bytes, written: Written) -> Sheet:
+    """The columns of a parquet file, its index among them."""
+    frame = _loaded(path, key, "a parquet file", lambda pandas: _frame(pandas, path, key, raw))
+    names = [str(name) for name in frame]
+    rows = zip(*(written_out(frame[name].to_numpy()) for name in frame), strict=True)
+    body = [(line, list(row)) for line, row in enumerate(rows, start=1)]
+    return sheet_of(path, key, (1, ", ".join(names)), names, body, replace(written, decimal="."))
+
+
+def _read_workbook(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+    """The table in a sheet of a workbook, the first unless one is named; lines are its rows."""
+    how = {"header": None, "sheet_name": None, "dtype": object}
+    frames = _loaded(path, key, "a workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), **how))
+    if named and named not in frames:
+        raise unreadable(path, key, "has no such sheet", f"the sheets are {', '.join(frames)}")
+    first, *others = frames
+    rows = map(written_out, frames[named or first].to_numpy(dtype=object))
+    stated = replace(written, separator="\t", decimal=".")
+    try:
+        sheet = read_text(path, key, "\n".join(map("\t".join, rows)), stated)
+    except DataError as error:
+        also = (
+            f"; its sheets are {', '.join(frames)}: name one as '{path.name}#{others[0]}'" if others else ""
+        )
+        raise DataError([replace(one, hint=f"{one.hint}{also}") for one in error.diagnostics]) from None
+    return replace(sheet, others=() if named else tuple(others))
+
+
+def _frame(pandas: Any, path: Path, key: str, raw: bytes) -> Any:
+    """The frame in a parquet file, with its index in columns before the others."""
+    parquet = import_module("pyarrow.parquet").ParquetFile(io.BytesIO(raw))
+    names = parquet.schema_arrow.names
+    if 8 * parquet.metadata.num_rows * len(names) > MOST_UNPACKED:
+        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
+    again = sorted({name for name in names if names.count(name) > 1})
+    if again:
+        what = f"has several columns of one name: {', '.join(again)}"
+        raise unreadable(path, key, what, "give each column a name of its own, or save it as CSV")
+    frame = pandas.read_parquet(io.BytesIO(raw))
+    if isinstance(frame.index, pandas.RangeIndex) and frame.index.name is None:
+        return frame
+    if frame.index.nlevels == 1 and frame.index.name is None:
+        frame.index.name = "time" if pandas.api.types.is_datetime64_any_dtype(frame.index.dtype) else "index"
+    return frame.reset_index()
+
+
+def _loaded(path: Path, key: str, kind: str, load: Callable[[Any], Any]) -> Any:
+    import pandas
+
+    try:
+        return load(pandas)
+    except ImportError:
+        hint = 'install what reads it: pip install "inputdesign-cli[data]"; or save it as CSV'
+        raise unreadable(path, key, f"is {kind}, and what reads it is not installed", hint) from None
+    except DataError:
+        raise
+    except Exception:  # a broken file makes its reader raise anything
+        raise unreadable(path, key, f"is not {kind} that can be read", "save it as CSV") from None

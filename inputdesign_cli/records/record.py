@@ -1,0 +1,339 @@
+"""Records of experiments: signals by channel in segments with even steps, and what was done to them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.copied_samples import samples_repeated
+from inputdesign_cli.findings.record_columns import columns_against_spec
+from inputdesign_cli.findings.record_times import times_assumed, times_disagree
+from inputdesign_cli.identification import resolution_of
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.records.columns import (
+    called,
+    count_of,
+    reference_columns,
+    rising,
+    with_channels,
+    with_headers,
+    with_names_of,
+    without_times,
+)
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.reading import read_sheet
+from inputdesign_cli.records.segments import EVEN, SHORTEST, Segment, joined_rows, segments_of
+from inputdesign_cli.records.signals import Signals, signals_of, typical_step
+from inputdesign_cli.specification.models.units import SECONDS
+
+# The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
+_ALIKE, _LONGER = 0.1, 0.5
+# Sample times of several files, or of a file in two places, differ by less than this share by rounding alone.
+_ROUND = 1e-3
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The signals as they stand in the files.
+
+    Attributes:
+        values: (samples, r + p), of inputs and outputs.
+        rows: (samples,), where each sample stands; the nearest one, where times were evened out.
+        held: (samples, p), whether an output was recorded as it was a sample before.
+        resolution: (p,), the step in which each output is recorded.
+    """
+
+    values: Array
+    rows: NDArray[np.int64]
+    held: NDArray[np.bool_]
+    resolution: Array
+
+    def at(self, samples: NDArray[np.int64]) -> Recorded:
+        """Return some of the samples."""
+        return replace(self, values=self.values[samples], rows=self.rows[samples], held=self.held[samples])
+
+
+@dataclass(frozen=True)
+class Record:
+    """Recorded experiments, their segments one after the other.
+
+    Attributes:
+        u, y: (N, r), (N, p), inputs and outputs, without gaps.
+        r: (N, r), the reference of a loop; None where some file does not have it.
+        time: (N,), in `time_unit`; counted from zero in a file that has none.
+        lengths: the samples of each segment.
+        files: the name of each file and its samples.
+        names: of the columns, by channel.
+        step, time_unit: the sample time.
+        findings: what was done to the record and what was seen in it.
+        header: the names of the columns of the first file, in small letters.
+        means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
+        recorded: the signals as they stand in the files; None: not known.
+        repeated: files that have samples in common.
+        lined: whether a line was taken away from an output: its slope is then estimated with the model, since
+            the inputs cause a part of it.
+        remarks: what a question did to the record later.
+    """
+
+    u: Array
+    y: Array
+    r: Array | None
+    time: Array
+    lengths: tuple[int, ...]
+    files: tuple[tuple[str, int], ...]
+    names: dict[str, str] = field(default_factory=dict)
+    step: float = 1.0
+    time_unit: str = "s"
+    findings: tuple[Finding, ...] = ()
+    header: tuple[str, ...] = ()
+    means: Array | None = None
+    recorded: Recorded | None = None
+    repeated: tuple[Finding, ...] = ()
+    lined: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The messages of the findings, and the remarks."""
+        return (*(one.message for one in self.findings), *self.remarks)
+
+    @property
+    def parts(self) -> list[tuple[Array, Array]]:
+        """Inputs and outputs of each segment."""
+        at = np.cumsum(self.lengths)[:-1]
+        return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
+
+    def files_of(self, samples: NDArray[np.int64]) -> tuple[tuple[str, int], ...]:
+        """Return the name of each file, and how many of these samples it has."""
+        ends = np.cumsum([count for _, count in self.files])
+        counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends))
+        return tuple((name, int(count)) for (name, _), count in zip(self.files, counts, strict=True))
+
+    def at(self, samples: NDArray[np.int64], lengths: tuple[int, ...]) -> Record:
+        """Return some of the samples, in segments of these lengths."""
+        return replace(
+            self,
+            u=self.u[samples],
+            r=None if self.r is None else self.r[samples],
+            y=self.y[samples],
+            time=self.time[samples],
+            lengths=lengths,
+            files=self.files_of(samples),
+            recorded=None if self.recorded is None else self.recorded.at(samples),
+        )
+
+    def without(self, samples: NDArray[np.int64]) -> Record:
+        """Return the record without some samples, and without segments that become too short."""
+        left = np.setdiff1d(np.arange(len(self.y)), samples)
+        apart = (np.diff(left) > 1) | np.isin(left[1:], np.cumsum(self.lengths))
+        runs = np.split(left, np.flatnonzero(apart) + 1)
+        kept = [run for run in runs if len(run) >= SHORTEST] or [max(runs, key=len)]
+        return self.at(np.concatenate(kept), tuple(map(len, kept)))
+
+
+def read_log(path: Path, preparation: Preparation) -> Record:
+    """Read a file without a spec: channels that are named, or else u1, u2, .., y1, y2, .. of the header.
+
+    Raises:
+        DataError: the file cannot be read, or does not show its inputs and outputs.
+    """
+    sheet = read_sheet(path, written=preparation.written)
+    columns = with_headers(sheet, with_channels(sheet, preparation.columns))
+    inputs, outputs = (count_of(letter, sheet, columns) for letter in "uy")
+    references = reference_columns(inputs, sheet, columns, clean=True)
+    given = replace(preparation, columns=columns)
+    signals = joined_rows(signals_of(sheet, inputs, outputs, given, references), resample=given.resample)
+    step, found = _step_of(signals, given)
+    record = _record(signals, step, signals.unit or "s", given, inputs, found)
+    named = {channel: column for channel, column in columns.items() if channel != "time" or signals.name}
+    return replace(record, names=named)
+
+
+def read_logs(paths: Sequence[Path], preparation: Preparation) -> Record:
+    """Read several files of the same channels and sample time, one after the other.
+
+    Raises:
+        DataError: see `read_log`; the files differ, or hold the same samples.
+    """
+    records = [read_log(path, preparation) for path in paths]
+    first = records[0]
+    for path, one in zip(paths, records, strict=True):
+        shapes = [(record.u.shape[1], record.y.shape[1], record.time_unit) for record in (first, one)]
+        if shapes[0] != shapes[1] or abs(one.step - first.step) > _ROUND * first.step:
+            message = f"{path.name} has other channels or another sample time than {paths[0].name}"
+            hint = "explore one experiment at a time, or say --columns and --sample-time"
+            raise DataError.because("data-not-uniform", message, hint)
+    joined = _together(paths, records)
+    return replace(joined, findings=(*joined.repeated, *joined.findings))
+
+
+def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Record:
+    """Read the channels of a plant: columns u1, u2, .., y1, y2, .. and, if there is one, time.
+
+    The only input may be called u, the only output y.
+
+    Raises:
+        SpecError: `unknown-channel`, a channel is named that the plant does not have.
+        DataError: a file cannot be read, lacks a column, holds text, or is sampled otherwise than the spec
+            says.
+    """
+    channels = [f"u{i + 1}" for i in range(units.inputs)] + [f"y{i + 1}" for i in range(units.outputs)]
+    named = set(preparation.columns) - {"time"} - (set(units.excitations) if units.closed_loop else set())
+    for what, option, names in (
+        ("operating point names", f"--operating-point {channels[0]}=1.5", preparation.operating_point),
+        ("columns name", f"--columns {channels[0]}=2", named),
+    ):
+        for name in names:
+            if name not in channels:
+                message = f"the {what} {name}, but the plant has no such channel"
+                hint = f"its channels are {', '.join(channels)}: write {option}"
+                raise bad_spec("unknown-channel", message, hint=hint)
+    return _together(paths, [_read(path, units, preparation) for path in paths])
+
+
+def _read(path: Path, units: Units, preparation: Preparation) -> Record:
+    """Read one file for a plant."""
+    sheet = read_sheet(path, written=preparation.written)
+    columns = with_names_of(units, sheet, with_headers(sheet, preparation.columns))
+    given = replace(preparation, columns=columns)
+    references = reference_columns(units.inputs, sheet, columns, clean=False) if units.closed_loop else {}
+    signals = signals_of(sheet, units.inputs, units.outputs, given, references)
+    signals = _in_step(joined_rows(signals, resample=given.resample), units, preparation)
+    found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, columns)
+    return _record(signals, units.sample_time, units.time_unit, given, units.inputs, found)
+
+
+def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
+    """Records of several files, one after the other."""
+    counts = Counter(path.name for path in paths)
+    labels = [path.name if counts[path.name] == 1 else str(path) for path in paths]
+    recorded = [one.recorded for one in records if one.recorded is not None]
+    references = [one.r for one in records if one.r is not None]
+    findings = [
+        (path.name, found) for path, one in zip(paths, records, strict=True) for found in one.findings
+    ]
+    if len(paths) > 1:
+        findings = [(name, replace(found, message=f"{name}: {found.message}")) for name, found in findings]
+    return replace(
+        records[0],
+        u=np.concatenate([one.u for one in records]),
+        y=np.concatenate([one.y for one in records]),
+        r=np.concatenate(references) if len(references) == len(records) else None,
+        time=np.concatenate([one.time for one in records]),
+        lengths=tuple(length for one in records for length in one.lengths),
+        files=tuple((label, len(one.y)) for label, one in zip(labels, records, strict=True)),
+        findings=tuple(found for _, found in findings),
+        means=np.average([one.means for one in records], axis=0, weights=[len(one.u) for one in records]),
+        recorded=Recorded(
+            np.concatenate([one.values for one in recorded]),
+            np.concatenate([one.rows for one in recorded]),
+            np.concatenate([one.held for one in recorded]),
+            np.max([one.resolution for one in recorded], axis=0),
+        ),
+        repeated=tuple(samples_repeated(paths, [one.values for one in recorded])),
+        lined=any(one.lined for one in records),
+    )
+
+
+def _record(
+    signals: Signals, step: float, unit: str, preparation: Preparation, r: int, found: Sequence[Finding]
+) -> Record:
+    """The record in the signals of one file, of which the first `r` are inputs."""
+    segments, done = segments_of(signals, step, unit, preparation)
+    inputs = np.concatenate([part.u for part in segments])
+    return Record(
+        inputs[:, :r],
+        np.concatenate([part.y for part in segments]),
+        inputs[:, r:] if inputs.shape[1] > r else None,
+        np.concatenate([part.time for part in segments]),
+        tuple(len(part.y) for part in segments),
+        ((signals.sheet.path.name, len(inputs)),),
+        {},
+        step,
+        unit,
+        (*signals.findings, *done, *found),
+        tuple(signals.sheet.header),
+        np.nanmean(signals.u[:, :r], axis=0),
+        _recorded(signals, step, segments, r),
+        lined=any(part.lined for part in segments),
+    )
+
+
+def _recorded(signals: Signals, step: float, segments: Sequence[Segment], r: int) -> Recorded:
+    """The signals of the file at the samples of the segments, `step` apart."""
+    stamped = np.flatnonzero(~np.isnan(signals.time))
+    stamps = signals.time[stamped] * (1.0 if signals.name else step)
+    times = np.concatenate([part.time for part in segments])
+    at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
+    values = np.column_stack([signals.u[:, :r], signals.y])[at]
+    held = np.concatenate([part.held for part in segments])
+    return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
+
+
+def _step_of(signals: Signals, preparation: Preparation) -> tuple[float, list[Finding]]:
+    """The sample time by the times, the option or the file; 1 if nothing says it."""
+    sheet, stated = signals.sheet, preparation.sample_time or signals.sheet.sample_time
+    if signals.name and not preparation.sample_time:
+        step = typical_step(signals.time)
+        if not np.isfinite(step):
+            message, hint = f"{sheet.path.name} has one time only", "give the sample time: --sample-time 0.5"
+            raise sheet.error("data-not-uniform", message, hint, 0)
+        if stated is not None and abs(step - stated) > _ROUND * stated:
+            return step, [times_disagree(stated, step)]
+        return step, []
+    if stated:
+        _check_stated(signals, stated, resample=preparation.resample)
+        return stated, []
+    if without_times(sheet, preparation.columns):
+        return 1.0, [times_assumed("No times are read", [])]
+    taken = {column.strip().lower() for column in preparation.columns.values()}
+    likely = [i for i, one in enumerate(sheet.columns) if one.dated or i in rising(sheet)]
+    names = [called(sheet, i) for i in likely if taken.isdisjoint((sheet.name_of(i).lower(), str(i + 1)))]
+    return 1.0, [times_assumed("No column is called as times are", names)]
+
+
+def _check_stated(signals: Signals, step: float, *, resample: bool) -> None:
+    """Raise `DataError` (`data-not-uniform`) where times advance by something else than the user states."""
+    apart = typical_step(signals.time) if signals.name else step
+    if (apart - step > _ALIKE * step or step - apart > _ALIKE * step) and not (
+        resample and apart - step <= _LONGER * step
+    ):
+        message = f"times in column {signals.name} advance by {apart:.6g}, and --sample-time says {step:.6g}"
+        hint = "leave --sample-time out; or mind --time-unit; or, if that column does not count, time=none"
+        raise signals.sheet.error("data-not-uniform", message, hint, 0)
+
+
+def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signals:
+    """The signals with times in the unit of the spec."""
+    sheet, stated, scale = signals.sheet, preparation.sample_time, 1.0
+    if signals.unit and (signals.name or preparation.time_unit):
+        scale = SECONDS[signals.unit] / SECONDS[units.time_unit]
+    if scale != 1.0 and not (preparation.time_unit or signals.dated):
+        message = f"the times are in {signals.unit}, but the spec counts in {units.time_unit}"
+        hint = f"add --time-unit {signals.unit} to convert them, or set time_unit: {signals.unit}"
+        place = Location(str(sheet.path), 1, 1, signals.name)
+        raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
+    signals = replace(signals, time=signals.time * scale) if signals.name else signals
+    steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
+    stated = stated or (None if steps.size else sheet.sample_time)
+    if stated is not None:
+        stated *= scale if preparation.time_unit else 1.0
+        _check_stated(signals, stated, resample=preparation.resample)
+    typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
+    if abs(typical - units.sample_time) <= (EVEN if stated else _ALIKE) * units.sample_time:
+        return signals
+    default = " (as it is where none is stated)" if units.sample_time == 1.0 else ""
+    said = f"the data are sampled every {typical:.6g} {units.time_unit}, but sample_time is "
+    message = f"{said}{units.sample_time:g} {units.time_unit}{default}"
+    hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
+    place = Location(str(sheet.path), int(sheet.lines[min(1, len(sheet.lines) - 1)]), 1)
+    details = {"data_sample_time": typical}
+    raise DataError(Diagnostic("data-not-uniform", message, hint, "sample_time", place, details))

@@ -1,0 +1,107 @@
+"""Columns of numbers with their names, whatever file they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError, Diagnostic, Location
+
+_PLAIN = (
+    "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave a "
+    "cell empty where there is no value, and write 1 and 0 for ON and OFF"
+)
+
+
+@dataclass(frozen=True)
+class Written:
+    """How a file is written, as the user says: separator, decimal mark, form of times in column `time`."""
+
+    separator: str | None = None
+    decimal: str | None = None
+    time_format: str | None = None
+    time: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Numbers (n,), NaN where a cell is empty.
+
+    Attributes:
+        fault: the first row that holds something else, and its text; `wrong` and `hint` are for the message.
+        dated: whether the numbers are seconds since the first of some dates or times.
+        began: what that first counts, in seconds, since 1970 or, of times of day, since midnight.
+        of_day: whether the cells hold times of day without a date.
+        undated: whether the cells look like dates and cannot be read.
+        done: what was done to make times of the cells.
+    """
+
+    numbers: Array
+    fault: tuple[int, str] | None = None
+    wrong: str = "is not a finite number"
+    hint: str = _PLAIN
+    dated: bool = False
+    began: float = 0.0
+    of_day: bool = False
+    undated: bool = False
+    done: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What a file holds.
+
+    Attributes:
+        path, key: of the file, and the key of the spec that names it.
+        names: of the columns; empty where the file has none.
+        lines: (n,) of the text file, or of rows counted from one.
+        head: line and text of the header; `texts` what the rows say, for diagnostics.
+        shown: whether messages may show what the file holds: most of it is numbers.
+        passed: lines between rows of numbers that are no rows, and what they are (see `text`).
+        sample_time, time_unit: what the file itself states.
+        others: sheets of the workbook that were not read, where none was named.
+    """
+
+    path: Path
+    key: str
+    names: tuple[str, ...]
+    columns: tuple[Column, ...]
+    lines: NDArray[np.int64]
+    head: tuple[int, str] = (1, "")
+    texts: Sequence[str] = ()
+    shown: bool = True
+    passed: tuple[tuple[int, str], ...] = ()
+    sample_time: float | None = None
+    time_unit: str | None = None
+    others: tuple[str, ...] = ()
+
+    @property
+    def header(self) -> list[str]:
+        """The names in small letters."""
+        return [name.strip().lower() for name in self.names]
+
+    def name_of(self, at: int) -> str:
+        """The name of a column, or its number."""
+        name = self.names[at].strip() if at < len(self.names) and self.shown else ""
+        return name or f"column {at + 1}"
+
+    def error(self, code: str, message: str, hint: str, row: int | None = None) -> DataError:
+        """The error that points at a row, or at the header; what is missing may be in another sheet."""
+        if self.others and code == "data-missing-column":
+            hint += f"; only the first sheet was read: name one as '{self.path.name}#{self.others[0]}'"
+        line, text = self.head
+        if row is not None:
+            line, text = int(self.lines[row]), self.texts[row] if self.texts else ""
+        place = Location(str(self.path), line, 1, text if self.shown else "")
+        return DataError(Diagnostic(code, message, hint, self.key, place))
+
+
+def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = None) -> DataError:
+    """The error about a file that cannot be read at all, or not from some line on."""
+    location = None if line is None else Location(str(path), line, 1)
+    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key, location)

@@ -1,1 +1,0 @@
-"""Records of data, on their way to a room of their own."""

@@ -1,1 +1,0 @@
-"""Spec sections to mathematical objects; after this nothing takes a spec."""
