@@ -25,8 +25,8 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
 from inputdesign_cli.plant import Model, Rational, ScalarTransfer
+from inputdesign_cli.questions.building.controllers import loop_controller
 from inputdesign_cli.questions.building.system import build_loop
-from inputdesign_cli.questions.building.tuning import loop_controller
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
