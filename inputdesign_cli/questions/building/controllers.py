@@ -29,7 +29,7 @@ from inputdesign_cli.specification.models.transfer import DiscreteMatrix
 def controller_matrix(
     controller: Controller, sample_time: float, channels: tuple[int, int]
 ) -> TransferMatrix:
-    """C of the loop u = r - C y.
+    """Return C of the loop u = r - C y.
 
     Args:
         channels: numbers of inputs and of outputs.
@@ -73,16 +73,15 @@ class Process:
 
 
 def loop_controller(spec: Spec, stated: LoopMargin, model: Model) -> Controller | None:
-    """C of the loop: tuned, as stated, or that of the experiment.
+    """Return C of the loop to be kept: tuned, stated, or the controller of the experiment.
 
-    Rules tune on the plant at hand: where it is uncertain, each plant that it might be has its own settings,
-    as after the experiment.
+    An uncertain plant has settings for each scenario, since the rules will be applied to the estimate.
 
     Args:
-        model: the plant, of the structure of the spec's, whose named parameters may have other values.
+        model: of the plant of the spec, possibly with other values of its named parameters.
 
     Raises:
-        SpecError: `not-supported` for plants that the rules of tuning do not know.
+        SpecError: `not-supported` for plants that the rules are not made for.
     """
     if stated.tuning is None:
         return stated.controller or spec.experiment.controller
@@ -90,7 +89,7 @@ def loop_controller(spec: Spec, stated: LoopMargin, model: Model) -> Controller 
 
 
 def _with_values(spec: Spec, model: Model) -> Spec:
-    """The spec with the values that the named parameters of its plant have in a model."""
+    """The spec with the values of a model for the named parameters of its plant."""
     if spec.plant.kind != "continuous":
         return spec
     values = dict(zip(model.names, model.theta.tolist(), strict=True))
@@ -103,7 +102,7 @@ def _with_values(spec: Spec, model: Model) -> Spec:
 
 
 def tuned(process: Process, tuning: Tuning) -> Pid:
-    """The settings of a PI or PID controller."""
+    """Return the settings of a PI or PID controller."""
     K, T, L = process.gain, process.time_constant, process.dead_time
     if tuning.simc is not None:
         reach = (tuning.simc.tau_c or L) + L
@@ -128,7 +127,7 @@ def tuned(process: Process, tuning: Tuning) -> Pid:
 
 
 def process_of(spec: Spec) -> Process:
-    """The nominal plant by its gain, time constant and dead time; a second lag is shared by the half rule.
+    """Return gain, time constant and dead time of the nominal plant; the half rule shares a second lag.
 
     Raises:
         SpecError: `not-supported`.

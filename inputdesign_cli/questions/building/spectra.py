@@ -33,7 +33,7 @@ _SAME = 1e-9
 
 
 def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
-    """The family of `spectrum`; FIR of order 20 for a sampled plant when nothing is said.
+    """Return the family of `spectrum`; by default FIR of order 20 for a sampled plant.
 
     Args:
         band: of the excitation, see `excitation_band`.
@@ -96,7 +96,7 @@ def _fir(spec: Spec, inputs: int, order: int) -> FirBasis | MatrixFirBasis:
 
 
 def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
-    """A polynomial spectrum has a band of its own."""
+    """Refuse a polynomial spectrum whose own band exceeds limits.band."""
     limit, (lo, hi) = spec.limits.band, stated.band
     if limit is not None and (lo < limit[0] * (1 - _SAME) or hi > limit[1] * (1 + _SAME)):
         raise spec.complain(
@@ -108,10 +108,11 @@ def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
 
 
 def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, float]) -> Array:
-    """The given frequencies in the unit of the experiment, or even ones inside the band.
+    """The stated frequencies in the unit of the experiment, or evenly spaced ones inside the band.
 
     `lines: L` in discrete time are l pi / L, l = 1 .. L, the harmonics of a period of 2 L samples up to the
-    Nyquist frequency, where a spectrum is real. In continuous time they are L even ones inside the band.
+    Nyquist frequency, where a spectrum is real. In continuous time they are evenly spaced inside
+    the band.
     """
     if stated.frequencies:
         given = np.array(stated.frequencies)
@@ -135,13 +136,13 @@ _KEY = "spectrum.given.file"
 _NEGATIVE = -1e-9
 _DENSITY, _POWER = "phi", "power"
 _HINTS = {
-    _DENSITY: "give the spectral density, such as the spectrum.csv of a run",
-    _POWER: "give the power of each sinusoid, such as the spectrum.csv of a run",
+    _DENSITY: "give the spectral density, as spectrum.csv of a run has it",
+    _POWER: "give the power of each sinusoid, as spectrum.csv of a run has it",
 }
 
 
 def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectrum | LinesBasis, Array]:
-    """The spectrum of `r` inputs in a table, and its coefficients.
+    """Return the spectrum of `r` inputs in a table, and its coefficients.
 
     Columns phi, or phi_11, phi_12_re, phi_12_im, phi_22, .. are a density, linear in between. Columns power,
     or power_11, .. are the powers of sinusoids at these frequencies, their mean squares.
@@ -166,7 +167,7 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
         raise spec.complain(
             "too-large",
             f"{name} holds {frequency.size} sinusoids, and at most {most.most} are taken: {most.why}",
-            hint="leave out those of the least power",
+            hint="leave out the sinusoids of the least power",
             key=_KEY,
         )
     directions = vectors.swapaxes(1, 2).reshape(-1, r)
@@ -194,7 +195,7 @@ def _read(spec: Spec, name: str, symbol: str, r: int, *, least: int) -> tuple[Ar
 
 
 def _below_nyquist(spec: Spec, name: str, frequency: Array) -> Array:
-    """The frequencies, of which rounding may have put the last beyond pi.
+    """The frequencies; the last may lie beyond pi by rounding.
 
     Raises:
         DataError: `bad-table`.

@@ -1,8 +1,8 @@
 """Spec -> whether a design has a best value.
 
-It has none where excitation informs about the parameters and is neither paid for nor limited. Combinations of
-the inputs may be free, and frequencies: a loop takes all power of the input away at a pole of the plant on
-the unit circle, while power of the output there informs about the pole.
+It has no best value if some excitation informs about the parameters and is neither paid for nor limited.
+Combinations of the inputs may be free, and frequencies: at a pole of the plant on the unit circle, a loop
+takes all power of the input away, while the power of the output there informs about the pole.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ def free_information(question: Question) -> FreeInformation | None:
 def priced_powers(question: Question) -> list[PricedPower] | None:
     """Return the powers that are paid for, or all with an upper limit, each with its weight.
 
-    None where the density of the excitation itself is limited.
+    None if the density of the excitation itself is limited.
     """
     if question.goal == "cost":
         return weights_of(question.cost)
