@@ -17,7 +17,7 @@ from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
 from inputdesign_cli.specification.models.wording import show
-from inputdesign_cli.specification.named_files import keep_inside
+from inputdesign_cli.specification.schema import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import compose
 from inputdesign_cli.specification.yaml.places import Path, Places, Source
@@ -28,10 +28,10 @@ _WHOLE = 1e-9
 
 
 def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
-    """Put `samples` beside each `duration`: as many as fit.
+    """Add `samples` to each section with a `duration`: the largest number that fits.
 
-    An experiment without a length takes all that limits allow, unless the shortest one is asked for.
-    A duration or sample time that cannot be read is left to the validation.
+    An experiment without a length takes all that limits allow, unless the shortest one is asked for. The
+    validation reports durations and sample times that cannot be read.
     """
     step = data.get("sample_time", 1.0)
     for name in ("experiment", "limits"):
@@ -40,7 +40,7 @@ def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
             continue
         duration, path = section["duration"], (name, "duration")
         if "samples" in section:
-            message = "{key} stands beside samples, which says the same"
+            message = "{key} and samples state the same"
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", path, at_key=True)
         elif _positive(duration) and _positive(step):
             samples = int(duration / step + _WHOLE)
@@ -66,11 +66,11 @@ def _positive(value: Plain) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e40
 
 
-# Take the place of a section that could not be read, so that the rest can still be checked.
+# Sections in place of ones that could not be read, so that the rest can still be checked.
 _STAND_IN: dict[str, dict[str, Plain]] = {"plant": {"B": [0, 1]}, "noise": {"variance": 1}}
 
 _MOST_ROUNDS = 50
-_MOST_TOLD = 100
+_MOST_REPORTED = 100
 
 
 def load_spec(
@@ -86,8 +86,8 @@ def load_spec(
         path: The YAML file.
         overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
         confine: The folder outside of which the spec may name no files.
-        design: Whether it must ask for a design, or for an analysis, that can be answered; None: if it states
-            anything of one.
+        design: Whether it must ask for a design, or for an analysis, that can be answered; None: only if it
+            has some key of a design.
 
     Returns:
         The checked spec, with defaults filled in.
@@ -148,18 +148,18 @@ Spec.build = build
 
 
 def _first(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
-    """As many as somebody reads; the last one says how many more there are."""
-    left = len(diagnostics) - _MOST_TOLD
+    """The first diagnostics; the last one counts the others."""
+    left = len(diagnostics) - _MOST_REPORTED
     if left <= 0:
         return diagnostics
     more = Diagnostic("more-errors", f"{left} more errors are not shown", "mend these first")
-    return [*diagnostics[:_MOST_TOLD], more]
+    return [*diagnostics[:_MOST_REPORTED], more]
 
 
 def read_tree(
     text: str, file: str, overrides: Sequence[str], folder: FilePath, confine: FilePath | None = None
 ) -> Tree:
-    """The plain data of a spec with what it includes and the overrides, not yet checked.
+    """Return the plain data of a spec with included files and overrides, not yet checked.
 
     A file that lies outside `confine` is a diagnostic of the tree.
 
@@ -188,25 +188,25 @@ def check_mapping(tree: Tree) -> None:
 
 
 def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:
-    """Validate, take out what is wrong, and validate again, until the rest is a spec that can be checked.
+    """Validate, remove wrong parts, and validate again, until the rest is a spec that can be checked.
 
-    So a wrong number in `plant` does not hide a contradiction in `accuracy`. What is wrong with a part
-    that was taken out, or with what contains it, is a consequence and is not reported.
+    A wrong number in `plant` does not hide a contradiction in `accuracy`. Errors in a removed part, or in a
+    section around it, are consequences and are not reported.
     """
     data = copy.deepcopy(tree.data)
     if not design:
         _estimated_noise(data)
-    told: list[PathDiagnostic] = []
+    reported: list[PathDiagnostic] = []
     broken = set(tree.broken)
     for path in _empty(data, ()):
         comma = isinstance(path[-1], str) and path[-1].isdecimal()
         mend = "use a decimal point: a comma begins the next key"
         hint = mend if comma else "write a value, or remove the key"
-        told.append(PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True))
+        reported.append(PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True))
         broken.add(path)
         _prune(data, path)
     for one in in_samples(data):
-        told.append(one)
+        reported.append(one)
         broken.add(one.path)
         _prune(data, one.path)
     for attempt in range(_MOST_ROUNDS):
@@ -214,32 +214,32 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
             spec = Spec.model_validate(data)
         except ValidationError as error:
             found = translate(error, data, Spec)
-            # Under its right name a misspelt key would be there: it is neither missing nor without effect.
+            # The right name of a misspelt key counts as present: neither missing nor without effect.
             broken |= {(*one.path[:-1], one.meant) for one in found if one.meant}
-            told += [one for one in found if not _consequence(one, broken, attempt)]
+            reported += [one for one in found if not _consequence(one, broken, attempt)]
             for one in found:
                 broken.add(one.path)
                 _prune(data, one.path)
-            if len(told) > _MOST_TOLD:
-                return None, told
+            if len(reported) > _MOST_REPORTED:
+                return None, reported
             continue
         checked = [shorten(one, tree.data) for one in run_checks(spec, broken, design=design)]
-        return spec, told + [one for one in checked if not related(one.path, broken)]
-    return None, told
+        return spec, reported + [one for one in checked if not related(one.path, broken)]
+    return None, reported
 
 
 def _estimated_noise(data: dict[str, Plain]) -> None:
-    """The variance of the noise may be left out where it is to be estimated."""
+    """Supply the variance of the noise: it may be left out if it is to be estimated."""
     noise = data.setdefault("noise", {})
     if isinstance(noise, dict):
         noise.setdefault("variance", 1.0)
 
 
 def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool:
-    """Whether this follows from what was taken out before.
+    """Whether an error follows from parts that were removed before.
 
-    What was taken out may have told which kind of plant or spectrum this is, so later attempts say nothing
-    about keys and names: what is missing or too much was said by the first.
+    A removed part may have decided the kind of plant or spectrum. Later attempts therefore report no missing
+    or unknown keys and names: the first attempt has reported them.
     """
     if attempt > 0 and found.code in ("unknown-key", "unsuitable-key", "unknown-name", "unused-parameter"):
         return True
@@ -257,7 +257,7 @@ def _empty(data: Plain, path: Path) -> list[Path]:
 
 
 def _prune(data: dict[str, Plain], path: Path) -> None:
-    """Remove the deepest mapping entry on the path; a required section gets its stand-in."""
+    """Remove the deepest mapping entry on the path; replace a required section."""
     holder: dict[str, Plain] | None = None
     key = ""
     node: Plain = data
@@ -278,7 +278,7 @@ def _prune(data: dict[str, Plain], path: Path) -> None:
 
 
 def _with_defaults(spec: Spec) -> Spec:
-    """The defaults that depend on other sections."""
+    """Fill in the defaults that depend on other sections."""
     update: dict[str, Plain] = {}
     if "cost" not in spec.model_fields_set and spec.closed_loop:
         update["cost"] = Cost(input_power=1.0, output_power=1.0)
@@ -290,7 +290,7 @@ def _with_defaults(spec: Spec) -> Spec:
 
 
 def _sorted(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
-    """In the order of the file, then of the overrides; the same diagnostic is made once."""
+    """Sort by the order of the file, then of the overrides, without repetitions."""
     order = {file: i for i, (file, _) in enumerate(places.sources)}
 
     def place(diagnostic: Diagnostic) -> tuple[int, int, int]:

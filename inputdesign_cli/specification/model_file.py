@@ -1,4 +1,4 @@
-"""The model file that `identify` writes, read for what it says of its estimate."""
+"""Read the estimate in a model file that `identify` wrote."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from inputdesign_cli.specification.yaml.places import format_key
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import read
 
-# Sample times that only the digits of a text tell apart.
+# Sample times differ by this share at most, from rounding in a text.
 _SAME = 1e-6
 
 
 def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
-    """The block `estimate` of a file that the spec names at `key`; nothing else of the file is shown.
+    """Return the block `estimate` of a file that the spec names at `key`; errors show nothing else of it.
 
     Raises:
-        SpecError: `bad-model-file`; `wrong-estimate`, its data were sampled otherwise than the spec says;
-            what is wrong with the file itself.
+        SpecError: `bad-model-file`; `wrong-estimate`, its data have another sample time than the spec;
+            the file cannot be read.
     """
     try:
         text = read_text(spec.resolve_path(name))
@@ -56,7 +56,7 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
 
 
 def is_prior(parameters: Mapping[str, float], covariance: Sequence[Sequence[float]]) -> bool:
-    """Whether a later spec will accept such a block: the covariance is positive definite beyond rounding."""
+    """Whether a later spec will accept an estimate: its covariance is positive definite beyond rounding."""
     try:
         Estimated.model_validate({"parameters": parameters, "covariance": covariance})
     except ValidationError:
@@ -65,9 +65,9 @@ def is_prior(parameters: Mapping[str, float], covariance: Sequence[Sequence[floa
 
 
 def _check_clock(spec: Spec, name: str, data: Mapping[str, Plain], key: str) -> None:
-    """Raise `SpecError` (`wrong-estimate`) where the file tells another sample time than the spec."""
+    """Raise `SpecError` (`wrong-estimate`) if the file has another sample time than the spec."""
     step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
-    if not isinstance(step, int | float):  # as of files that were written before they told it
+    if not isinstance(step, int | float):  # older files have none
         return
     if unit == spec.time_unit and isclose(step, spec.sample_time, rel_tol=_SAME):
         return

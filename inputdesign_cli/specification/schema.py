@@ -1,22 +1,30 @@
-"""The JSON schema of a spec, for editors that complete and check YAML."""
+"""The JSON schema of a spec, for editors that complete and check YAML, and the keys that name files."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path as FilePath
+
+from inputdesign_cli.specification.models.fields import FILE_FORMAT
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
+from inputdesign_cli.specification.yaml.files import is_outside, outside
 from inputdesign_cli.specification.yaml.overrides import KEY
+from inputdesign_cli.specification.yaml.places import Path, format_key
 from inputdesign_cli.specification.yaml.plain import Plain
+from inputdesign_cli.specification.yaml.reader import Tree
 from inputdesign_cli.version import __version__
 
 
 def json_schema() -> dict[str, Plain]:
-    """The schema (draft 2020-12) of a spec file: keys, types, choices and descriptions.
+    """Return the schema (draft 2020-12) of a spec file: keys, types, choices and descriptions.
 
-    What spans several keys (shapes, stability, contradictions) is left to `idesign validate`.
+    `idesign validate` checks conditions on several keys (shapes, stability, contradictions).
     """
     schema = _tidy(Spec.model_json_schema())
     names = {"type": "string", "minLength": 1}
     schema["properties"][KEY] = {
-        "description": "Files whose blocks stand where the spec has none, such as model.yaml of `identify`.",
+        "description": "Files whose blocks the spec takes over, for example model.yaml of `identify`.",
         "anyOf": [names, {"type": "array", "items": names, "minItems": 1}],
     }
     schema.pop("required")
@@ -36,9 +44,9 @@ def json_schema() -> dict[str, Plain]:
 
 
 def _tidy(node: Plain) -> Plain:
-    """Without what pydantic adds for Python alone.
+    """Remove entries that pydantic makes for Python alone.
 
-    That is null for absent keys, class names as titles, and defaults that are whole sections.
+    They are null for absent keys, class names as titles, and defaults that are whole sections.
     """
     if isinstance(node, list):
         return [_tidy(item) for item in node]
@@ -56,3 +64,41 @@ def _tidy(node: Plain) -> Plain:
         if len(kept["anyOf"]) == 1:
             kept = {**kept.pop("anyOf")[0], **kept}
     return kept
+
+
+def named_files(data: Plain, path: Path = ()) -> Iterator[tuple[Path, str]]:
+    """Find every text at a key that may name a file, with its path; a title is none, whatever it says."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for step, value in items:
+        if isinstance(value, str) and step in _keys():
+            yield (*path, step), value
+        yield from named_files(value, (*path, step))
+
+
+def keep_inside(tree: Tree, folder: FilePath, confine: FilePath) -> None:
+    """Make a diagnostic of the tree of every file that lies outside `confine`."""
+    for path, name in named_files(tree.data):
+        if is_outside(folder / name, confine):
+            location = tree.places.location(tree.places.mark(path))
+            tree.diagnostics.append(outside(name, confine, format_key(path), location))
+
+
+@cache
+def _keys() -> frozenset[str]:
+    return frozenset(_file_keys(Spec.model_json_schema()))
+
+
+def _file_keys(node: Plain) -> Iterator[str]:
+    if isinstance(node, list):
+        for item in node:
+            yield from _file_keys(item)
+    elif isinstance(node, dict):
+        yield from (name for name, below in node.get("properties", {}).items() if _may_name_a_file(below))
+        for below in node.values():
+            yield from _file_keys(below)
+
+
+def _may_name_a_file(value: dict[str, Plain]) -> bool:
+    """Whether some alternative of a value, in nested unions too, is the name of a file."""
+    unions = (option for union in ("anyOf", "oneOf", "allOf") for option in value.get(union, ()))
+    return value.get("format") == FILE_FORMAT or any(map(_may_name_a_file, unions))

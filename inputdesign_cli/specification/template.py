@@ -1,4 +1,4 @@
-"""A spec before validation: what a sweep varies many times over, cheaper than reading the file each time."""
+"""A spec before validation, which a sweep varies many times without reading the file again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from inputdesign_cli.specification.loading import parse_spec, read_tree
 from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
-from inputdesign_cli.specification.named_files import named_files
+from inputdesign_cli.specification.schema import named_files
 from inputdesign_cli.specification.yaml.files import is_outside, read_text
 from inputdesign_cli.specification.yaml.overrides import apply_overrides
 from inputdesign_cli.specification.yaml.places import Places
@@ -27,7 +27,7 @@ from inputdesign_cli.specification.yaml.reader import Tree, read
 
 @dataclass(frozen=True)
 class SpecTemplate:
-    """The text of a spec, where it came from, the overrides that hold for all variants, and their data.
+    """The text of a spec, its file, the overrides of all variants, and their data.
 
     `included` are files whose blocks are in the data; outside `confine` the spec may name no files.
     """
@@ -41,7 +41,7 @@ class SpecTemplate:
     confine: FilePath | None = None
 
     def spec(self, overrides: Sequence[str]) -> Spec:
-        """The checked spec of one variant, without the `sweep` block.
+        """Return the checked spec of one variant, without the `sweep` block.
 
         Raises:
             SpecError: As `load_spec`.
@@ -50,7 +50,7 @@ class SpecTemplate:
         return parse_spec(self.text, self.file, every, folder=self.folder, confine=self.confine)
 
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
-        """The plain data of one variant, without the `sweep` block; nothing is checked but the overrides.
+        """Return the plain data of one variant, without the `sweep` block; only the overrides are checked.
 
         Raises:
             SpecError: An override that cannot be applied.
@@ -62,20 +62,20 @@ class SpecTemplate:
         return tree.data
 
     def digest(self, data: dict[str, Plain]) -> str:
-        """SHA-256 of what a variant says and of the contents of every file that it names."""
+        """Return the SHA-256 of a variant and of the contents of every file that it names."""
         contents = {n: hashlib.sha256(read_regular(self.folder / n)).hexdigest() for n in self.files(data)}
         return fingerprint({"spec": data, "files": contents} if contents else data)
 
     def files(self, data: dict[str, Plain]) -> list[str]:
-        """The files that a variant names, is free to name and finds, as it writes them."""
+        """Return the names of existing files that a variant names and may read."""
         named = {name for _, name in named_files(data) if os.path.isfile(self.folder / name)}
         return sorted(n for n in named if not (self.confine and is_outside(self.folder / n, self.confine)))
 
     def sweep(self) -> Sweep | None:
-        """The `sweep` block, checked; None where there is none.
+        """Return the checked `sweep` block; None if the spec has none.
 
         Raises:
-            SpecError: With the place of all that is wrong in the block.
+            SpecError: With the place of every error in the block.
         """
         if "sweep" not in self.data:
             return None
@@ -95,7 +95,7 @@ def read_template(
     confine: FilePath | None = None,
     text: str | None = None,
 ) -> SpecTemplate:
-    """Read a spec file with `overrides` applied, and check nothing yet; or its `text`, where that is known.
+    """Read a spec file, or its `text`, with `overrides` applied; nothing is checked yet.
 
     Raises:
         SpecError: The file cannot be read or is no mapping in YAML, an override cannot be applied, or a
@@ -110,7 +110,7 @@ def read_template(
 
 
 def same_content(one: str, other: str) -> bool:
-    """Whether two texts of a spec say the same, whatever their comments, layout and order of keys.
+    """Whether two texts of a spec agree, apart from comments, layout and order of keys.
 
     Raises:
         SpecError: One of them is not YAML.

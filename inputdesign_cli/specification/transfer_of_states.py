@@ -1,7 +1,7 @@
 """The transfer functions of a system in state space, in exact fractions.
 
-A float is a fraction, so the characteristic polynomial and the numerators are fractions too: what is zero
-is zero and what cancels cancels, whatever the unit of time and the coordinates of the states.
+A float is a fraction, so the characteristic polynomial and the numerators are fractions too. Zeros and
+common factors are exact, whatever the unit of time and the coordinates of the states.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ Exact = list[Fraction]
 Entry = tuple[list[float], list[float]]
 """Numerator and denominator, descending."""
 
-# What leaving a pole and a zero out may change of the response, and what the whole conversion may.
+# Largest relative change of the response by cancelling a pole and a zero, and by the whole conversion.
 _CANCELS = 1e-9
 _DIFFERS = 1e-8
-# The response of the states themselves is known to this share of the terms that it is the sum of.
+# The response of the states is known to this share of the terms of its sum.
 _ROUNDING = 1e-12
 _PRIME = 2**61 - 1
 
@@ -27,14 +27,14 @@ _PRIME = 2**61 - 1
 def transfer_functions(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, *, discrete: bool
 ) -> list[list[Entry]]:
-    """Rows of columns of numerators and denominators, without what they have in common.
+    """Return rows of columns of numerators and denominators without common factors.
 
     Args:
         A, B, C, D: (n, n), (n, r), (p, n) and (p, r).
 
     Raises:
-        SpecError: `not-finite`; `inaccurate-conversion` where polynomials of floats cannot say what the
-            states say, which a comparison of both over frequency shows.
+        SpecError: `not-finite`; `inaccurate-conversion` if polynomials of floats have another response over
+            frequency than the states.
     """
     matrices = [np.asarray(part, dtype=float) for part in (A, B, C, D)]
     if not all(np.isfinite(part).all() for part in matrices):
@@ -50,9 +50,9 @@ def transfer_functions(
 
 
 def _fractions(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> tuple[list[list[Exact]], Exact]:
-    """C adj(s I - A) B + D det(s I - A), and det(s I - A): the algorithm of Faddeev and Leverrier.
+    """Return C adj(s I - A) B + D det(s I - A), and det(s I - A), by the algorithm of Faddeev and Leverrier.
 
-    Integers do; a power of two scales each matrix. n products of n by n matrices.
+    A power of two makes integers of each matrix. There are n products of n by n matrices.
     """
     (a, per_a), (b, per_b), (c, per_c) = _integers(A), _integers(B), _integers(C)
     n, scale = len(A), per_b * per_c
@@ -87,7 +87,7 @@ def _integers(matrix: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def _coprime(top: Exact, bottom: Exact) -> tuple[Exact, Exact]:
-    """Without their greatest common divisor. Fractions grow fast, so a prime tells first if there is one."""
+    """Cancel the greatest common divisor, after a fast test for one in arithmetic modulo a prime."""
     top = _without_lead(top)
     if not top:
         return [Fraction(0)], [Fraction(1)]
@@ -157,7 +157,7 @@ def _converted(top: Exact, bottom: Exact, states: tuple[np.ndarray, ...], *, dis
 
 
 def _leads_of_rounding(top: list[float], excess: int, states: tuple[np.ndarray, ...]) -> int:
-    """How many first coefficients d, c b, c A b, .. are sums of terms that cancel but for rounding.
+    """Count the first coefficients d, c b, c A b, .. whose terms cancel but for rounding.
 
     Args:
         top: numerator.
@@ -178,17 +178,17 @@ def _leads_of_rounding(top: list[float], excess: int, states: tuple[np.ndarray, 
 
 
 def _inaccurate() -> SpecError:
-    message = "the transfer functions of this system in state space cannot be told in floating point"
+    message = "the transfer functions of this system in state space cannot be represented in floating point"
     hint = "name the entries of the states that are estimated, or use a longer unit of time"
     return bad_spec("inaccurate-conversion", message, hint=hint, key="plant")
 
 
 def _without_near_pairs(top: list[float], bottom: list[float], *, discrete: bool) -> Entry:
-    """Without poles that a zero hides but for rounding: (s - z)/(s - p) is 1 at every frequency."""
+    """Cancel poles with zeros that equal them but for rounding: (s - z)/(s - p) is 1 at every frequency."""
     zeros, poles = np.roots(top), np.roots(bottom)
     kept = []
     for zero in zeros:
-        # Its sup over the boundary of stability is the distance to the pole over that of the pole from there.
+        # The largest deviation from 1 is |z - p| over the distance of the pole from the stability boundary.
         away = np.abs(np.abs(poles) - 1.0) if discrete else np.abs(poles.real)
         effect = np.abs(poles - zero)
         near = np.flatnonzero(effect <= _CANCELS * away)
@@ -203,7 +203,7 @@ def _without_near_pairs(top: list[float], bottom: list[float], *, discrete: bool
 
 
 def _agree(entry: Entry, states: tuple[np.ndarray, ...], *, discrete: bool) -> bool:
-    """Whether polynomials and states have the same response wherever it bends, and between."""
+    """Whether polynomials and states have the same response on a grid around their corner frequencies."""
     A, b, c, d = states
     top, bottom = entry
     roots = np.concatenate([np.roots(top), np.roots(bottom), np.linalg.eigvals(A) if len(A) else []])

@@ -258,7 +258,7 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
 
 def _is_process(spec: Spec) -> bool:
     """Whether rules of tuning know the plant."""
-    from inputdesign_cli.questions.building.tuning import process_of
+    from inputdesign_cli.questions.building.controllers import process_of
 
     try:
         process_of(spec)

@@ -11,7 +11,7 @@ import scipy.stats
 
 from inputdesign_cli import assess, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.questions.building.tuning import Process, process_of, tuned
+from inputdesign_cli.questions.building.controllers import Process, process_of, tuned
 from inputdesign_cli.specification.models.loop import Amigo, LoopMargin, Simc, Tuning
 
 GAIN, LAG, DEAD, H = 2.1, 180.0, 25.0, 5.0

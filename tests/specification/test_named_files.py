@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli import Spec, load_spec
 from inputdesign_cli.cli.watch import _named_files as followed_files
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.named_files import named_files
+from inputdesign_cli.specification.schema import named_files
 from inputdesign_cli.specification.template import read_template
 from inputdesign_cli.specification.yaml.places import format_key
 from inputdesign_cli.sweeps.plan import build_plan

@@ -1,25 +1,35 @@
-"""Spec -> the controller of a loop, in q^-1."""
+"""Spec -> the controller of a loop in q^-1, as stated or tuned on the nominal plant.
+
+Rules of tuning: [skogestad-2003] with the half rule, and [astrom-hagglund-2004]. The hold delays by half a
+sample on average, which counts as dead time.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
-from inputdesign_cli.plant import Rational, TransferMatrix, delayed, discretised, pid
+from inputdesign_cli.plant import Model, Rational, TransferMatrix, delayed, discretised, pid
 from inputdesign_cli.questions.building.weights import rational
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import (
     ContinuousController,
     Controller,
     LoopsController,
+    Pid,
     PidController,
     SingleController,
 )
+from inputdesign_cli.specification.models.loop import LoopMargin, Tuning
 from inputdesign_cli.specification.models.transfer import DiscreteMatrix
 
 
 def controller_matrix(
     controller: Controller, sample_time: float, channels: tuple[int, int]
 ) -> TransferMatrix:
-    """C of the loop u = r - C y.
+    """Return C of the loop u = r - C y.
 
     Args:
         channels: numbers of inputs and of outputs.
@@ -47,3 +57,115 @@ def _single(controller: SingleController, sample_time: float) -> Rational:
             return delayed(made, controller.delay)
         case _:
             return rational(controller)
+
+
+_KEY = "accuracy.loop.tuning"
+_REAL = 1e-9
+
+
+@dataclass(frozen=True)
+class Process:
+    """gain e^(-dead_time s) / (time_constant s + 1), or gain e^(-dead_time s) / s without a time constant."""
+
+    gain: float
+    time_constant: float | None
+    dead_time: float
+
+
+def loop_controller(spec: Spec, stated: LoopMargin, model: Model) -> Controller | None:
+    """Return C of the loop to be kept: tuned, stated, or the controller of the experiment.
+
+    An uncertain plant has settings for each scenario, since the rules will be applied to the estimate.
+
+    Args:
+        model: of the plant of the spec, possibly with other values of its named parameters.
+
+    Raises:
+        SpecError: `not-supported` for plants that the rules are not made for.
+    """
+    if stated.tuning is None:
+        return stated.controller or spec.experiment.controller
+    return PidController(pid=tuned(process_of(_with_values(spec, model)), stated.tuning))
+
+
+def _with_values(spec: Spec, model: Model) -> Spec:
+    """The spec with the values of a model for the named parameters of its plant."""
+    if spec.plant.kind != "continuous":
+        return spec
+    values = dict(zip(model.names, model.theta.tolist(), strict=True))
+    changes: dict[str, object] = {
+        ".".join(("plant", *map(str, known.place))): values[known.label]
+        for known in spec.plant.named_parameters
+        if values.get(known.label, known.value) != known.value
+    }
+    return spec.with_(**changes) if changes else spec
+
+
+def tuned(process: Process, tuning: Tuning) -> Pid:
+    """Return the settings of a PI or PID controller."""
+    K, T, L = process.gain, process.time_constant, process.dead_time
+    if tuning.simc is not None:
+        reach = (tuning.simc.tau_c or L) + L
+        if T is None:
+            return Pid(Kp=1.0 / (K * reach), Ti=4.0 * reach, sample=tuning.sample)
+        return Pid(Kp=T / (K * reach), Ti=min(T, 4.0 * reach), sample=tuning.sample)
+    assert tuning.amigo is not None
+    if tuning.amigo.type == "pi":
+        if T is None:
+            return Pid(Kp=0.35 / (K * L), Ti=13.4 * L, sample=tuning.sample)
+        gain = (0.15 + (0.35 - L * T / (L + T) ** 2) * T / L) / K
+        times = 0.35 * L + 13.0 * L * T**2 / (T**2 + 12.0 * L * T + 7.0 * L**2)
+        return Pid(Kp=gain, Ti=times, sample=tuning.sample)
+    if T is None:
+        return Pid(Kp=0.45 / (K * L), Ti=8.0 * L, Td=0.5 * L, sample=tuning.sample)
+    return Pid(
+        Kp=(0.2 + 0.45 * T / L) / K,
+        Ti=(0.4 * L + 0.8 * T) / (L + 0.1 * T) * L,
+        Td=0.5 * L * T / (0.3 * L + T),
+        sample=tuning.sample,
+    )
+
+
+def process_of(spec: Spec) -> Process:
+    """Return gain, time constant and dead time of the nominal plant; the half rule shares a second lag.
+
+    Raises:
+        SpecError: `not-supported`.
+    """
+    plant = spec.plant
+    refuse = _refusal(spec)
+    if plant.kind != "continuous" or not plant.sampled:
+        raise refuse("the plant is not written in s with sample: zoh")
+    if (plant.inputs, plant.outputs) != (1, 1):
+        raise refuse("the plant has several channels")
+    matrix = plant.continuous
+    above = np.trim_zeros(np.array(matrix.numerator_matrix[0][0], dtype=float), "f")
+    below = np.trim_zeros(np.array(matrix.denominator_matrix[0][0], dtype=float), "f")
+    poles = np.roots(below)
+    if above.size != 1 or not 1 <= poles.size <= 2:
+        raise refuse("the plant has zeros, or more than two lags")
+    if np.any(np.abs(poles.imag) > _REAL * np.abs(poles)):
+        raise refuse("the plant oscillates")
+    lags = sorted((float(-1.0 / p.real) for p in poles if p != 0.0), reverse=True)
+    integrates = len(lags) < poles.size
+    if integrates and len(lags) == 0 and poles.size == 2:
+        raise refuse("the plant integrates twice")
+    dead_time = float(matrix.delays[0][0]) + 0.5 * spec.sample_time
+    gain = float(above[0] / below[-2 if integrates else -1])
+    kept = None if integrates else lags.pop(0)
+    if lags:
+        dead_time += 0.5 * lags[0]
+        kept = None if kept is None else kept + 0.5 * lags[0]
+    return Process(gain, kept, dead_time)
+
+
+def _refusal(spec: Spec) -> Callable[[str], Exception]:
+    def refuse(why: str) -> Exception:
+        return spec.complain(
+            "not-supported",
+            f"{why}, and the rules of tuning are for a gain, one or two lags and a dead time",
+            hint="tune it yourself: accuracy.loop.controller: {pid: {Kp: .., Ti: ..}}",
+            key=_KEY,
+        )
+
+    return refuse

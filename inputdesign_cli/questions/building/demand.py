@@ -1,6 +1,6 @@
-"""Whether memory and time suffice: what several keys of a spec ask for together, before it starts.
+"""Estimate, before a design starts, whether memory and time suffice for several keys together.
 
-What a single key may ask for stands in `specification.models.sizes`.
+The sizes of single keys stand in `specification.models.sizes`.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from inputdesign_cli.spectrum import Basis
 _MOST_BYTES = 4 * 2**30
 _NODES = 2000  # of an integral, where poles are well damped
 _COPIES = 4  # of a record's gradient while its information matrix is formed
-# A round takes so many steps of the solver; in each, matrices of so many cuts are factored, and products of
-# all pairs of entries of the information matrix are summed over them and taken to so many unknowns.
+# A round takes _STEPS steps of the solver. Each factors the matrices of _CUTS cuts, and sums the products of
+# all pairs of entries of the information matrix for _UNKNOWNS unknowns.
 _CUTS, _STEPS, _ROUNDS, _UNKNOWNS = 50, 15, 15, 250
 _CRITERION, _FACTORINGS = 4, 60
 _PER_SECOND = 1e10  # multiplications
 _PROBES, _TRACE = 40, 1e-12
-_GENEROUS = 10  # times the first rounds: plants that are hard take as long
+_GENEROUS = 10  # hard plants take this many times as long as the first rounds
 
 
 def check_model(spec: Spec, model: Model) -> None:
-    """Whether the gradients of a model of so many parameters and channels fit.
+    """Refuse models whose gradients do not fit into memory.
 
     Raises:
         SpecError: `too-large`.
@@ -44,9 +44,9 @@ def check_model(spec: Spec, model: Model) -> None:
 
 
 def check_effects(spec: Spec, experiment: Experiment) -> None:
-    """Whether every parameter of the plant leaves a trace in the samples, beyond the rounding of G.
+    """Refuse plants with a parameter that changes G by no more than rounding.
 
-    One that is zero by nature has no size of its own: it must change something at all.
+    The change is a shift by the whole value; a parameter that is zero must have some effect on G.
 
     Raises:
         SpecError: `without-effect`.
@@ -61,8 +61,8 @@ def check_effects(spec: Spec, experiment: Experiment) -> None:
         names = _names_of(model, model.in_plant & silent)
         raise spec.complain(
             "without-effect",
-            f"{names}: to change it by a little leaves G as it is at the nominal parameters, so that no data "
-            "tell it",
+            f"{names}: a small change of it does not change G at the nominal parameters, so that no data "
+            "determine it",
             hint=f"choose nominal values at which G depends on it, or write plant.known: [{names}]",
             key="plant",
         )
@@ -72,8 +72,8 @@ def check_effects(spec: Spec, experiment: Experiment) -> None:
     names = _names_of(model, lost)
     raise spec.complain(
         "without-effect",
-        f"{names}: to change it by all of its value moves G by less than {_TRACE:g} of itself at every "
-        "frequency of the experiment, so that no data tell it",
+        f"{names}: a change by all of its value moves G by less than {_TRACE:g} of itself at every "
+        "frequency of the experiment, so that no data determine it",
         hint="dynamics that are much faster than the sampling leave no trace: sample faster (sample_time), "
         f"or write plant.known: [{names}]",
         key="plant",
@@ -85,7 +85,7 @@ def _names_of(model: Model, which: NDArray[np.bool_]) -> str:
 
 
 def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
-    """Whether the programs of a convex design fit, and their first rounds end within the time limit.
+    """Refuse convex designs that do not fit into memory, or whose first rounds exceed the time limit.
 
     A program has a matrix inequality of the order of the information matrix for each frequency that binds.
 
@@ -107,7 +107,7 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
         step += entries**2 * _UNKNOWNS
         return step * _STEPS * _ROUNDS / _PER_SECOND
 
-    # What takes less than a second is tried.
+    # Anything below a second is tried.
     limit = max(spec.solver.time_limit, 1.0)
     if seconds(size) > limit:
         fits = max(k for k in range(size) if seconds(k) <= limit)
@@ -122,13 +122,13 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
 
 
 def _rounded(seconds: float) -> str:
-    """Two digits, rounded up, written out."""
+    """Round up to two digits, and write them out."""
     unit = 10 ** max(len(f"{seconds:.0f}") - 2, 0)
     return str(int(-(-seconds // unit) * unit))
 
 
 def check_record(spec: Spec, parameters: int) -> None:
-    """Whether the record fits; without a section `signal` one that does not is left out.
+    """Refuse records that are too long; without a section `signal` they are left out later.
 
     Raises:
         SpecError: `too-large`.
@@ -148,7 +148,7 @@ def check_record(spec: Spec, parameters: int) -> None:
 
 
 def longest_record(parameters: int, outputs: int) -> int:
-    """The most samples of a record whose gradient fits."""
+    """Return the most samples of a record whose gradient fits into memory."""
     return min(_MOST_BYTES // (8 * _COPIES * parameters * outputs), most("signal.samples"))
 
 

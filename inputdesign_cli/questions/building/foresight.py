@@ -1,4 +1,4 @@
-"""Spec -> whether the data of its experiment may leave other dead times, and what to do about it."""
+"""Spec -> whether the data of its experiment may fit other dead times as well, and what to do about it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from inputdesign_cli.questions.building.prior import build_earlier
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.specification import Spec
 
-# Filtered noise: power between the lines of a multisine, where whole periods of them differ.
+# Orders of filtered noise with power between the lines of a multisine, where other dead times differ.
 _ORDERS = (12, 60)
 
 
 def build_foresight(
     spec: Spec, nominal: Experiment, design: Callable[[Spec], Result] | None
 ) -> Foresight | None:
-    """How rivals are foreseen; None for plants without dead times that are estimated.
+    """Return how rival dead times are foreseen; None for plants that have none to be estimated.
 
     Args:
         nominal: the experiment, in raw parameters.
-        design: the result of a design, without looking at others; None where nothing is designed.
+        design: solves a spec without a look at other spectra; None if nothing is designed.
     """
     model = nominal.model
     late = np.flatnonzero(model.dead_times)
@@ -35,7 +35,7 @@ def build_foresight(
         return None
     names = ", ".join(_quoted(model.names[i]) for i in late)
     stated = spec.spectrum
-    # Several plants take their time, and noise of a filter has no other spectrum beside it.
+    # Designs for several plants take long, and filtered noise needs no other spectrum.
     alone = spec.uncertainty is not None or stated is None or stated.type == "fir"
 
     def solved(order: int) -> Result:
@@ -57,5 +57,5 @@ def build_foresight(
 
 
 def _quoted(name: str) -> str:
-    """A name as it is written in a list of YAML."""
+    """Write a name as in a list of YAML."""
     return f'"{name}"' if "[" in name else name

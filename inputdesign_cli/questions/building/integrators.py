@@ -1,4 +1,4 @@
-"""Spec -> where the excitation of a plant that integrates may have power, so that what it tells is finite."""
+"""Spec -> the band of the excitation of a plant that integrates, so that the information is finite."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from inputdesign_cli.specification.models.spectrum import (
     MultisineSpectrum,
 )
 
-# Poles so near to zero are poles there; those of gradients are of no higher order.
+# Poles nearer to zero are poles at zero; poles of gradients are of no higher order.
 _AT_ZERO, _HIGHEST = 1e-7, 8
-# On half the distance to the next pole so many points leave the sums exact to rounding.
+# With this number of points on half the distance to the next pole, the sums are exact to rounding.
 _POINTS = 128
 _NONE = slice(20, 60)
 _ABOVE, _ROUNDING = 30.0, 1e-10
-# Of the band, what is left out where nothing else says it.
+# The share of the band that a hint proposes to leave out.
 _MARGIN = 0.01
 
 
 def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
-    """The experiment, its band without frequency zero where only lines beside it are excited.
+    """Return the experiment with a finite information matrix: its band starts at the lowest line.
 
-    Next to a pole at z = 1 that is not in a loop the gradient of the prediction grows without end, and so
-    does what any power there tells.
+    Near a pole at z = 1 that is not in a loop, the gradient of the prediction has no bound, and neither has
+    the information of any power there.
 
     Raises:
         SpecError: `infinite-information`.
     """
     source = experiment.model if experiment.loop is None else experiment.loop
     if not experiment.model.continuous:
-        endless = _growing(experiment, source.noise_gradient)
-        if endless:
+        unbounded = _growing(experiment, source.noise_gradient)
+        if unbounded:
             fed_back = "" if experiment.loop is None else " and fed back"
-            first = endless.split(", ")[0]
+            first = unbounded.split(", ")[0]
             part = "plant" if _moves_plant(experiment, first) else "noise"
             another = (
                 "in q^-1 it may be free as a root of A, where the noise passes through it as well"
@@ -58,7 +58,7 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
                 )
             raise spec.complain(
                 "infinite-information",
-                f"the noise alone, which is integrated{fed_back}, tells without end of {endless}",
+                f"the noise alone, integrated{fed_back}, gives infinite information about {unbounded}",
                 hint=hint,
                 key=part,
             )
@@ -76,10 +76,10 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     other = "spectrum: {type: free} with " if fir else ""
     raise spec.complain(
         "infinite-information" if grown else "infinite-output",
-        f"the plant integrates: power at frequency zero tells without end of {grown}, so that no design with "
-        "power there has a value"
+        f"the plant integrates: power at frequency zero gives infinite information about {grown}, so that no "
+        "design with power there has a value"
         if grown
-        else "the plant integrates: power at frequency zero makes the outputs wander without end, so that "
+        else "the plant integrates: power at frequency zero makes the outputs drift without bound, so that "
         "they have no power",
         hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}limits: {{band: "
         f"[{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}; or make the experiment in closed loop{loop}",
@@ -88,7 +88,7 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
 
 
 def _wanders(experiment: Experiment) -> bool:
-    """Whether outputs grow without end towards zero, where what they tell may not: where noise drifts."""
+    """Whether outputs have no bound at frequency zero, while drifting noise keeps the information finite."""
     model = experiment.model
     if experiment.loop is not None or model.continuous:
         return False
@@ -96,33 +96,33 @@ def _wanders(experiment: Experiment) -> bool:
 
 
 def _moves_plant(experiment: Experiment, name: str) -> bool:
-    """Whether G depends on a parameter: those of the noise alone leave it as it is."""
+    """Whether G depends on a parameter."""
     model = experiment.model
     gradient = model.plant_gradient([0.3 * experiment.band[1]])
     return bool(np.any(gradient[:, model.names.index(name)]))
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
-    """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero."""
+    """The names of the parameters whose gradient (n, k, ..) has a pole at frequency zero."""
     grows = _grows(experiment, gradient)
     return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
 
 
 def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]) -> NDArray[np.bool_]:
-    """(k,): which parts of a response (n, k, ..) grow without end towards zero.
+    """Which parts (k,) of a response (n, k, ..) have a pole at frequency zero.
 
-    Its principal part there tells, however small: Cauchy's integrals over a circle in the plane of
-    frequencies that holds no other pole. On the axis a weak pole would be seen from very near only.
+    Its principal part follows from Cauchy's integrals over a circle that encloses no other pole. Values on
+    the axis would show a weak pole only from very near.
     """
     source = experiment.model if experiment.loop is None else experiment.loop
     distance = np.abs(source.singularities)
     nearest = float(np.min(distance[distance > _AT_ZERO], initial=experiment.band[1]))
-    # Far off the axis late signals differ too much in size.
+    # Far from the axis the sizes of late signals differ too much.
     radius = min(0.5 * nearest, 1.0 / max(source.memory, 1.0))
     turn = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
     around = response(radius * turn)
     powers: Array = np.abs(np.fft.ifft(around, axis=0)).max(axis=(2, 3))
-    # Poles of such high order there are none: what stands there is rounding, as in all others.
+    # No pole has an order this high: these coefficients are rounding, as large as in all others.
     rounding = np.maximum(_ABOVE * powers[_NONE].max(axis=0), _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
     return np.asarray(powers[1 : _HIGHEST + 1].max(axis=0) > rounding)
 

@@ -21,7 +21,7 @@ _KEY = "limits.spectrum"
 
 
 def build_power_limits(spec: Spec) -> list[PowerLimit]:
-    """Upper and lower limits on the powers; lower limits of zero say nothing and are left out."""
+    """Return the upper and lower limits on the powers, without lower limits of zero."""
     limits: list[PowerLimit] = []
     stated_limits = {
         "input": spec.limits.input_power,
@@ -46,9 +46,9 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
 
 
 def implied_limits(spec: Spec) -> list[PowerLimit]:
-    """What limits on single samples leave of the powers: with |u| <= a an input has no more than a^2.
+    """Return the limits on powers that follow from limits on single samples: a^2 from |u| <= a.
 
-    Of values that are held over h samples there is one move in h.
+    Values that are held over h samples move once in h samples.
     """
     kinds: list[PowerKind] = ["input", "output", "moves"]
     most = [*stated_peaks(spec), stated_moves(spec) if spec.plant.sampled else None]
@@ -62,7 +62,7 @@ def implied_limits(spec: Spec) -> list[PowerLimit]:
 
 
 def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
-    """Bounds on the density of the excitation at every frequency of its band.
+    """Return the bounds on the density of the excitation at every frequency of its band.
 
     Raises:
         SpecError, DataError: a curve cannot be used, or the lower bound crosses the upper one.
@@ -82,7 +82,7 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
         if upper and zero is None and level(grid).min() <= 0.0:
             zero = float(grid[int(np.argmin(level(grid)))])
         if zero is not None:
-            why = "no spectrum with a density vanishes there and stays positive around"
+            why = "no spectrum with a density vanishes there and is positive around it"
             relative = "how far a spectrum stays above it is counted relative to it"
             raise spec.complain(
                 "bad-limit",
@@ -109,7 +109,7 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
 def _level(
     spec: Spec, curve: Curve, key: str, band: tuple[float, float]
 ) -> tuple[Callable[[Array], Array], Array, ComplexArray, float | None]:
-    """The level over frequency in rad/sample, its kinks, points near which it changes fast, where it is zero.
+    """Return the level over frequency in rad/sample, its kinks, points of fast change, and its zero.
 
     Raises:
         SpecError: `bad-limit`, it is infinite somewhere in the band.

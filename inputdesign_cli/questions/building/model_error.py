@@ -25,10 +25,10 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
 from inputdesign_cli.plant import Model, Rational, ScalarTransfer
+from inputdesign_cli.questions.building.controllers import loop_controller
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_loop
 from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
-from inputdesign_cli.questions.building.tuning import loop_controller
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
@@ -40,12 +40,12 @@ _GROWS = 5.0
 
 
 def confidence_factor(probability: float, parameters: int) -> float:
-    """alpha with Pr(chi-squared with this many degrees of freedom <= alpha^2) = probability."""
+    """Return alpha with Pr(chi-squared with this many degrees of freedom <= alpha^2) = probability."""
     return float(np.sqrt(2.0 * scipy.special.gammaincinv(parameters / 2.0, probability)))
 
 
 def model_error_alpha(spec: Spec, model: Model) -> float:
-    """alpha as given, or from the confidence and the number of parameters of G."""
+    """Return alpha as stated, or from the confidence and the number of parameters of G."""
     error = spec.accuracy.error
     if error is not None and error.alpha is not None:
         return error.alpha
@@ -54,7 +54,7 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 
 def build_calibration(spec: Spec) -> Calibration | None:
-    """How alpha is calibrated where `confidence: {exact: ..}` asks for that."""
+    """Return how alpha is calibrated for `confidence: {exact: ..}`; None without it."""
     error = spec.accuracy.error
     stated = None if error is None else error.calibrated
     if stated is None or stated.exact is None:
@@ -65,7 +65,7 @@ def build_calibration(spec: Spec) -> Calibration | None:
 def required_band(
     spec: Spec, experiment: Experiment, stated: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """The band of a requirement: as stated, or all frequencies, in continuous time those that are excited."""
+    """Return the band of a requirement: stated, or all (in continuous time: all excited) frequencies."""
     if not spec.plant.sampled:
         return stated or experiment.band
     lo, hi = spec.clip_band(stated)
@@ -75,13 +75,12 @@ def required_band(
 def build_model_errors(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> list[OnModelError]:
-    """The bound on the model error, stated or of a loop, in raw coordinates.
+    """Return the bounds on the model error, stated or of a loop, in raw coordinates.
 
-    One an entry of G that is not absent, or one of the norm; empty when it is not asked for.
+    There is one for each entry of G that is present, or one of the norm; none if none is asked for.
 
     Args:
-        nominal: where the experiment is on a scenario, the plant of the spec: r_adm may be that of the one or
-            of the other.
+        nominal: the plant of the spec, if the experiment is on a scenario; r_adm may follow from either.
 
     Raises:
         SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
@@ -99,7 +98,7 @@ def build_model_errors(
 
 
 def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
-    """What has r_u of every entry where no bound on it is stated; r_adm means nothing."""
+    """Return model errors of every entry, to evaluate r_u without a stated bound; r_adm has no meaning."""
     band, alpha = required_band(spec, experiment, None), model_error_alpha(spec, experiment.model)
     return [
         ModelError(experiment=experiment, band=band, entry=entry, admissible=Absolute(1.0), alpha=alpha)
@@ -149,7 +148,7 @@ def _on_entry(
 
 
 def _check_nowhere_void(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], key: str) -> None:
-    """Raise `SpecError` (`not-supported`) where a weight vanishes: ellipsoids are compared with r_adm."""
+    """Raise `SpecError` (`not-supported`) if a weight vanishes: ellipsoids are compared with r_adm."""
     void, units = on_the_limit(weight.zero_points, band), build_units(spec)
     if void is not None:
         raise spec.complain(
@@ -162,7 +161,7 @@ def _check_nowhere_void(spec: Spec, weight: ScalarTransfer, band: tuple[float, f
 
 
 def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
-    """What to say of a margin that the loop does not even have with the nominal plant."""
+    """Return the error for a margin that the loop does not have with the nominal plant."""
     stated = spec.accuracy.loop
     if stated is None or not isinstance(admissible, Sensitivity):
         return None
@@ -172,23 +171,23 @@ def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> Sp
         f"with the nominal plant |S| of the loop reaches {peak:.4g} already, and the margin asks for "
         f"{stated.peak:.4g} at most",
         hint="tune the controller more slowly (a larger tau_c), or ask for less of a margin than "
-        f"{stated.allowing(peak)} (the nearer, the longer the experiment), such as "
+        f"{stated.allowing(peak)} (the nearer, the longer the experiment), for example "
         f"{stated.allowing(1.2 * peak)}",
         key=_LOOP,
     )
 
 
 def _has_floor(spec: Spec) -> bool:
-    """Whether r_adm of scenarios is positive since that of the nominal plant is."""
+    """Whether r_adm of scenarios is positive since r_adm of the nominal plant is."""
     stated = spec.uncertainty
     return stated is not None and (stated.r_adm == "fixed" or stated.floor > 0.0)
 
 
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
-    """Raise `SpecError` (`unbounded-error`) where no information is enough for the requirement.
+    """Raise `SpecError` (`unbounded-error`) if no information is enough for the requirement.
 
-    That is at a pole of G on the unit circle: the estimated pole is off by a little, and the error of G
-    there grows faster than G itself.
+    At a pole of G on the unit circle, a small error of the estimated pole makes the error of G grow faster
+    than G itself.
     """
     lo, hi = requirement.band
     units = build_units(spec)
@@ -202,14 +201,13 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
                 "unbounded-error",
                 f"G has a pole on the unit circle, at {where}, that is estimated: no experiment bounds the "
                 "error there",
-                hint="leave that frequency out, such as "
-                f"{key}.band: [{_beside(at, lo, hi, units.frequency)}]",
+                hint=f"leave that frequency out: {key}.band: [{_beside(at, lo, hi, units.frequency)}]",
                 key=key,
             )
 
 
 def _beside(at: float, lo: float, hi: float, unit: float) -> str:
-    """The larger part of the band without the frequency, in the user's unit."""
+    """The larger part of the band on one side of a frequency, in the user's unit."""
     margin = 1e-2 * (hi - lo)
     left, right = (lo, at - margin), (at + margin, hi)
     edges = right if right[1] - right[0] >= left[1] - left[0] else left
@@ -245,7 +243,7 @@ def _admissible_of(
     entry: Entry | None,
     nominal: Model | None,
 ) -> AdmissibleError:
-    """r_adm of a model; of a scenario as `uncertainty` says, its own down to a floor or the nominal one.
+    """Return r_adm of a model; of a scenario its own down to a floor, or the nominal one (`uncertainty`).
 
     Raises:
         SpecError: see `build_model_errors`.
@@ -263,7 +261,7 @@ def _admissible_of(
 def _admissible(
     spec: Spec, error: StatedError, model: Model, band: tuple[float, float], entry: Entry | None
 ) -> AdmissibleError:
-    """r_adm; of a table its column r_adm_21 for an entry, or r_adm for all alike."""
+    """Return r_adm; a table has a column r_adm_21 for each entry, or r_adm for all."""
     if error.relative is not None:
         return Relative(model, error.relative, entry)
     if error.absolute is not None:
@@ -278,10 +276,10 @@ def _admissible(
 
 
 def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> Table:
-    """One column of a file, positive over the whole `band` of the section that has `key`.
+    """Return one column of a file, positive over the whole `band` of the section that has `key`.
 
     Raises:
-        DataError: the file cannot be read, or does not tell the column on the whole band (`bad-table`).
+        DataError: the file cannot be read, or does not have the column on the whole band (`bad-table`).
     """
     units = build_units(spec)
     columns = read_frequency_table(spec, name, [column], key)
@@ -329,7 +327,7 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float
 
 
 def _settings(controller: Controller) -> dict[str, float] | None:
-    """Those of a PID controller; none of others."""
+    """The settings of a PID controller; empty for other controllers."""
     if controller.kind != "pid":
         return {}
     stated = controller.pid

@@ -1,4 +1,4 @@
-"""Spec -> what is estimated: coefficients, some of them known, or named parameters that they follow from."""
+"""Spec -> the parameters to be estimated: coefficients, some of them known, or named parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from inputdesign_cli.specification.models.plant import ContinuousPlant, Polynomi
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
-    """A list of one dead time for each entry that has one, empty lists for the others; empty if none has.
+    """Return a list of one dead time for each entry that has one, else an empty list; () if none has.
 
     See `Expression.present`.
     """
@@ -30,14 +30,14 @@ def delays_of(plant: ContinuousPlant) -> Rows:
 
 
 def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
-    """Of each numerator, -1 where the entry is absent; see `Expression.present`."""
+    """Return the degree of each numerator, -1 for an absent entry; see `Expression.present`."""
     return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_terms.numerator]
 
 
 def reparametrised(
     spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, model: Listed
 ) -> Model:
-    """The model in the parameters that the spec names and without those that it knows.
+    """Return the model in the named parameters of the spec, without the known ones.
 
     Raises:
         SpecError: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
@@ -70,10 +70,10 @@ def reparametrised(
 def _of_named(
     spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameters: Sequence[Parameter]
 ) -> Parametrisation:
-    """The named parameters of the plant, and those of the noise as they are."""
+    """The named parameters of the plant, then the coefficients of the noise."""
     named = plant.named_parameters
     noise = [p for p in parameters if p.letter in "cd"]
-    # No name of a parameter of the plant: those are in ASCII.
+    # Names of parameters of the plant are in ASCII: these differ from all of them.
     symbols = {p.name: f"\N{GREEK SMALL LETTER EPSILON}{i}" for i, p in enumerate(noise)}
     terms = [Expression(symbols[p.name]) if p.letter in "cd" else _term(plant, p) for p in parameters]
     labels = (*(one.label for one in named), *symbols)
@@ -113,7 +113,7 @@ def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter:
 
 
 def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
-    """Raise `SpecError` (`unknown-parameter`) for the name of a parameter that the model does not have."""
+    """Raise `SpecError` (`unknown-parameter`) if the model has no parameter of this name."""
     if name not in known:
         of_plant = spec.plant.known if spec.plant.kind != "regression" else None
         fixed = name in (*(of_plant or ()), *(spec.noise.known or ())) and not key.endswith("known")
@@ -126,7 +126,7 @@ def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
 
 
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
-    """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
+    """Return a matrix over some named parameters as one (k, k) over all `known`; no names stand for all.
 
     Raises:
         SpecError: `unknown-parameter` or `wrong-shape`.

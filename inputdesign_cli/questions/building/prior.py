@@ -18,14 +18,14 @@ PRIOR = "experiment.prior.information"
 
 @dataclass(frozen=True)
 class StatedPrior:
-    """Information (m, m) of the parameters with these names (all, when none are named), and their values."""
+    """The information (m, m) about named parameters (no names stand for all), and their values."""
 
     matrix: Array
     names: tuple[str, ...] | None
     values: Mapping[str, float] | None
 
     def over(self, spec: Spec, known: Sequence[str]) -> Array:
-        """(k, k): over all parameters that the model has.
+        """Return the information (k, k) about all parameters of the model.
 
         Raises:
             SpecError: it does not fit them.
@@ -34,7 +34,7 @@ class StatedPrior:
 
 
 def stated_prior(spec: Spec) -> StatedPrior | None:
-    """The matrix of the spec, or that of the model file that it names; None for a record, and for no prior.
+    """Return the prior of the spec, or of the model file that it names; None for a record, or no prior.
 
     Raises:
         SpecError: `bad-model-file`.
@@ -52,7 +52,7 @@ def stated_prior(spec: Spec) -> StatedPrior | None:
 
 
 def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
-    """The prior as an estimate, with nominal values where nothing is known; None without values.
+    """Return the prior as an estimate, with nominal values of other parameters; None without values.
 
     Raises:
         SpecError: it does not fit the parameters; `bad-model-file`.
@@ -65,7 +65,7 @@ def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
 
 
 def inverse(covariance: Array) -> Array:
-    """Of a covariance or an information matrix (k, k), by way of correlations.
+    """Return the inverse of a covariance or information matrix (k, k), by way of correlations.
 
     Raises:
         LinAlgError: it is singular.

@@ -31,12 +31,12 @@ _RELATIVE_ZERO = 1e-9
 def build_requirements(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> list[RequirementFactory]:
-    """One maker for each requirement that `accuracy` states, in the order of the contract.
+    """Return a maker for each requirement of `accuracy`, in the order of the contract.
 
     Requirements over frequency are made entry by entry of G.
 
     Args:
-        nominal: the plant of the spec, where the experiment is on a scenario.
+        nominal: the plant of the spec, if the experiment is on a scenario.
 
     Raises:
         SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
@@ -83,7 +83,7 @@ def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment]
 def build_asked(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
-    """What the goal of a design is about, and what must hold besides: requirements beside a criterion.
+    """Return the makers of the goal of a design, and of the requirements besides a criterion.
 
     Raises:
         SpecError, DataError: see `build_requirements` and `build_criterion`.
@@ -94,9 +94,9 @@ def build_asked(
 
 
 def stated_bounds(spec: Spec) -> list[StatedBound]:
-    """The numbers of `accuracy` that bound errors in proportion to them, or to their powers.
+    """Return the numbers of `accuracy` that bound errors in proportion to them, or to their powers.
 
-    None for a bound over the whole confidence ellipsoid: its error is not in proportion to any of them.
+    There are none for a bound over the whole confidence ellipsoid: its error is not in proportion.
     """
     accuracy, found = spec.accuracy, list[StatedBound]()
     error, variance = accuracy.error, accuracy.weighted_variance
@@ -134,7 +134,7 @@ def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]
 
 
 def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    """M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over."""
+    """Require M >= (chi2 gamma / 2) V'', chi2 the quantile for the parameters of the hessian."""
     asked = spec.accuracy.application
     assert asked is not None
     chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
@@ -163,7 +163,7 @@ def _target(
 
 
 def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    """`accuracy.weighted_variance` of every entry of G that is not absent."""
+    """Require `accuracy.weighted_variance` of every entry of G that is present."""
     stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
     assert stated is not None
     weight = build_weight(spec, stated.weight, f"{key}.weight")
@@ -188,7 +188,7 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
 
 
 def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
-    """Raise `SpecError` (`admissible-not-positive`) where G vanishes: its relative variance is infinite."""
+    """Raise `SpecError` (`admissible-not-positive`) if G vanishes: its relative variance is infinite."""
     grid, units = variance.grid, build_units(spec)
     size = variance.nominal_size(grid)
     if size.min() <= _RELATIVE_ZERO * np.median(size):
@@ -211,4 +211,4 @@ BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "standard_deviation": _standard_deviations,
     "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
 }
-"""What makes the requirement of each key of `accuracy`; a new requirement adds its own."""
+"""The builder of each key of `accuracy`; a new requirement adds its own."""

@@ -1,4 +1,4 @@
-"""Spec -> how its experiment is tried on the true system: the nominal one, but for what `simulation` says."""
+"""Spec -> the simulation of its experiment on the true system, nominal except for `simulation`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from inputdesign_cli.specification.models.experiment import Noise
 
 
 def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
-    """What `simulate` needs besides the design or the given excitation.
+    """Return the study of `simulate`, except for the design or the given excitation.
 
     Args:
         nominal: the experiment on the design model, in raw parameters, prior information included.
@@ -37,7 +37,7 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
 
 
 def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
-    """What simulates experiments for an exact confidence; None where asymptotic theory alone is to tell."""
+    """Return the simulator of experiments for an exact confidence; None if asymptotic theory decides."""
     error = spec.accuracy.error
     stated = None if error is None else error.calibrated
     if stated is None or not stated.runs:
@@ -46,10 +46,10 @@ def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
 
 
 def _true_system(spec: Spec) -> TrueSystem | None:
-    """The system of `simulation.plant` and `simulation.noise`; None where neither is given.
+    """Return the system of `simulation.plant` and `simulation.noise`; None if neither is stated.
 
     Raises:
-        SpecError: a loop that the nominal plant leaves stable, and the true one does not.
+        SpecError: the loop is stable with the nominal plant, and unstable with the true one.
     """
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):

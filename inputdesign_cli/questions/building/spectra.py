@@ -1,12 +1,15 @@
-"""Spec -> the family of spectra to design in."""
+"""Spec -> the family of spectra to design in, or the spectrum of a file."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
+from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.building.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.spectrum import (
     FirSpectrum,
     FreeSpectrum,
@@ -15,14 +18,22 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
     WhiteSpectrum,
 )
-from inputdesign_cli.spectrum import Basis, FirBasis, FlatBasis, LinesBasis, MatrixFirBasis, PolynomialBasis
+from inputdesign_cli.spectrum import (
+    Basis,
+    FirBasis,
+    FlatBasis,
+    LinesBasis,
+    MatrixFirBasis,
+    PolynomialBasis,
+    TabulatedSpectrum,
+)
 
 _DEFAULT_ORDER = 20
 _SAME = 1e-9
 
 
 def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
-    """The family of `spectrum`; FIR of order 20 for a sampled plant when nothing is said.
+    """Return the family of `spectrum`; by default FIR of order 20 for a sampled plant.
 
     Args:
         band: of the excitation, see `excitation_band`.
@@ -85,7 +96,7 @@ def _fir(spec: Spec, inputs: int, order: int) -> FirBasis | MatrixFirBasis:
 
 
 def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
-    """A polynomial spectrum has a band of its own."""
+    """Refuse a polynomial spectrum whose own band exceeds limits.band."""
     limit, (lo, hi) = spec.limits.band, stated.band
     if limit is not None and (lo < limit[0] * (1 - _SAME) or hi > limit[1] * (1 + _SAME)):
         raise spec.complain(
@@ -97,10 +108,11 @@ def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
 
 
 def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, float]) -> Array:
-    """The given frequencies in the unit of the experiment, or even ones inside the band.
+    """The stated frequencies in the unit of the experiment, or evenly spaced ones inside the band.
 
     `lines: L` in discrete time are l pi / L, l = 1 .. L, the harmonics of a period of 2 L samples up to the
-    Nyquist frequency, where a spectrum is real. In continuous time they are L even ones inside the band.
+    Nyquist frequency, where a spectrum is real. In continuous time they are evenly spaced inside
+    the band.
     """
     if stated.frequencies:
         given = np.array(stated.frequencies)
@@ -118,3 +130,80 @@ def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, 
             key="spectrum.lines",
         )
     return inside
+
+
+_KEY = "spectrum.given.file"
+_NEGATIVE = -1e-9
+_DENSITY, _POWER = "phi", "power"
+_HINTS = {
+    _DENSITY: "give the spectral density, as spectrum.csv of a run has it",
+    _POWER: "give the power of each sinusoid, as spectrum.csv of a run has it",
+}
+
+
+def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectrum | LinesBasis, Array]:
+    """Return the spectrum of `r` inputs in a table, and its coefficients.
+
+    Columns phi, or phi_11, phi_12_re, phi_12_im, phi_22, .. are a density, linear in between. Columns power,
+    or power_11, .. are the powers of sinusoids at these frequencies, their mean squares.
+
+    Raises:
+        DataError: the file cannot be read, or holds no spectrum (`bad-table`).
+        SpecError: `too-large` for more sinusoids than `spectrum.given.frequencies` takes.
+    """
+    path = spec.resolve_path(name)
+    lines = has_column(path, _POWER, key=_KEY) and not has_column(path, _DENSITY, key=_KEY)
+    symbol = _POWER if lines else _DENSITY
+    frequency, values = _read(spec, name, symbol, r, least=1 if lines else 2)
+    eigenvalues, vectors = np.linalg.eigh(values)
+    if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
+        wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
+        raise bad_table(spec, name, f"{symbol} must be {wanted}", _HINTS[symbol], _KEY)
+    frequency = _below_nyquist(spec, name, frequency)
+    if not lines:
+        return TabulatedSpectrum(frequency, values), np.ones(1)
+    most = SIZES["spectrum.given.frequencies"]
+    if frequency.size > most.most:
+        raise spec.complain(
+            "too-large",
+            f"{name} holds {frequency.size} sinusoids, and at most {most.most} are taken: {most.why}",
+            hint="leave out the sinusoids of the least power",
+            key=_KEY,
+        )
+    directions = vectors.swapaxes(1, 2).reshape(-1, r)
+    powers = np.maximum(eigenvalues, 0.0).ravel()
+    there = powers > 0.0
+    at = np.repeat(frequency, r)[there]
+    return LinesBasis(at, directions[there].astype(complex), np.unique(at), np.ones(r)), powers[there]
+
+
+def _read(spec: Spec, name: str, symbol: str, r: int, *, least: int) -> tuple[Array, ComplexArray]:
+    """Frequencies (n,) and Hermitian values (n, r, r)."""
+    pairs = [(i, j) for i in range(r) for j in range(i + 1, r)]
+    names: dict[str, tuple[int, int, complex]] = {symbol: (0, 0, 1.0)}
+    if r > 1:
+        names = {f"{symbol}_{i + 1}{i + 1}": (i, i, 1.0) for i in range(r)}
+    for i, j in pairs:
+        names |= {f"{symbol}_{i + 1}{j + 1}_re": (i, j, 1.0), f"{symbol}_{i + 1}{j + 1}_im": (i, j, 1j)}
+    columns = read_frequency_table(spec, name, list(names), _KEY, least=least)
+    values = np.zeros((columns["frequency"].size, r, r), dtype=complex)
+    for column, (i, j, unit) in names.items():
+        values[:, i, j] += unit * columns[column]
+    for i, j in pairs:
+        values[:, j, i] = values[:, i, j].conj()
+    return columns["frequency"], values
+
+
+def _below_nyquist(spec: Spec, name: str, frequency: Array) -> Array:
+    """The frequencies; the last may lie beyond pi by rounding.
+
+    Raises:
+        DataError: `bad-table`.
+    """
+    if not spec.plant.sampled:
+        return frequency
+    if frequency[-1] > np.pi * (1 + 1e-4):
+        reached = f"{frequency[-1] / build_units(spec).frequency:g} rad/{spec.time_unit}"
+        message = f"it reaches {reached}, beyond the Nyquist frequency"
+        raise bad_table(spec, name, message, "frequencies end at pi/sample_time", _KEY)
+    return np.minimum(frequency, np.pi)

@@ -15,19 +15,21 @@ from inputdesign_cli.plant import (
     ContinuousModel,
     Listed,
     Loop,
+    Matrices,
     Model,
     PolynomialModel,
     SampledModel,
+    StateSpaceModel,
     close_loop,
     hold_entries,
 )
+from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.demand import check_effects, check_model
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.integrators import on_finite_information
 from inputdesign_cli.questions.building.parameters import degrees_of, delays_of, reparametrised
 from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
-from inputdesign_cli.questions.building.state_space import state_space_model
 from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import Controller
@@ -43,12 +45,76 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.specification.models.values import depth
 
-# Of pi/sample_time, where a band is proposed.
+# A pole this near to the unit circle is on it, but for rounding.
+_ROUNDING = 1e-9
+
+
+def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> StateSpaceModel:
+    """Return the state-space model at the nominal parameters.
+
+    Raises:
+        SpecError: `unstable-polynomial` for an unstable predictor, or an unstable plant without a controller;
+            `conflicting-keys` for K together with coloured noise.
+    """
+    stated = plant.state_space
+    n, r, p = len(stated.A), plant.inputs, plant.outputs
+    given = {
+        "A": np.array(stated.A),
+        "B": np.array(stated.B),
+        "C": np.array(stated.C),
+        "D": np.zeros((p, r)) if stated.D is None else np.array(stated.D),
+        "K": np.zeros((n, p)) if stated.K is None else np.array(stated.K),
+    }
+    written = [(letter, M.shape) for letter, M in given.items() if letter in plant.stated_matrices]
+    places = [(letter, i, j) for letter, shape in written for i, j in np.ndindex(shape)]
+    free = [place for place in (*places, (DELAY, 0, 0)) if plant.term(*place).names]
+    model = StateSpaceModel(
+        Matrices(**given, delay=stated.delay),
+        tuple(free),
+        covariance,
+        spec.sample_time if plant.sample is not None else None,
+    )
+    _check(spec, plant, model)
+    return model
+
+
+def _check(spec: Spec, plant: StateSpacePlant, model: StateSpaceModel) -> None:
+    key = "plant.state_space"
+    coloured = any(spec.noise.drifts) or any(len(np.ravel(x)) > 1 for x in (spec.noise.C, spec.noise.D))
+    if plant.state_space.K is not None and coloured:
+        raise spec.complain(
+            "conflicting-keys",
+            "K says how the noise is coloured, and noise does so, too",
+            hint="remove K, or C, D and drift",
+            key=f"{key}.K",
+        )
+    away = np.abs(model.predictor_poles[:, None] - model.poles).min(axis=1, initial=np.inf)
+    own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # the poles that K makes
+    worst = float(np.max(np.abs(model.predictor_poles), initial=0.0))
+    if worst > 1.0 + _ROUNDING or np.any(np.abs(own) > 1.0 - _ROUNDING):
+        what = "A - K C" if plant.state_space.K is not None else "A"
+        raise spec.complain(
+            "unstable-polynomial",
+            f"the predictor is unstable: {what}, sampled, has an eigenvalue of radius {worst:.6g}",
+            hint="check the signs of A; an unstable plant needs a gain K with which A - K C is stable",
+            key=f"{key}.A",
+        )
+    worst = float(np.max(np.abs(model.poles), initial=0.0))
+    if worst > 1.0 + _ROUNDING and not spec.closed_loop:
+        raise spec.complain(
+            "unstable-polynomial",
+            f"the plant is unstable: A, sampled, has an eigenvalue of radius {worst:.6g}",
+            hint="check the signs of A; an unstable plant needs a loop: add experiment.controller",
+            key=f"{key}.A",
+        )
+
+
+# The share of pi/sample_time at which a proposed band ends.
 _WITHIN = 0.95
 
 
 def build_model(spec: Spec) -> Model:
-    """The model of `plant` and `noise`.
+    """Return the model of `plant` and `noise`.
 
     Raises:
         SpecError: `not-supported` for a regression; what is wrong with known and with named parameters.
@@ -88,7 +154,7 @@ def build_model(spec: Spec) -> Model:
 
 
 def _coloured(model: Listed, noise: NoiseShape, C: Sequence[Array], D: Sequence[Array]) -> Listed:
-    """The model with these C and D and the drift of the noise; itself where there is nothing to add."""
+    """The model with C, D and the drift of the noise; the model itself if there are none."""
     if not any(noise.drifts) and all(len(p) == 1 for p in (*C, *D)):
         return model
     return Coloured(model, tuple(C), tuple(D), noise.held, noise.drifts)
@@ -97,10 +163,12 @@ def _coloured(model: Listed, noise: NoiseShape, C: Sequence[Array], D: Sequence[
 def polynomial_model(
     plant: PolynomialPlant, noise: NoiseShape, covariance: Array, D: Sequence[Array] | None = None
 ) -> PolynomialModel:
-    """A plant in q^-1; A, C and D that the spec states once are common to the outputs.
+    """Return the model of a plant in q^-1; A, C and D that are stated once are common to the outputs.
 
     Args:
-        D: in place of those of the noise.
+        plant, noise: sections of the spec.
+        covariance: of the white noise, (p, p).
+        D: in place of the D of the noise.
     """
     return PolynomialModel(
         B=_arrays(plant.B_matrix),
@@ -114,7 +182,7 @@ def polynomial_model(
 
 
 def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
-    """A plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
+    """Return a plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
     matrix = plant.continuous
     rows = (matrix.numerator_matrix, matrix.denominator_matrix)
     held = hold_entries(*rows, sample_time, matrix.delays)
@@ -123,12 +191,12 @@ def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
 
 
 def bare_experiment(spec: Spec, model: Model, loop: Loop | None = None) -> Experiment:
-    """The experiment in raw coordinates, of which nothing is checked and without its prior."""
+    """Return the experiment in raw coordinates, unchecked and without its prior."""
     return Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
 
 
 def build_experiment(spec: Spec) -> Experiment:
-    """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
+    """Return the experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
     Raises:
         SpecError: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
@@ -147,7 +215,7 @@ def build_experiment(spec: Spec) -> Experiment:
 
 
 def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
-    """The loop of a model that is sampled.
+    """Return the loop of a sampled model.
 
     Raises:
         SpecError: the loop is unstable or algebraic.
@@ -159,10 +227,10 @@ def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
 
 
 def excitation_band(spec: Spec) -> tuple[float, float]:
-    """Where the excitation may have power, in rad/sample, or rad per time unit in continuous time.
+    """Return the band of the excitation in rad/sample, or rad per time unit in continuous time.
 
     Raises:
-        SpecError: `needs-band` when continuous time leaves it open.
+        SpecError: `needs-band` in continuous time without a band.
         DataError: the table of a given spectrum cannot be read.
     """
     band = _stated_band(spec)
@@ -182,7 +250,7 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
 
 
 def _stated_band(spec: Spec) -> tuple[float, float] | None:
-    """The band of the spectrum or of the limits; in continuous time also what a given excitation covers."""
+    """The band of the spectrum or of the limits; in continuous time also of a given excitation."""
     match spec.spectrum:
         case PolynomialSpectrum(band=band):
             return band
@@ -208,7 +276,7 @@ def _around(frequencies: Sequence[float]) -> tuple[float, float]:
 
 
 def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
-    """Weights of the powers: of the sum over the channels, or one a channel."""
+    """Return the weights of the powers: of the sum over the channels, or one per channel."""
     weights: dict[PowerKind, Weight] = {
         "input": spec.cost.input_power,
         "output": spec.cost.output_power,
@@ -218,7 +286,7 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
-    """`experiment.prior` (k, k): a matrix, that of a model file, or that of earlier samples."""
+    """The information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
     stated = stated_prior(spec)
     if stated is not None:
         return stated.over(spec, experiment.model.names)
@@ -230,7 +298,7 @@ def _prior(spec: Spec, experiment: Experiment) -> Array | None:
 
 
 def prior_record(spec: Spec) -> Array | None:
-    """(n, r): the earlier samples that `experiment.prior` names; None where it is something else, or absent.
+    """Return the earlier samples (n, r) that `experiment.prior` names; None if it names none.
 
     Raises:
         DataError: they cannot be used.
@@ -242,9 +310,9 @@ def prior_record(spec: Spec) -> Array | None:
 
 
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
-    """(n, r): the samples of an excitation from a CSV file, its columns u1, u2, .. (in closed loop r1, ..).
+    """Return the samples (n, r) of an excitation from columns u1, u2, .. (in closed loop r1, ..) of a file.
 
-    Of one input the column is u or u1.
+    A single input may have the column u.
 
     Raises:
         DataError: the file cannot be used.
@@ -256,7 +324,7 @@ def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
 
 
 def record_step(spec: Spec) -> float:
-    """The time between samples in the unit of the experiment's frequencies: 1, or sample_time.
+    """Return the time between samples in the unit of the experiment's frequencies: 1, or sample_time.
 
     Raises:
         SpecError: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
@@ -286,5 +354,5 @@ def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, .
 
 
 def per_output(value: tuple) -> tuple[Array, ...]:
-    """One polynomial, common to all outputs, or a list of one an output."""
+    """Return one polynomial, common to all outputs, or one per output."""
     return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))

@@ -1,4 +1,4 @@
-"""Spec -> the plants that the true one might be, each with what is required of the design there."""
+"""Spec -> the plants that the true one might be, each with the requirements on the design there."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.questions.building.demand import check_effects
 from inputdesign_cli.questions.building.integrators import on_finite_information
-from inputdesign_cli.questions.building.parameter_draws import Draw, Unsure, drawing, reach
-from inputdesign_cli.questions.building.parameters import check_known
+from inputdesign_cli.questions.building.knowledge import KEY, Draw, Unsure
 from inputdesign_cli.questions.building.requirements import build_asked
 from inputdesign_cli.questions.building.system import build_loop
 from inputdesign_cli.questions.common.region import Region
@@ -29,19 +28,18 @@ from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.specification.models.uncertainty import SOURCES
 from inputdesign_cli.spectrum import Basis
 
-_KEY = "uncertainty"
 _DEFAULT_SCENARIOS, _DEFAULT_RADIUS = 100, 0.998
-# So many draws for each plant that is asked for, and no fewer than so many.
+# The most draws for each plant that is asked for, and the most at least.
 _TRIES, _LEAST_TRIES = 20, 500
-# Fresh plants between two looks at the clock.
+# Fresh plants between two checks of the time limit.
 _AT_A_TIME = 50
 _ON_CIRCLE = 1e-9
-# Where an entry of G is looked at, of the band.
+# Frequencies at which an entry of G is evaluated, in shares of the band.
 _PROBES = np.array([0.31, 0.57, 0.83])
 
 
 def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Plants | None:
-    """The scenarios of `uncertainty`; None without one.
+    """Return the scenarios of `uncertainty`; None without this section.
 
     Args:
         experiment: on the nominal plant, of the length that the question is about.
@@ -49,8 +47,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
 
     Raises:
         SpecError: `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`,
-            `wrong-estimate`;
-            what is wrong with a requirement at one of the plants.
+            `wrong-estimate`; a requirement cannot be asked of one of the plants.
         DataError: a record cannot be used.
     """
     stated = spec.uncertainty
@@ -62,7 +59,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
     if isinstance(stated.scenarios, tuple):
         return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
     number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
-    draw = drawing(spec, stated, experiment)
+    draw = scenario.drawing()
     batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
 
     def afresh() -> Iterator[Batch]:
@@ -81,12 +78,12 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
         fresh=stated.fresh,
         at=scenario.possible,
         unknowns=None if basis is not None and basis.free else _unknowns(spec, basis),
-        region=None if stated.worst_case is None else scenario.region(stated.worst_case),
+        region=None if stated.worst_case is None else scenario.worst_region(stated.worst_case),
     )
 
 
 def _needed(spec: Spec, basis: Basis | None) -> int | None:
-    """How many scenarios the stated risk takes; None where no risk is stated."""
+    """Return the number of scenarios for the stated risk; None if no risk is stated."""
     stated = spec.uncertainty
     if stated is None or stated.risk is None:
         return None
@@ -95,7 +92,7 @@ def _needed(spec: Spec, basis: Basis | None) -> int | None:
             "not-supported",
             "how many plants a risk takes depends on the number of unknowns, and a free spectrum has none",
             hint="write scenarios: 200 in place of risk, or choose spectrum: {type: fir}",
-            key=f"{_KEY}.risk",
+            key=f"{KEY}.risk",
         )
     needed = samples_for(stated.risk, 1.0 - CONFIDENCE, _unknowns(spec, basis))
     if needed > most("uncertainty.scenarios"):
@@ -104,16 +101,16 @@ def _needed(spec: Spec, basis: Basis | None) -> int | None:
             f"a risk of {stated.risk:g} with {_unknowns(spec, basis)} unknowns takes {needed} plants, and at "
             f"most {most('uncertainty.scenarios')} are taken",
             hint="allow more risk, or lower the order of the spectrum",
-            key=f"{_KEY}.risk",
+            key=f"{KEY}.risk",
         )
     return needed
 
 
 def _unknowns(spec: Spec, basis: Basis | None) -> int:
-    """Count the unknowns of the program: of the spectrum, and the factor, length or cost that is sought.
+    """Count the unknowns of the program: of the spectrum, and the factor, length or cost.
 
-    Nothing is sought of a given excitation. How many plants prove a risk is then as with one unknown:
-    (1 - risk)^plants is the probability that none of them is missed by chance.
+    A given excitation has no unknowns. The number of plants that prove a risk is then the number for one:
+    (1 - risk)^plants is the probability that all of them meet the accuracy by chance.
     """
     if basis is None:
         return 1
@@ -122,7 +119,7 @@ def _unknowns(spec: Spec, basis: Basis | None) -> int:
 
 
 def farthest_radius(spec: Spec, experiment: Experiment) -> float:
-    """The radius beyond which poles, in closed loop those of the loop, count as unstable.
+    """Return the radius beyond which poles of the plant, or of its loop, count as unstable.
 
     Raises:
         SpecError: `unsuitable-key`, `no-stable-plant`.
@@ -135,7 +132,7 @@ def farthest_radius(spec: Spec, experiment: Experiment) -> float:
                 "unsuitable-key",
                 "a radius is one of poles in z, and the plant is not sampled",
                 hint="remove stable_within: unstable plants are not drawn",
-                key=f"{_KEY}.stable_within",
+                key=f"{KEY}.stable_within",
             )
         return 1.0
     own = (experiment.loop or nominal).radius
@@ -146,13 +143,13 @@ def farthest_radius(spec: Spec, experiment: Experiment) -> float:
             "no-stable-plant",
             f"the nominal model itself has a pole, or a zero of its noise, at radius {own:.6g}",
             hint=f"write {0.5 * (1.0 + own):.6g}, or leave it out",
-            key=f"{_KEY}.stable_within",
+            key=f"{KEY}.stable_within",
         )
     return within
 
 
 class _NoPlantError(Exception):
-    """Parameters that are none of a stable plant: the code of the error, and what is wrong."""
+    """Parameters give no stable plant; with the code of the error, and what is wrong."""
 
     def __init__(self, code: str, what: str) -> None:
         super().__init__(what)
@@ -160,20 +157,20 @@ class _NoPlantError(Exception):
 
 
 class _Scenarios(Unsure):
-    """What makes plants out of parameters."""
+    """Makes plants of parameters."""
 
     @property
     def _radius(self) -> float:
-        """Beyond this radius poles are too near to the unit circle, or outside."""
+        """The radius beyond which poles are too near to the unit circle, or outside."""
         return farthest_radius(self.spec, self.experiment)
 
     def at(self, theta: Array, radius: float) -> Alternative:
-        """The plant with these parameters.
+        """Return the plant with these parameters, and the requirements on the design there.
 
         Raises:
-            _NoPlantError: they are none of a plant of this structure, or it, or its loop, has poles beyond
+            _NoPlantError: they give no plant of this structure, or a pole of it, or of its loop, lies beyond
                 the radius.
-            SpecError: it is one, but what is asked cannot be asked of it.
+            SpecError: a requirement cannot be asked of this plant.
         """
         model, loop = self._sound(theta, radius)
         self._check_seen(theta, model)
@@ -185,10 +182,7 @@ class _Scenarios(Unsure):
         except SpecError as error:
             found = error.diagnostics[0]
             raise self.spec.complain(
-                found.code,
-                f"at the scenario {self._named(theta)}: {found.message}",
-                hint=found.hint,
-                key=_KEY,
+                found.code, f"at the scenario {self._named(theta)}: {found.message}", hint=found.hint, key=KEY
             ) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
@@ -215,16 +209,16 @@ class _Scenarios(Unsure):
 
     @cached_property
     def _act(self) -> NDArray[np.bool_]:
-        """(p, r): the entries of the nominal G that are not zero."""
+        """Which entries (p, r) of the nominal G are not zero."""
         return self._acting(self.nominal)
 
     def _acting(self, model: Model) -> NDArray[np.bool_]:
-        """(p, r): whether an entry of G is zero nowhere but by chance."""
+        """Which entries (p, r) of G are not zero at some of a few frequencies."""
         lo, hi = self.experiment.band
         return np.any(model.plant_at(lo + (hi - lo) * _PROBES) != 0.0, axis=0)
 
     def _check_seen(self, theta: Array, model: Model) -> None:
-        """Raise `delay-beyond-record` where a dead time outlasts the experiment, as at the nominal plant."""
+        """Raise `delay-beyond-record` if a dead time outlasts the experiment."""
         spec = self.spec
         if "samples" not in spec.experiment.model_fields_set:
             return
@@ -234,23 +228,20 @@ class _Scenarios(Unsure):
                 "delay-beyond-record",
                 f"at the scenario {self._named(theta)} a dead time outlasts the experiment",
                 hint="take more samples, or state the uncertainty more tightly",
-                key=_KEY,
+                key=KEY,
             )
 
     def _named(self, theta: Array) -> str:
         return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self.nominal.names, theta, strict=True))
 
     def listed(self, scenarios: Sequence[Mapping[str, float]]) -> Batch:
-        """The plants that the spec states one by one."""
-        names, thetas, plants = list(self.nominal.names), [], []
+        """Return the plants that the spec lists."""
+        thetas, plants = [], []
         # A known integrator is one at every plant.
         farthest = max((self.experiment.loop or self.nominal).radius, 1.0 - _ON_CIRCLE)
         for number, values in enumerate(scenarios):
-            key = f"{_KEY}.scenarios[{number}]"
-            theta = self.nominal.theta.copy()
-            for name, value in values.items():
-                check_known(self.spec, names, name, key)
-                theta[names.index(name)] = value
+            key = f"{KEY}.scenarios[{number}]"
+            theta = self.moved(values, key)
             try:
                 plants.append(self.at(theta, farthest))
             except _NoPlantError as error:
@@ -263,23 +254,23 @@ class _Scenarios(Unsure):
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
 
-    def region(self, confidence: float) -> Region:
-        """All plants that the draws are from, up to this confidence."""
-        name, centre, columns, box = reach(self.spec, self.stated, self.experiment, confidence)
+    def worst_region(self, confidence: float) -> Region:
+        """Return the region of this confidence in which the worst plant is searched."""
+        name, centre, columns, box = self.region(confidence)
         return Region(name, centre, columns, box, self.possible)
 
     def possible(self, theta: Array) -> Alternative | None:
-        """The plant with these parameters; None where it is unstable, or they are those of no plant."""
+        """Return the plant with these parameters; None if there is none, or it is unstable."""
         try:
             return self.at(theta, self._radius)
         except _NoPlantError:
             return None
 
     def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
-        """So many plants, drawn again where they are unstable, or no plants.
+        """Draw a number of plants; draws that give no stable plant are repeated.
 
         Raises:
-            SpecError: `no-stable-plant` where next to none is left.
+            SpecError: `no-stable-plant` if hardly any draw gives one.
         """
         radius, thetas, plants = self._radius, list[Array](), list[Alternative]()
         most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
@@ -291,7 +282,7 @@ class _Scenarios(Unsure):
                     f"only {len(plants)} of {drawn} {what} drawn have all their poles within {radius:.6g}, "
                     f"and dead times, gains and expressions that a plant can have{last}",
                     hint="the uncertainty reaches far beyond what is possible: state it more tightly",
-                    key=_KEY,
+                    key=KEY,
                 )
             theta, drawn = draw(rng), drawn + 1
             try:

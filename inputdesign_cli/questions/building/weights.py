@@ -10,17 +10,17 @@ from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
 
-# So near to the stability limit a root is on it; so near to an end of the band, as a share, within it.
+# A root this near to the stability limit is on it; this near to an end of the band (a share), it is inside.
 _ON_THE_LIMIT, _EDGE = 1e-9, 1e-9
 
 
 def rational(transfer: DiscreteTransfer) -> Rational:
-    """A transfer function of the spec, its denominator kept in factors."""
+    """Return a transfer function of the spec, its denominator kept in factors."""
     return Rational.build(list(transfer.numerator), [list(f) for f in transfer.denominator_factors])
 
 
 def held(transfer: ContinuousTransfer, sample_time: float) -> Rational:
-    """A transfer function of the spec in s behind a zero-order hold."""
+    """Return a transfer function of the spec in s behind a zero-order hold."""
     ratio = transfer.continuous
     return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, sample_time)
 
@@ -28,7 +28,7 @@ def held(transfer: ContinuousTransfer, sample_time: float) -> Rational:
 def build_weight(
     spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer | None, key: str
 ) -> ScalarTransfer:
-    """A weight of the spec, one where none is given.
+    """Return a weight of the spec; 1 if none is stated.
 
     Raises:
         SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled;
@@ -61,7 +61,7 @@ def build_weight(
 
 
 def check_finite(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], code: str, key: str) -> None:
-    """Raise `SpecError` (with this code) where a weight has a pole on the stability limit in the band.
+    """Raise `SpecError` (with this code) if a weight has a pole on the stability limit in the band.
 
     Args:
         band: in rad/sample, or in rad per time unit where the plant is in continuous time.
@@ -76,13 +76,13 @@ def check_finite(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], 
         code,
         f"{key} has a pole on the {'unit circle' if sampled else 'imaginary axis'}, at "
         f"{at / units.frequency:.6g} {units.per_time}: it is infinite there",
-        hint=f"move it inside (such as {mended}), or keep the band that it is for away from it",
+        hint=f"move it inside ({mended}), or keep the band that it is for away from it",
         key=key,
     )
 
 
 def on_the_limit(points: ComplexArray, band: tuple[float, float]) -> float | None:
-    """The lowest frequency of the band at which one of these points lies on the stability limit, if any."""
+    """Return the lowest frequency of the band at which a point lies on the stability limit, if any."""
     lo, hi = band
     near = points.real[np.abs(points.imag) <= _ON_THE_LIMIT * hi]
     inside = near[(near >= lo - _EDGE * hi) & (near <= hi * (1.0 + _EDGE))]

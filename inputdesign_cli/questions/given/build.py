@@ -10,7 +10,6 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.findings.limits_not_kept import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.questions.building.foresight import build_foresight
-from inputdesign_cli.questions.building.given_table import read_given_spectrum
 from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits
 from inputdesign_cli.questions.building.model_error import (
@@ -19,9 +18,9 @@ from inputdesign_cli.questions.building.model_error import (
     unstated_errors,
 )
 from inputdesign_cli.questions.building.requirements import build_criterion, build_requirements
-from inputdesign_cli.questions.building.signal_checks import check_signal
-from inputdesign_cli.questions.building.signal_settings import build_record_request
+from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
 from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
+from inputdesign_cli.questions.building.spectra import read_given_spectrum
 from inputdesign_cli.questions.building.system import (
     build_cost,
     build_experiment,

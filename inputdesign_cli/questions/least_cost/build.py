@@ -9,9 +9,7 @@ from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.questions.building.demand import check_design
-from inputdesign_cli.questions.building.endless import check_reach
 from inputdesign_cli.questions.building.foresight import build_foresight
-from inputdesign_cli.questions.building.free_directions import check_every_direction_counts
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.questions.building.model_error import (
@@ -21,11 +19,11 @@ from inputdesign_cli.questions.building.model_error import (
 )
 from inputdesign_cli.questions.building.parameters import check_known
 from inputdesign_cli.questions.building.requirements import build_asked, stated_bounds
-from inputdesign_cli.questions.building.signal_checks import check_signal
-from inputdesign_cli.questions.building.signal_settings import build_record_request
+from inputdesign_cli.questions.building.signal_settings import build_record_request, check_signal
 from inputdesign_cli.questions.building.simulation import build_simulation, build_simulator
 from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
+from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.factor_columns import FewColumns

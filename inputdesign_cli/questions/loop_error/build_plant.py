@@ -12,13 +12,13 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model, PolynomialModel
 from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 from inputdesign_cli.questions.building.demand import check_effects, check_model
-from inputdesign_cli.questions.building.state_space import state_space_model
 from inputdesign_cli.questions.building.system import (
     bare_experiment,
     build_model,
     held_plant,
     per_output,
     polynomial_model,
+    state_space_model,
 )
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant

@@ -1,4 +1,4 @@
-"""Checks across sections. Each is a function of the spec that yields diagnostics with absolute paths."""
+"""All checks across sections; each is a function of the spec that yields diagnostics with absolute paths."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from inputdesign_cli.specification.yaml.places import Path, parse_key
 
 Check = Callable[[Spec], Iterator[PathDiagnostic]]
 
-# What each check reads. It is skipped where one of these could not be read: its answer would mislead.
+# The keys that each check reads. It is skipped if one could not be read: its answer would mislead.
 CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (plant.stable_unless_controlled, ("plant", "experiment.controller")),
     (loop.controller_fits, ("plant", "experiment.controller")),
@@ -36,7 +36,7 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (goal.lengths_agree, ("experiment.samples", "limits.samples", "objective")),
 )
 
-# What is of no concern to who only wants to estimate a model.
+# These checks do not matter if a model is only to be estimated.
 OF_DESIGNS = (goal.something_asked, goal.limits_present)
 
 
@@ -46,11 +46,11 @@ def related(path: Path, broken: Iterable[Path]) -> bool:
 
 
 def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagnostic]:
-    """What all checks find whose inputs could be read.
+    """Return the diagnostics of all checks whose keys could be read.
 
     Args:
         spec: The spec, which is valid section by section.
-        broken: The paths of what could not be read.
+        broken: The paths that could not be read.
         design: Whether the question of a design must be complete.
     """
     return [

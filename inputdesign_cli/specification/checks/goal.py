@@ -1,4 +1,4 @@
-"""Is the question complete and without contradiction: what is asked for, and what keeps it finite."""
+"""Check that the question of a design is complete and without contradiction, and has a finite answer."""
 
 from __future__ import annotations
 

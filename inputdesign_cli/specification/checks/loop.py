@@ -1,4 +1,4 @@
-"""Do controllers and desired loops fit the channels of the plant."""
+"""Check that controllers and desired loops fit the channels of the plant."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LOOP = ("accuracy", "loop")
 
 
 def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A controller works in discrete time and has a row an input and a column an output of the plant."""
+    """A controller works in discrete time, with a row per input and a column per output of the plant."""
     controller, path = spec.experiment.controller, ("experiment", "controller")
     if controller is not None and spec.plant.kind == "regression":
         message = "{key} does not go with a regression"
@@ -27,7 +27,7 @@ def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """So has the controller of a sensitivity that is to be kept."""
+    """The controller of a loop that is to be kept fits the plant in the same way."""
     error, loop = spec.accuracy.model_error, spec.accuracy.loop
     controller = error.sensitivity.controller if error is not None and error.sensitivity is not None else None
     if controller is not None and spec.plant.kind != "regression":
@@ -37,12 +37,12 @@ def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A sensitivity is that of a loop."""
+    """A bound on a sensitivity needs a loop."""
     tuned = spec.at(*_LOOP, "tuning") is not None
-    for path, where in ((_SENSITIVITY, "beside it"), (_LOOP, "or tuning: {simc: {}} there")):
+    for path, where in ((_SENSITIVITY, "there"), (_LOOP, "or tuning: {simc: {}} there")):
         stated, own = spec.at(*path), spec.at(*path, "controller")
         if stated is not None and own is None and not spec.closed_loop and not (path == _LOOP and tuned):
-            message = "{key} is that of a control loop, but there is no controller"
+            message = "{key} needs a control loop, but there is no controller"
             hint = f"add experiment.controller, or a controller {where} for the loop to be kept"
             yield PathDiagnostic("needs-controller", message, hint, path)
 

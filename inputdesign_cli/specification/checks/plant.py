@@ -1,4 +1,4 @@
-"""Do stability, noise, spectrum, weights, the true system of a simulation and a regression fit the plant."""
+"""Check that noise, spectrum, weights, true system and regression fit the plant, and that it is stable."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnosti
 
 
 SAMPLED = "add sample: zoh to the plant"
-"""What mends most that a plant in s cannot have without."""
+"""The hint for keys that a plant in s cannot have unless it is sampled."""
 
 
 def noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -68,7 +68,7 @@ def names_differ(spec: Spec) -> Iterator[PathDiagnostic]:
     for name in spec.plant.parameters or ():
         if name in spec.noise.coefficients:
             message = f"{name} is the name of a coefficient of the noise as well"
-            hint = f"call the parameter otherwise, such as {name}_plant"
+            hint = f"choose another name for the parameter: {name}_plant"
             yield PathDiagnostic("bad-name", message, hint, ("plant", "parameters", name), at_key=True)
 
 

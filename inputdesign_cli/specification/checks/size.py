@@ -1,4 +1,4 @@
-"""Do lists have one entry per channel, and do frequencies lie where there are frequencies."""
+"""Check that lists have one entry per channel, and that frequencies lie below the Nyquist frequency."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def channels(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def named_channels(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Names and units are those of channels that the plant has."""
+    """Names and units belong to channels that the plant has."""
     sizes = ("u", spec.plant.inputs), ("y", spec.plant.outputs)
     there = [f"{letter}{i + 1}" for letter, count in sizes for i in range(count)]
     for name in spec.channels or ():

@@ -35,7 +35,7 @@ from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Tran
 from inputdesign_cli.specification.models.units import FRACTION
 
 DEFAULT_CONFIDENCE = 0.95
-# Draws that lie on the rarer side.
+# The least number of draws on the rarer side of a probability.
 _LEAST_TELLING = 4
 _PROBABILITY = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 _NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
@@ -51,7 +51,7 @@ _NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_err
 
 
 class Sensitivity(Section):
-    """An admissible error that keeps the sensitivity S of a control loop: |W S| <= 1, or |S| below a peak."""
+    """An admissible error that keeps |W S| <= 1, or |S| below a peak, for the sensitivity S of a loop."""
 
     numerator: Numerator | None = Field(default=None, description="Numerator of W in q^-1.")
     denominator: Denominator | None = Field(
@@ -78,7 +78,7 @@ class Sensitivity(Section):
 
 
 class Confidence(Section):
-    """The probability that sizes r_u: of an ellipsoid of parameters, or that of the error itself."""
+    """The probability that fixes r_u: of an ellipsoid of parameters, or of the error itself."""
 
     ellipsoid: Fraction | None = Field(
         default=None, description="Probability that fixes alpha by the chi-squared distribution."
@@ -97,13 +97,13 @@ class Confidence(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """One probability is given, and draws and runs that tell it."""
+        """One probability is given, with enough draws and runs to estimate it."""
         yield from self.exactly_one("ellipsoid", "exact")
         rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
         least = math.ceil(_LEAST_TELLING / rare - 1e-9)
         for key, count, none in (("draws", self.draws, ""), ("runs", self.runs, ", or 0 for none")):
             if count < least and not (none and count == 0):
-                message = f"{{key}} is {count}: too few to tell a probability of {self.exact or 0.5:g}"
+                message = f"{{key}} is {count}: too few to estimate a probability of {self.exact or 0.5:g}"
                 yield PathDiagnostic("out-of-range", message, f"write {least} or more{none}", (key,))
 
 
@@ -239,8 +239,8 @@ class FrequencyResponse(Section):
     )
     detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = Field(
         default=None,
-        description="Odd harmonics only are excited, and in a band one at random of each group of so many is "
-        "left out: what appears at the others tells nonlinearity.",
+        description="Only odd harmonics are excited, and in a band one of each group of this size, at random, "
+        "is left out: power at the others shows nonlinearity.",
     )
     noise: FileName | None = Field(
         default=None,
@@ -265,7 +265,7 @@ class Accuracy(Section):
         default=None, description="Bound on the model error over frequency."
     )
     loop: LoopMargin | None = Field(
-        default=None, description="Margin of a control loop, kept with every plant that the data leave over."
+        default=None, description="Margin of a control loop, kept with every plant within the model error."
     )
     information: Annotated[InformationTarget, Shorthand("matrix", {"type": "array"})] | None = Field(
         default=None, description="Lower bound on the information matrix."
@@ -296,12 +296,12 @@ class Accuracy(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A loop is kept by a bound on the model error: there is one."""
+        """A loop is kept by a bound on the model error, so that only one of them is stated."""
         yield from self.at_most_one("model_error", "loop")
 
     @property
     def error(self) -> ModelError | None:
-        """The bound on the model error, stated or for the sake of the loop."""
+        """The bound on the model error, stated or derived from the margin of the loop."""
         if self.loop is None:
             return self.model_error
         confidence = None if self.loop.confidence is None else Confidence(ellipsoid=self.loop.confidence)

@@ -1,4 +1,4 @@
-"""`controller:` as people write them: polynomials in q^-1, PID, a transfer function in s, single loops."""
+"""`controller:` as polynomials in q^-1, PID, a transfer function in s, or single loops."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Pid(Section):
     sample: Rule = Field(default="tustin", description=_RULE)
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """It does something, and its derivative is one that the rule of sampling can have."""
+        """Its gain is not zero, and the rule of sampling admits its derivative."""
         if self.Kp == 0.0:
             message = "{key} is zero: the controller does nothing"
             yield PathDiagnostic("out-of-range", message, "remove the controller", ("Kp",))
@@ -46,7 +46,7 @@ class Pid(Section):
 
     @property
     def filter_time(self) -> float:
-        """Tf, or what it is where it is not stated."""
+        """Tf, by default Td / 10."""
         return self.Td / 10.0 if self.Tf is None else self.Tf
 
 

@@ -42,7 +42,7 @@ from inputdesign_cli.specification.models.units import FRACTION
 from inputdesign_cli.specification.models.values import check_delay_stable, depth
 from inputdesign_cli.specification.models.wording import count
 
-# Roots on the unit circle come inside, as far as decimals can tell, when they are shrunk by this.
+# This factor moves roots on the unit circle inside, whatever the rounding of decimals.
 _INSIDE = 1.0 - 1e-7
 
 InformationSource = Annotated[
@@ -78,7 +78,7 @@ class NoiseShape(Section):
     )
 
     def covariance(self, outputs: int) -> np.ndarray:
-        """The covariance of e (outputs, outputs); a number stands for that multiple of I, none for I."""
+        """Return the covariance (outputs, outputs) of e; a number is a multiple of I, no variance is I."""
         if isinstance(self.variance, tuple):
             return np.array(self.variance, dtype=float)
         return (self.variance or 1.0) * np.eye(outputs)
@@ -95,7 +95,7 @@ class NoiseShape(Section):
 
     @property
     def held(self) -> tuple[bool, ...]:
-        """Of each D, whether all of its coefficients are known."""
+        """Whether all coefficients are known, for each D."""
         known, single = self.known or (), depth(self.D) == 1
         return tuple(
             len(p) > 1 and all(f"d{k}" + ("" if single else f"[{i + 1}]") in known for k in range(1, len(p)))
@@ -104,7 +104,7 @@ class NoiseShape(Section):
 
     @property
     def drifts(self) -> tuple[bool, ...]:
-        """Whether the noise integrates: one for all outputs, or one an output."""
+        """Whether the noise integrates: one value for all outputs, or one per output."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -139,7 +139,7 @@ class SimulationNoise(NoiseShape):
 
 
 class Prior(Section):
-    """Information at hand before the experiment; with the parameters' values it counts for estimates."""
+    """Information from before the experiment; with values of the parameters it enters estimates as well."""
 
     information: InformationSource = Field(
         description="Information matrix (inverse covariance) of the parameters, or the name of a file: data "
@@ -152,33 +152,33 @@ class Prior(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every row of a matrix has a name; a file says itself what it is of."""
+        """Every row of a matrix has a name; a file names its parameters itself."""
         if isinstance(self.information, tuple):
             yield from check_names(self.names, len(self.information), "information")
         elif self.parameters is not None:
-            of = "tells its parameters itself" if self.names_a_model else "holds samples, not a matrix"
+            of = "names its parameters itself" if self.names_a_model else "holds samples, not a matrix"
             message = f"{{key}} stands beside {self.information}, which {of}"
             hint = "remove it, or write the matrix under information in numbers"
             yield PathDiagnostic("conflicting-keys", message, hint, ("parameters",), at_key=True)
 
     @property
     def names(self) -> tuple[str, ...] | None:
-        """Of the parameters, row by row, where they are stated."""
+        """The names of the parameters, row by row, if they are stated."""
         return None if self.parameters is None else tuple(self.parameters)
 
     @property
     def values(self) -> Mapping[str, float] | None:
-        """Of the parameters by name, where they are stated."""
+        """The values of the parameters by name, if they are stated."""
         return self.parameters if isinstance(self.parameters, Mapping) else None
 
     @property
     def names_a_model(self) -> bool:
-        """Whether the information is that of a model file."""
+        """Whether the information comes from a model file."""
         return isinstance(self.information, str) and self.information.endswith((".yaml", ".yml"))
 
 
 class Estimated(Section):
-    """What identify says of the plant and noise beside it; by itself it changes nothing."""
+    """The estimate of plant and noise by identify, with its covariance; it changes no design."""
 
     parameters: Values = Field(description="The parameters and their values.")
     covariance: CovarianceMatrix = Field(description="Their covariance, in the same order.")
@@ -224,7 +224,7 @@ class Cost(Section):
 
 
 def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> Iterator[PathDiagnostic]:
-    """Parameter names are distinct and as many as the matrix has rows."""
+    """Parameter names are distinct, and there is one for each row of the matrix."""
     if names is None:
         return
     repeated = sorted({n for n in names if names.count(n) > 1})

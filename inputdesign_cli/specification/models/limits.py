@@ -1,4 +1,4 @@
-"""`limits:`, what the experiment may not exceed."""
+"""`limits:`, bounds on the experiment."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class SpectrumLimit(Section):
     min: Curve | None = Field(default=None, description="Smallest density, in the same forms.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A bound is given, and the lower one is below the upper one, which leaves something."""
+        """A bound is given, the lower one is below the upper one, and the upper one is positive."""
         yield from _some(self, "max", "min", "{max: 1}")
         if self.max == 0.0:
             message = "{key} must be greater than 0, not 0"
@@ -84,7 +84,7 @@ Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 
 
 class AmplitudeLimit(Section):
-    """Bounds on single samples of what the excitation causes, noise and operating point not counted."""
+    """Bounds on single samples, about the operating point and without noise."""
 
     input: PerChannel[Level] | None = Field(
         default=None, description="Largest |u|; a number or one per input."
@@ -99,7 +99,7 @@ class AmplitudeLimit(Section):
 
 
 class Limits(Section):
-    """What the experiment may not exceed; all are optional."""
+    """Bounds on the experiment; all are optional."""
 
     input_power: Power | None = Field(
         default=None, description="Power of u that r causes: number, list, {min, max}."

@@ -1,4 +1,4 @@
-"""`accuracy.loop:` and `accuracy.closed_loop_error:`, control loops that the model will serve."""
+"""`accuracy.loop:` and `accuracy.closed_loop_error:`, the control loops that the model is for."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Control(Section):
     ) = Field(default=None, description="true: minimum-variance control.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """There is one law, and what it is given is stable."""
+        """There is one law, and its transfer functions are stable."""
         yield from self.exactly_one("model_reference", "internal_model", "minimum_variance")
         if self.model_reference is not None:
             yield from check_stable(self.model_reference, "model_reference")
@@ -54,7 +54,7 @@ class ClosedLoopError(Section):
 
     control: Control = Field(description="The control law.")
     reference: Reference = Field(
-        default=Reference(), description="What the loop follows (default: white, variance 1)."
+        default=Reference(), description="The reference of the loop (default: white, variance 1)."
     )
     covariance: Literal["asymptotic", "parametric"] = Field(
         default="asymptotic",
@@ -103,12 +103,14 @@ class LoopMargin(Section):
     tuning: Tuning | None = Field(default=None, description="Or the rule by which it is tuned.")
     max_sensitivity_db: Positive | None = Field(default=None, description="Largest |S|, in dB.")
     phase_margin: (
-        Annotated[Positive, Wording("a number", "write degrees between 0 and 60, such as 45")] | None
+        Annotated[Positive, Wording("a number", "write degrees between 0 and 60: 45, for example")] | None
     ) = Field(
         default=None, description="Least phase margin in degrees, below 60, kept by the peak of |S| for it."
     )
-    gain_margin: Annotated[Positive, Wording("a number", "write a factor above 1, such as 2")] | None = Field(
-        default=None, description="Least gain margin, a factor above 1, kept by the peak of |S| for it."
+    gain_margin: Annotated[Positive, Wording("a number", "write a factor above 1: 2, for example")] | None = (
+        Field(
+            default=None, description="Least gain margin, a factor above 1, kept by the peak of |S| for it."
+        )
     )
 
     confidence: Fraction | None = Field(
@@ -117,7 +119,7 @@ class LoopMargin(Section):
     band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """One margin, which a loop can have, and one controller."""
+        """There are one margin, which a loop can have, and one controller."""
         yield from self.exactly_one("max_sensitivity_db", "phase_margin", "gain_margin")
         yield from self.at_most_one("controller", "tuning")
         if self.max_sensitivity_db is not None and self.max_sensitivity_db > MOST_DECIBELS:
@@ -134,7 +136,7 @@ class LoopMargin(Section):
 
     @property
     def peak(self) -> float:
-        """The largest |S|: at it 1 + L is 1/|S| away from 0, which bounds the margins of gain and phase."""
+        """The largest |S|; 1 + L keeps a distance of 1/|S| from 0, which bounds gain and phase margins."""
         if self.max_sensitivity_db is not None:
             return float(10 ** (self.max_sensitivity_db / 20))
         if self.phase_margin is not None:
@@ -143,7 +145,7 @@ class LoopMargin(Section):
         return self.gain_margin / (self.gain_margin - 1.0)
 
     def allowing(self, peak: float) -> str:
-        """An entry like the one that is stated, of which |S| may reach a little more than `peak`."""
+        """Return an entry for the stated margin with which |S| may reach a little more than `peak`."""
         if self.phase_margin is not None:
             degrees = math.degrees(2.0 * math.asin(0.5 / peak))
             return f"phase_margin: {math.floor(10.0 * degrees) / 10.0:g}"

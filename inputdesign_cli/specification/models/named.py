@@ -21,7 +21,7 @@ from inputdesign_cli.specification.yaml.scalars import clip
 
 
 class TakesExpressions:
-    """Tells the JSON schema that texts may stand in place of numbers, which models see as their values."""
+    """Allows texts in place of numbers in the JSON schema; models read the values of these expressions."""
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -41,7 +41,7 @@ def _with_texts(node: Plain) -> Plain:
 
 EXPRESSIONS = TakesExpressions()
 
-# Keys whose texts are words.
+# Keys whose texts are words, not expressions.
 _WORDS = ("time",)
 
 Terms = tuple[Expression, ...]
@@ -62,8 +62,8 @@ class NamedParameter:
     """A parameter with a name of its own.
 
     Attributes:
-        label: what the user calls it; `symbol` what it is called in expressions.
-        place: where its value stands, seen from the section of the plant.
+        label: its name for the user; `symbol`: its name in expressions.
+        place: the path of its value, from the section of the plant.
     """
 
     label: str
@@ -73,7 +73,7 @@ class NamedParameter:
 
 
 def values_of(parameters: dict[str, Plain]) -> dict[str, float]:
-    """Named values; one that cannot be read, of which pydantic tells, counts as 1 here."""
+    """Return the values by name; one that cannot be read counts as 1, and pydantic reports it."""
     return {str(name): _number(value) for name, value in parameters.items()}
 
 
@@ -83,7 +83,7 @@ def _number(value: Plain) -> float:
 
 
 def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
-    """Parameters are called so that expressions can name them."""
+    """Names of parameters can stand in expressions."""
     for name in parameters:
         if not is_name(name):
             yield PathDiagnostic(
@@ -110,7 +110,7 @@ def check_used(parameters: Mapping[str, float], texts: Iterable[str]) -> Iterato
 
 
 def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list[PathDiagnostic]) -> Plain:
-    """Numbers in place of all texts of a nested value; what is wrong with a text is added to `found`."""
+    """Return a nested value with numbers in place of texts; errors in texts are added to `found`."""
     if isinstance(value, list | tuple):
         return [worth(part, parameters, (*path, i), found) for i, part in enumerate(value)]
     if isinstance(value, dict):
@@ -149,7 +149,7 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
         PathDiagnostic(
             "undefined-expression",
             f"{{key}} {what} at the nominal parameters: {clip(value)}",
-            "look for a division by zero, or the root or the logarithm of what is not positive",
+            "look for a division by zero, or a root or logarithm of a number that is not positive",
             path,
         )
     )
@@ -157,7 +157,7 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
 
 
 def texts_in(value: Plain) -> list[str]:
-    """Every text of a nested value."""
+    """Return every text of a nested value."""
     if isinstance(value, str):
         return [value]
     listed = value if isinstance(value, list | tuple) else ()
@@ -166,17 +166,17 @@ def texts_in(value: Plain) -> list[str]:
 
 
 def leading(terms: Terms) -> int:
-    """The place of the first coefficient that exists; the length where none does."""
+    """Return the index of the first coefficient that is present; the length if none is."""
     return next((i for i, one in enumerate(terms) if one.present), len(terms))
 
 
 def expressed(value: Plain) -> Plain:
-    """A nested value of numbers and texts with an expression in place of each."""
+    """Return a nested value with an expression in place of each number and text."""
     if isinstance(value, list | tuple):
         return tuple(expressed(part) for part in value)
     return Expression(value if isinstance(value, str) else repr(float(value)))
 
 
 def matrix(value: Plain) -> TermMatrix:
-    """One polynomial as a 1 x 1 matrix; a matrix as it is."""
+    """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
     return value if depth(value) == 3 else ((value,),)

@@ -53,7 +53,7 @@ from inputdesign_cli.specification.yaml.plain import Plain
 
 
 class NamedPlant(Section):
-    """What plants have in common whose coefficients may be expressions in named parameters."""
+    """A plant whose coefficients may be expressions in named parameters."""
 
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ()
 
@@ -73,7 +73,7 @@ class NamedPlant(Section):
     @model_validator(mode="wrap")
     @classmethod
     def _worth(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """The section with the values of its expressions; it remembers what was written."""
+        """Validate the values of the expressions, and keep the section as it was written."""
         if not isinstance(data, dict):
             return handler(data)
         numbers = dict(data)
@@ -95,7 +95,7 @@ class NamedPlant(Section):
         return made
 
     def check_written(self) -> Iterator[PathDiagnostic]:
-        """What is wrong with what its coefficients are, whatever the values of its parameters."""
+        """Return what is wrong with the coefficients, whatever the values of the parameters."""
         return iter(())
 
     @property
@@ -105,7 +105,7 @@ class NamedPlant(Section):
 
     @property
     def named_parameters(self) -> tuple[NamedParameter, ...]:
-        """Parameters with names of their own; none where the coefficients are the parameters."""
+        """The named parameters; empty if the coefficients are the parameters."""
         stated = self.parameters or {}
         return tuple(NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
 
@@ -141,7 +141,8 @@ class StateSpace(Section):
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
     )
     time: Literal["continuous", "discrete"] = Field(
-        default="continuous", description="Whether A and B are those of derivatives, or of samples."
+        default="continuous",
+        description="Whether A and B give derivatives of the states, or their next samples.",
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -169,7 +170,7 @@ Continuous = Annotated[
         "a mapping of keys", "write {numerator: [..], denominator: [..]}, or {gain: .., time_constant: ..}"
     ),
 ]
-"""The plant itself in s."""
+"""The transfer matrix in s, in one of two forms."""
 
 
 class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials A, B, F"):
@@ -206,12 +207,12 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
             )
 
     def check_written(self) -> Iterator[PathDiagnostic]:
-        """Some coefficient of B exists."""
+        """Some coefficient of B is present."""
         yield from check_gain(matrix(expressed(self.written["B"])), "B")
 
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
-        """Entry by entry the power of the first coefficient of B that exists; its length where none does."""
+        """The power of the first coefficient of B that is present, entry by entry; the length if none is."""
         return tuple(
             tuple(leading(entry) for entry in row) for row in matrix(expressed(self.written.get("B", self.B)))
         )
@@ -276,13 +277,13 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
 
     @property
     def named_parameters(self) -> tuple[NamedParameter, ...]:
-        """Those that are stated, or the quantities of a process model."""
+        """The stated parameters, or the quantities of a process model."""
         if self.parameters is None and self.continuous.kind == "process":
             return self.continuous.own_parameters()
         return super().named_parameters
 
     def check_written(self) -> Iterator[PathDiagnostic]:
-        """Some coefficient of a numerator exists, and none that does makes an entry improper."""
+        """Some coefficient of a numerator is present, and every entry is proper."""
         yield from self.continuous.check_present(self.stated_terms)
 
     @cached_property
@@ -294,7 +295,7 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
 
     @cached_property
     def stated_terms(self) -> CoefficientTerms:
-        """The coefficients as they are written."""
+        """The stated coefficients, as expressions in named parameters if there are any."""
         return self.continuous.terms(self.written["continuous"])
 
 
@@ -311,7 +312,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Something is estimated, and matrices in continuous time are sampled."""
+        """Some parameter is named, and matrices in continuous time are sampled."""
         if self.parameters is None:
             message = "{key} needs parameters: numbers in its matrices are not estimated"
             hint = "write parameters: {k: 2.0}, and k in the matrices"
@@ -321,7 +322,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
             message = "{key} in continuous time must say how it is sampled"
             yield PathDiagnostic("missing-key", message, "add sample: zoh", keys=("sample",))
         elif not continuous and self.sample is not None:
-            message = "{key} is for matrices in continuous time, and these are those of samples"
+            message = "{key} is for matrices in continuous time, and time is discrete here"
             yield PathDiagnostic("unsuitable-key", message, "remove it", ("sample",), at_key=True)
 
     @property
@@ -335,15 +336,15 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         return len(self.state_space.B[0])
 
     def check_written(self) -> Iterator[PathDiagnostic]:
-        """Matrices of samples have no dead time beside them, whatever its value."""
+        """Matrices in discrete time have no dead time, whatever its value."""
         if self.state_space.time == "discrete" and self.term("delay", 0, 0).present:
-            message = "{key} is in continuous time, but the matrices are those of samples"
+            message = "{key} is in continuous time, but time is discrete here"
             path = ("state_space", "delay")
             yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
 
     @property
     def stated_matrices(self) -> tuple[str, ...]:
-        """The letters of those that are written."""
+        """The letters of the stated matrices."""
         return self.state_space.stated("A", "B", "C", "D", "K")
 
     def term(self, letter: str, row: int, column: int) -> Expression:

@@ -1,4 +1,4 @@
-"""Plants in s as engineers write them: gain, time constant or damping and natural frequency, dead time."""
+"""Plants in s by gain, time constant or damping and natural frequency, and dead time."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """It is of first or of second order, and all shapes are that of the gain."""
+        """It is of first or second order, and all quantities have the shape of the gain."""
         if not self.stated("damping"):
             yield from self.exactly_one("time_constant", "natural_frequency")
         for one, other in (("damping", "natural_frequency"), ("natural_frequency", "damping")):
@@ -65,13 +65,13 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
 
     def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Some gain exists."""
+        """Some gain is present."""
         if not any(one.present for row in terms.numerator for entry in row for one in entry):
             message = "{key} is zero: the input has no effect"
             yield PathDiagnostic("zero-polynomial", message, "", ("continuous", "gain"))
 
     def grid(self, name: str) -> Grid:
-        """A quantity as rows of columns."""
+        """Return a quantity as rows of columns."""
         value = self.at(name)
         return value if isinstance(value, tuple) else ((float(str(value)),),)
 
@@ -103,7 +103,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         return False
 
     def own_parameters(self) -> tuple[NamedParameter, ...]:
-        """The quantities, entry by entry; not those of an entry of gain zero, nor dead times of zero."""
+        """Return the quantities, entry by entry, without entries of gain zero and dead times of zero."""
         single = depth(self.gain) == 0
         found = []
         for name in self.stated(*QUANTITIES):
@@ -117,10 +117,10 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         return tuple(found)
 
     def terms(self, written: Mapping[str, Plain] | None = None) -> CoefficientTerms:
-        """Its coefficients as expressions in its own parameters.
+        """Return the coefficients as expressions in its quantities.
 
         Args:
-            written: the section, where its values are expressions in other parameters.
+            written: the section as written, if its values are expressions in named parameters.
         """
 
         def of(name: str, i: int, j: int) -> Expression:

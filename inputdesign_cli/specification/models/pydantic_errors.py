@@ -31,7 +31,7 @@ from inputdesign_cli.specification.yaml.scalars import clip, why_not_number
 
 @dataclass(frozen=True)
 class Declared:
-    """A type without its annotations, and these; the outermost annotation stands last."""
+    """A type without its annotations, and the annotations; the outermost one stands last."""
 
     type: Any
     metadata: tuple[object, ...] = ()
@@ -49,7 +49,7 @@ class Declared:
 
     @property
     def tag(self) -> str:
-        """What tells it apart from the other alternatives of a union."""
+        """The tag that distinguishes it from the other alternatives of a union."""
         own = TAG + self.section.phrase if self.section else ""
         return next((m.tag for m in self.metadata if isinstance(m, Tag)), own)
 
@@ -75,7 +75,7 @@ _UNKNOWN = Declared(object)
 
 
 def declared(annotation: Any, metadata: tuple[object, ...] = ()) -> Declared:
-    """The annotation taken apart; that a key may be absent (None) does not count."""
+    """Split an annotation into type and metadata, without the None of optional keys."""
     if typing.get_origin(annotation) is Annotated:
         inner, *outer = typing.get_args(annotation)
         return declared(inner, (*outer, *metadata))
@@ -87,7 +87,7 @@ def declared(annotation: Any, metadata: tuple[object, ...] = ()) -> Declared:
 
 
 def declared_at(root: type[Section], location: Sequence[str | int]) -> Declared:
-    """The type at the location of a pydantic error, tags included."""
+    """Return the type at the location of a pydantic error, tags included."""
     found = Declared(root)
     for step in location:
         found = found.at(step)
@@ -95,7 +95,7 @@ def declared_at(root: type[Section], location: Sequence[str | int]) -> Declared:
 
 
 def measure_at(root: type[Section], location: Sequence[str | int]) -> Measure | None:
-    """What a number at the location counts in: what is said nearest to it, within its section."""
+    """Return the unit of a number at the location: the innermost annotation within its section."""
     found, latest = Declared(root), None
     for step in location:
         found = found.at(step)
@@ -105,7 +105,7 @@ def measure_at(root: type[Section], location: Sequence[str | int]) -> Measure | 
 
 
 def sections_in(annotation: Any) -> set[type[Section]]:
-    """Every section that an annotation names, however deep in unions and lists."""
+    """Return every section in an annotation, in nested unions and lists too."""
     if section := Declared(annotation).section:
         return {section}
     return {section for part in typing.get_args(annotation) for section in sections_in(part)}
@@ -117,7 +117,7 @@ def _is_union(annotation: Any) -> bool:
 
 # Pydantic's name of a bound that a number breaks -> our words.
 _BOUNDS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
-# Where a type says nothing of itself: what it is called, and what to write.
+# Words and hint for types that carry no wording.
 _DEFAULTS = {
     "float_type": ("a number", ""),
     "int_type": ("a whole number", ""),
@@ -128,11 +128,11 @@ _DEFAULTS = {
 }
 
 _TYPE = f"{TAG}type: "
-"""How the tags begin of alternatives that a key `type` tells apart."""
+"""The beginning of the tags of alternatives with a key `type`."""
 
 
 def translate(error: ValidationError, data: Plain, root: type[Section]) -> list[PathDiagnostic]:
-    """The diagnostics behind a pydantic error.
+    """Return the diagnostics of a pydantic error.
 
     Args:
         error: What `root.model_validate(data)` raised.
@@ -213,7 +213,7 @@ def _wrong_value(
     if kind == "too_short":
         empty = describe(value).replace("a ", "an empty ")
         return "wrong-shape", f"{{key}} is {empty}; it needs at least one entry", hint
-    # A list that is nested wrongly is a list; that it is one says nothing.
+    # Of a list that is nested wrongly, "not a list" would mislead.
     mistaken = kind == "union_tag_invalid" and isinstance(value, list)
     if kind == "too_long" and isinstance(value, list):
         return "wrong-shape", f"{{key}} must be {what}, not {len(value)}", hint or "write as many"
@@ -291,7 +291,7 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
 
 
 def _holding(model: type[Section] | None, key: str) -> list[str]:
-    """The keys beside it under which a key that was written too far out belongs."""
+    """The keys of a section under which a key belongs that was written one level too high."""
     fields = model.model_fields.items() if model is not None else ()
     return [
         name
@@ -302,7 +302,7 @@ def _holding(model: type[Section] | None, key: str) -> list[str]:
 
 @cache
 def _homes(root: type[Section]) -> dict[str, list[str]]:
-    """Every key below the root -> where it belongs, for a key that was written elsewhere."""
+    """Return the places where each key below the root belongs."""
     homes: dict[str, set[str]] = {}
 
     def walk(model: type[Section], path: str) -> None:

@@ -1,4 +1,4 @@
-"""`signal:`, `solver:`, `simulation:` and `report:`: how a spectrum is realised, found, tried and shown."""
+"""`signal:`, `solver:`, `simulation:` and `report:`: how a spectrum is realised, found, tested and shown."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Signal(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every setting means something for the type of signal."""
+        """Every setting belongs to the type of signal."""
         for key in self.stated(*_ONLY_FOR):
             types = _ONLY_FOR[key]
             if self.type is not None and self.type not in types:
@@ -166,7 +166,7 @@ def _pair(value: object) -> object:
         raise fail(
             "wrong-shape",
             "{key} must hold two different parameters, which span the plane of the ellipse",
-            'write a pair, such as ["b1", "f1"] or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
+            'write a pair: ["b1", "f1"], or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
         )
     return value
 
@@ -175,7 +175,7 @@ Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of t
 
 
 class Report(Section):
-    """What the figures show."""
+    """The contents of the figures."""
 
     ellipses: Annotated[Several[Pair], SIZES["report.ellipses"]] | None = Field(
         default=None,

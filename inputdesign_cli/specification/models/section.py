@@ -1,4 +1,4 @@
-"""The base of every model of the spec: frozen, without unknown keys; and what its checks return."""
+"""The base of every model of the spec, and the diagnostics that its checks return."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from inputdesign_cli.specification.yaml.places import Path, Places, format_key
 from inputdesign_cli.specification.yaml.plain import Plain
 
 CARRIER = "diagnostics"
-"""The type of the one pydantic error that carries diagnostics of ours, and their place in its context."""
+"""The type of the pydantic error that carries diagnostics, and their key in its context."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class PathDiagnostic:
     meant: str = ""
 
     def placed(self, places: Places, whole: str) -> Diagnostic:
-        """The diagnostic with its line; `whole` stands for the key where the whole file is meant."""
+        """Return the diagnostic with its line; `whole` names the file in place of an empty key."""
         key = format_key(self.path)
         location = places.location(places.mark(self.path, at_key=self.at_key))
         message, hint = (text.replace("{key}", key or whole) for text in (self.message, self.hint))
@@ -57,18 +57,18 @@ class PathDiagnostic:
 
 
 def carry(*diagnostics: PathDiagnostic) -> PydanticCustomError:
-    """The pydantic error that carries the diagnostics; a validator raises it."""
+    """Return the pydantic error that carries the diagnostics, for a validator to raise."""
     return PydanticCustomError(CARRIER, CARRIER, {CARRIER: diagnostics})
 
 
 def fail(code: str, message: str, hint: str = "") -> PydanticCustomError:
-    """The pydantic error of one diagnostic about the value at hand."""
+    """Return the pydantic error of one diagnostic about the value at hand."""
     return carry(PathDiagnostic(code, message, hint))
 
 
 @dataclass(frozen=True)
 class Wording:
-    """What a diagnostic calls a type, and what it advises; it stands in the `Annotated[..]` of the type.
+    """The words of a diagnostic for a type, and its hint, in the `Annotated[..]` of the type.
 
     Args:
         what: What the value must be: "a list of coefficients".
@@ -83,7 +83,7 @@ TAG = "\x00"
 """Marks the tags that pydantic puts into the path of an error inside a union; they are not keys."""
 
 FAMILIES: dict[str, list[type[Section]]] = {}
-"""Models that are alternatives of each other, so that a key of one inside another gets a useful answer."""
+"""Models that are alternatives of each other, for the hint on a key of one inside another."""
 
 
 class Section(BaseModel):
@@ -111,18 +111,18 @@ class Section(BaseModel):
         return Tag(TAG + cls.phrase).__get_pydantic_core_schema__(source, handler)
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """What is wrong with the section as a whole, once each of its values is valid."""
+        """Return what is wrong with the section as a whole; each of its values is valid."""
         return iter(())
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {}
-    """Keys that people write here -> how this section says the same."""
+    """Common keys that this section does not have -> a hint on its own keys."""
 
     def stated(self, *keys: str) -> tuple[str, ...]:
-        """Those of the keys that have a value."""
+        """Return the keys that have a value."""
         return tuple(key for key in keys if getattr(self, key) is not None)
 
     def at(self, *path: str) -> object:
-        """The value at a path below; None where a section on the way is absent or has no such key."""
+        """Return the value at a path below; None if a section or key on the path is absent."""
         inner = getattr(self, path[0], None)
         if path[1:]:
             return inner.at(*path[1:]) if isinstance(inner, Section) else None
@@ -150,15 +150,15 @@ class Section(BaseModel):
 
 
 def tag(word: str) -> Tag:
-    """The pydantic tag of an alternative."""
+    """Return the pydantic tag of an alternative."""
     return Tag(TAG + word)
 
 
 def pick(choose: Callable[[dict[str, Plain]], str], plain: str = "") -> Discriminator:
-    """The discriminator of a union of sections.
+    """Return the discriminator of a union of sections.
 
     Args:
-        choose: The phrase of the alternative that a mapping of the file stands for.
+        choose: Returns the phrase of the alternative for a mapping of the file.
         plain: The tag of the alternative that is no mapping, if there is one.
     """
 

@@ -12,7 +12,7 @@ from inputdesign_cli.specification.models.wording import count
 
 
 def as_matrix(value: tuple) -> PolynomialMatrix:
-    """One polynomial as a 1 x 1 matrix; a matrix as it is."""
+    """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
     return value if depth(value) == 3 else ((value,),)
 
 
@@ -30,14 +30,14 @@ def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnosti
 def check_each(
     value: tuple, check: Callable[[Polynomial], PathDiagnostic | None], *path: str
 ) -> Iterator[PathDiagnostic]:
-    """What the check finds in each polynomial of the value at `path`."""
+    """Yield the diagnostics of a check of each polynomial of the value at `path`."""
     for indices, polynomial in with_paths(value):
         if found := check(polynomial):
             yield replace(found, path=(*path, *indices))
 
 
 def denominators_of(numerator: tuple, denominator: tuple) -> PolynomialMatrix:
-    """Denominators as rows of columns, those that are common repeated and factors multiplied out."""
+    """Return denominators as rows of columns, common ones repeated and factors multiplied out."""
     if depth(denominator) == 3:
         return as_matrix(denominator)
     common = product(factor for _, factor in with_paths(denominator))
@@ -45,7 +45,7 @@ def denominators_of(numerator: tuple, denominator: tuple) -> PolynomialMatrix:
 
 
 def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
-    """Every polynomial of a nested value with the indices that lead to it."""
+    """Return every polynomial of a nested value with its indices."""
     if depth(value) == 1:
         return [((), value)]
     return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
@@ -60,20 +60,20 @@ def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDia
 
 
 def check_gain(entries: TermMatrix, name: str) -> Iterator[PathDiagnostic]:
-    """Some coefficient exists."""
+    """Some coefficient is present."""
     if not any(one.present for row in entries for p in row for one in p):
         message = "all coefficients of {key} are zero: the input has no effect"
         yield PathDiagnostic("zero-polynomial", message, path=(name,))
 
 
 def size_of(value: tuple) -> tuple[int, int]:
-    """The numbers of rows and columns."""
+    """Return the numbers of rows and columns."""
     entries = as_matrix(value)
     return len(entries), len(entries[0])
 
 
 def shape_words(value: tuple) -> str:
-    """The shape in a sentence."""
+    """Return the shape in words."""
     if depth(value) == 1:
         return "one list of coefficients"
     rows, columns = size_of(value)

@@ -1,7 +1,7 @@
-"""How large the counts and the lists of a spec may be, and why: the one place that says so.
+"""The largest counts and lists of a spec, and the reasons.
 
-Beyond these, memory or time runs out, or rounding has the last word; `docs/sizes.md` shows them with what was
-measured. What depends on several keys together is estimated in `questions/building/demand.py`.
+Beyond them memory or time runs out, or rounding dominates; `docs/sizes.md` shows them with measurements.
+`questions/building/demand.py` estimates the demand of several keys together.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Size:
 
 
 def magnitude(least: float, most: float) -> AfterValidator:
-    """Zero, or numbers of this size: beyond, products of a few of them leave the range of arithmetic."""
+    """Allow zero, and numbers of this size: products of a few others would overflow."""
 
     def check(value: float) -> float:
         if value and not least <= abs(value) <= most:
@@ -103,5 +103,5 @@ SIZES = {
 
 
 def most(key: str) -> int:
-    """The largest value that `SIZES` has for a key."""
+    """Return the largest value of a key."""
     return SIZES[key].most

@@ -50,11 +50,11 @@ OF_DESIGNS = (
     "sweep",
     "uncertainty",
 )
-"""Keys of which a spec that is only estimated from has none."""
+"""Keys of a design: a spec for an estimate alone has none of them."""
 
 
 class Spec(Section):
-    """An experiment to be designed: everything that a spec file says, checked, with defaults filled in.
+    """An experiment to be designed: the checked contents of a spec file, with defaults filled in.
 
     Frequencies are in rad per `time_unit`, times in `time_unit`. `load_spec` and `parse_spec` make one;
     it remembers where each key was written, so that later diagnostics can point at the line.
@@ -83,7 +83,7 @@ class Spec(Section):
     )
     estimate: Estimated | None = Field(
         default=None,
-        description="What identify says of plant and noise, with their covariance: for experiment.prior.",
+        description="The estimate of plant and noise by identify, with its covariance: for experiment.prior.",
     )
     cost: Cost = Field(
         default=Cost(input_power=1.0),
@@ -202,37 +202,37 @@ class Spec(Section):
         return math.pi / self.sample_time if self.plant.sampled else math.inf
 
     def clip_band(self, band: tuple[float, float] | None) -> tuple[float, float]:
-        """The band within [0, nyquist] in rad per time unit; None stands for all frequencies.
+        """Return the band within [0, nyquist] in rad per time unit; None stands for all frequencies.
 
-        The end needs a clip: the checks let 3.1416 pass for pi.
+        The end needs a clip: the checks accept 3.1416 for pi.
         """
         low, high = band or (0.0, math.inf)
         return low, min(high, self.nyquist)
 
     @property
     def sha256(self) -> str:
-        """The hash of what the spec says, overrides applied; comments, layout and order do not count."""
+        """The hash of the contents, overrides applied; comments, layout and order do not count."""
         return fingerprint(self.content)
 
     def to_yaml(self) -> str:
-        """The keys that the user gave, overrides applied, as YAML that `parse_spec` reads back."""
+        """Return the keys that the user gave, overrides applied, as YAML that `parse_spec` reads back."""
         return to_yaml(self.content)
 
     def locate(self, key: str) -> Location | None:
-        """Where a key such as `plant.F` or `plant.B[1]` is written, or its deepest ancestor that is."""
+        """Return where a key (`plant.F`, `plant.B[1]`) is written, or its deepest ancestor that is."""
         places = self._source.places
         return places.location(places.mark(parse_key(key)))
 
     def resolve_path(self, name: str) -> Path:
-        """The path of a file that the spec names: relative names start in the folder of the spec."""
+        """Return the path of a file that the spec names: relative names start in the folder of the spec."""
         return self._source.folder / name
 
     def complain(self, code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
-        """An error with a single diagnostic that points at the line of `key`, for the caller to raise."""
+        """Return an error with a single diagnostic that points at the line of `key`."""
         return SpecError.because(code, message, hint, key, self.locate(key))
 
     def place(self, error: _Error) -> _Error:
-        """An error of the same type whose keyed diagnostics point at their lines."""
+        """Return an error of the same type whose diagnostics point at the lines of their keys."""
         found = [
             one if one.location or not one.key else replace(one, location=self.locate(one.key))
             for one in error.diagnostics
@@ -243,5 +243,5 @@ class Spec(Section):
 
     @property
     def content(self) -> dict[str, object]:
-        """What the user wrote, overrides applied, as plain data."""
+        """The contents as the user wrote them, overrides applied, as plain data."""
         return self._source.data or self.model_dump(mode="json", exclude_none=True, exclude_unset=True)

@@ -1,4 +1,4 @@
-"""`spectrum:`, the family the input spectrum is designed in, or an excitation that is given."""
+"""`spectrum:`, the family in which the input spectrum is designed, or a given excitation."""
 
 from __future__ import annotations
 

@@ -24,9 +24,9 @@ _RANGE = re.compile(rf"\s*({_NUMBER})\s*:\s*({_NUMBER})\s*(?::\s*({_NUMBER})\s*)
 
 
 def range_values(text: str) -> tuple[str, ...] | None:
-    """The numbers of `low:high:step` as text, both ends included; None for a text that is no range.
+    """Return the numbers of `low:high:step` as text, both ends included; None for a text that is no range.
 
-    They are counted in decimals, so that 0:1:0.1 holds 0.3 and not 0.30000000000000004.
+    Decimal arithmetic makes 0:1:0.1 hold 0.3 and not 0.30000000000000004.
 
     Raises:
         SpecError: `bad-range`.
@@ -64,7 +64,7 @@ def _plain(value: Decimal) -> str:
 
 
 def _expanded(value: object) -> object:
-    """The values that a range stands for; everything else as it is."""
+    """Return the values of a range, and everything else unchanged."""
     if not isinstance(value, str):
         return value
     try:

@@ -48,7 +48,7 @@ from inputdesign_cli.specification.yaml.plain import Plain
 
 
 class Ratio(Section):
-    """numerator / denominator, whatever the variable."""
+    """numerator / denominator, in s or in q^-1."""
 
     numerator: Numerator = Field(description="Coefficients of the numerator.")
     denominator: Denominator = Field(
@@ -92,7 +92,7 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 
 
 class _Matrix(Section):
-    """numerator / denominator entry by entry, whatever the variable."""
+    """numerator / denominator entry by entry, in s or in q^-1."""
 
     numerator: GainMatrix = Field(description="Coefficients; a matrix is rows (outputs) of columns (inputs).")
     denominator: ContinuousDenominator = Field(
@@ -127,7 +127,7 @@ class DiscreteMatrix(_Matrix, family="transfer", phrase="a transfer matrix in q^
 
 
 def check_each_proper(above: TermMatrix, below: PolynomialMatrix, levels: int) -> Iterator[PathDiagnostic]:
-    """Every entry of a matrix in s is proper, whose numerator is written with so many levels of lists."""
+    """Every entry of a matrix in s is proper; `levels` is the nesting of its numerator as written."""
     for i, row in enumerate(above):
         for j, entry in enumerate(row):
             where = (i, j) if levels == 3 else ()
@@ -149,7 +149,7 @@ class ContinuousMatrix(_Matrix):
 
 
 class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s"):
-    """The same with dead times and integrators: those of a plant."""
+    """A transfer matrix in s of a plant, with dead times and integrators."""
 
     kind: ClassVar[Literal["rational"]] = "rational"
 
@@ -175,7 +175,7 @@ class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
 
     def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Some coefficient of the numerators exists, and every entry is proper."""
+        """Some coefficient of the numerators is present, and every entry is proper."""
         for found in (
             *check_gain(terms.numerator, "numerator"),
             *check_each_proper(terms.numerator, self.denominator_matrix, depth(self.numerator)),
@@ -200,7 +200,7 @@ class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s
         return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)
 
     def terms(self, written: Mapping[str, Plain]) -> CoefficientTerms:
-        """Its coefficients as expressions, from the section as it was written."""
+        """Return the coefficients as expressions, from the section as it was written."""
         above, below, delay = (
             expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
         )
@@ -265,7 +265,7 @@ Target = Annotated[
 
 
 def check_stable(transfer: Target, *path: str) -> Iterator[PathDiagnostic]:
-    """The poles of the transfer function at `path` are stable; a matrix in s that is not is never read."""
+    """The poles of the transfer function at `path` are stable; a matrix in s has its own check."""
     if transfer.kind == "continuous":
         inside = (*path, "continuous", "denominator")
         yield from check_each(transfer.continuous.denominator, check_left_half_plane, *inside)

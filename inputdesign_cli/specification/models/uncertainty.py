@@ -1,4 +1,4 @@
-"""`uncertainty:`, how well the plant of the spec is known: it makes the design robust."""
+"""`uncertainty:`, how well the plant of the spec is known, for a robust design."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ Scenarios = Annotated[
 
 
 class Uncertainty(Section):
-    """How well the plant is known, and what the design does about it."""
+    """How well the plant is known, and how the design takes this into account."""
 
     covariance: CovarianceSource | None = Field(
         default=None,
-        description="Covariance of the parameters around those of the plant: a matrix, or a model that "
+        description="Covariance of the parameters around the nominal ones: a matrix, or a model that "
         "identify wrote (.yaml).",
     )
     information: InformationSource | None = Field(
@@ -72,7 +72,7 @@ class Uncertainty(Section):
     scenarios: Scenarios | None = Field(
         default=None,
         description="How many plants are drawn (default: 100, or what risk needs), or the plants one by one: "
-        "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are those of the plant.",
+        "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are nominal.",
     )
     risk: Fraction | None = Field(
         default=None,
@@ -85,7 +85,7 @@ class Uncertainty(Section):
     worst_case: Fraction | None = Field(
         default=None,
         description="Confidence of the ellipsoid (of intervals: all of them) in which the worst plant is "
-        "searched and added to those that are served, until none is found to be missed. Never proved.",
+        "searched and added to the scenarios, until none is found that misses the accuracy. Never proved.",
     )
     seed: Index = Field(default=1, description="Seed of the draws.")
     stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = Field(
@@ -103,18 +103,18 @@ class Uncertainty(Section):
     cost: Literal["nominal", "mean", "worst"] | None = Field(
         default=None,
         description="The powers that are paid for: of the nominal plant, their mean over all (default in "
-        "closed loop), or those of the plant where they cost most.",
+        "closed loop), or of the plant where they cost most.",
     )
     fresh: Annotated[Index, SIZES["uncertainty.fresh"]] = Field(
         default=3000, description="Plants drawn afresh that the finished design is tried on."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """The prior is stated once, with rows that have names."""
+        """The uncertainty is stated once, with names for the rows of a matrix."""
         listed = isinstance(self.scenarios, tuple)
         if listed:
             for extra in self.stated(*SOURCES):
-                message = "{key} stands beside a list of scenarios, which says all"
+                message = "{key} stands beside a list of scenarios, which is complete"
                 hint = "write scenarios: 200 for plants that are drawn, or remove the one"
                 yield PathDiagnostic("conflicting-keys", message, hint, (extra,), at_key=True)
             for extra in (key for key in _OF_DRAWS if key in self.model_fields_set):
@@ -132,7 +132,7 @@ class Uncertainty(Section):
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", ("discard",))
         if self.risk is not None and self.discard:
             message = "{key} leaves plants out, and risk draws as many as it takes where none is"
-            hint = "state scenarios: 200 in place of risk; what is missed then is what the fresh plants tell"
+            hint = "state scenarios: 200 in place of risk; the fresh plants then show how many are missed"
             yield PathDiagnostic("conflicting-keys", message, hint, ("discard",))
         for key in ("covariance", "information"):
             matrix = self.covariance if key == "covariance" else self.information

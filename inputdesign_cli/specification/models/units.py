@@ -1,4 +1,4 @@
-"""In which unit a number of a spec is, and what to write for a text such as "1 h", "40 %" or "0.5 Hz"."""
+"""The units of the numbers of a spec, and hints for texts with units: "1 h", "40 %", "0.5 Hz"."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _WITH_UNIT = re.compile(_NUMBER + r"\s*([%A-Za-z\u00b0\u00b5\u03bc/]+)")
 
 @dataclass(frozen=True)
 class Measure:
-    """What a number counts in; stands in the `Annotated[..]` of a type, for all numbers inside."""
+    """The quantity of a number, in the `Annotated[..]` of a type, for all numbers inside."""
 
     of: Literal["time", "seconds", "frequency", "signal", "move", "fraction"]
 
@@ -28,13 +28,14 @@ class Measure:
 TIME, SECONDS_ONLY = Measure("time"), Measure("seconds")
 FREQUENCY, SIGNAL, FRACTION = Measure("frequency"), Measure("signal"), Measure("fraction")
 MOVE = Measure("move")
-"""What a signal changes by in a sample."""
+"""The change of a signal in a sample."""
 
 
 def without_unit(text: str, measure: Measure | None, time_unit: str | None) -> str:
-    """What to write for a number with a unit; empty for another text.
+    """Return a hint for a number with a unit; empty for another text.
 
     Args:
+        text: in place of a number.
         measure: of the number that is wanted; None if it is not known.
         time_unit: of the spec; None if it is not known.
     """
@@ -46,7 +47,7 @@ def without_unit(text: str, measure: Measure | None, time_unit: str | None) -> s
     if unit == "%":
         return _percent(number, of)
     value, seconds = float(number), "s" if of == "seconds" else time_unit
-    # A parameter with a name of its own may be anything; its unit tells what it is.
+    # A named parameter may be of any quantity; its unit shows which.
     if of in ("time", "seconds") or (of is None and _seconds(unit)):
         return _time(number, _seconds(unit), seconds)
     if of == "frequency" or (of is None and (unit in _RADIANS or unit.startswith("rad/"))):

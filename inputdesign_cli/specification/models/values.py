@@ -16,13 +16,12 @@ from inputdesign_cli.specification.models.wording import show
 
 Polynomial = tuple[float, ...]
 
-# Coefficients of which the sum is this small have a root at z = 1, as far as decimals can tell; a radius this
-# near to 1 is 1.
+# Coefficients with a relative sum below this have a root at z = 1; a radius this near to 1 is 1.
 _ROUNDING = 1e-12
 
 
 def product(factors: Iterable[Polynomial]) -> Polynomial:
-    """The product of polynomials given by their coefficients (the order of the powers does not matter)."""
+    """Return the product of polynomials, all in ascending or all in descending powers."""
     with np.errstate(all="ignore"):
         full: np.ndarray = functools.reduce(np.convolve, (np.asarray(f) for f in factors), np.ones(1))
     return tuple(float(c) for c in full)
@@ -89,7 +88,7 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
 
 
 def _decimal_comma(polynomial: Polynomial) -> str:
-    """What to add where 0,7 was most likely meant for 0.7: whole numbers with a zero before another."""
+    """Return the hint on 0,7 in place of 0.7, for whole numbers with a zero before another."""
     whole = all(float(c).is_integer() for c in polynomial)
     if whole and 0.0 in polynomial[1:-1]:
         return "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
@@ -148,19 +147,19 @@ Nested = TypeVar("Nested", bound=tuple)
 
 
 def depth(value: object) -> int:
-    """How deeply lists are nested: 0 for a number, 1 for a list of numbers."""
+    """Return how deeply lists are nested: 0 for a number, 1 for a list of numbers."""
     if not isinstance(value, list | tuple):
         return 0
     return 1 + max((depth(v) for v in value), default=0)
 
 
 def as_whole(value: object) -> object:
-    """500.0 as 500; everything else as it is."""
+    """Return 500.0 as 500, and everything else unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def as_text(value: object) -> object:
-    """An unquoted number, true or false as the text that it is; everything else as it is."""
+    """Return an unquoted number, true or false as its text, and everything else unchanged."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return str(value) if isinstance(value, int | float) else value
@@ -241,7 +240,7 @@ def semidefinite(rows: Matrix) -> Matrix:
 
 
 def positive_definite(rows: Matrix) -> Matrix:
-    """A covariance matrix has positive eigenvalues, in whatever units: so has that of correlations."""
+    """A covariance matrix is positive definite; tested on correlations, so that units do not matter."""
     values = np.array(rows)
     variances = np.diag(values)
     if np.any(variances <= 0.0) or not _has_positive_correlations(values, np.sqrt(variances)):

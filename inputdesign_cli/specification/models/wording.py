@@ -1,4 +1,4 @@
-"""Values and choices in words: "the number 5", "a, b or c", and the word that was probably meant."""
+"""Values and choices in words: "the number 5", "a, b or c", and the nearest known word."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from inputdesign_cli.specification.yaml.scalars import clip
 
-# Our word -> words that people use for it; difflib would not find them.
+# Our word -> common words for it that difflib would not find.
 _SYNONYMS = {
     "sample_time": ("Ts", "dt", "sampling_time"),
     "samples": ("N", "length"),
@@ -24,7 +24,7 @@ _SYNONYMS = {
     "filtered_noise": ("gaussian",),
 }
 
-# Ways of sampling that other programs have.
+# Methods of sampling in other programs.
 _OTHER_SAMPLING = {
     *(
         "foh",
@@ -46,7 +46,7 @@ _IN_SAMPLES = (
 
 
 def describe(value: object) -> str:
-    """A value in words: "the number 5", "a list"."""
+    """Return a value in words: "the number 5", "a list"."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):
@@ -61,29 +61,29 @@ def describe(value: object) -> str:
 
 
 def show(value: float) -> str:
-    """A number as a person would write it."""
+    """Return a number as a person would write it."""
     if isinstance(value, int) and (abs(value) < 10**9 or abs(value) >= 2**1024):
         return str(value) if abs(value) < 10**9 else clip(str(value))
     return f"{float(value):.6g}"
 
 
 def count(number: int, noun: str) -> str:
-    """A number of things: "1 input", "2 inputs"."""
+    """Return a number of things: "1 input", "2 inputs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def choices(known: Sequence[str]) -> str:
-    """Alternatives in a sentence: "a, b or c"."""
+    """Return alternatives in a sentence: "a, b or c"."""
     return known[0] if len(known) == 1 else ", ".join(known[:-1]) + " or " + known[-1]
 
 
 def synonym(word: str, known: Iterable[str]) -> str | None:
-    """The known word of which this one is another name."""
+    """Return the known word that has the same meaning as another, if there is one."""
     return next((ours for ours in known if word in _SYNONYMS.get(ours, ())), None)
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that was probably meant, if there is one."""
+    """Return the known word that was probably meant, if there is one."""
     known = list(known)
     if ours := synonym(word, known):
         return ours
@@ -94,7 +94,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def unknown_word(value: object, known: Sequence[str]) -> tuple[str, str]:
-    """Message and hint for a value that is none of the known words."""
+    """Return message and hint for a value that is no known word."""
     message = f"{{key}} must be {choices(known)}, not {describe(value)}"
     word = value if isinstance(value, str) else ""
     if "zoh" in known and word.lower() in _OTHER_SAMPLING:

@@ -1,4 +1,4 @@
-"""A spec file to text: everything that can be wrong before the first character is understood."""
+"""Read the text of a spec file, with plain words for errors of files and encodings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a spec file, UTF-8 with or without a byte order mark.
+    """Return the text of a spec file, UTF-8 with or without a byte order mark.
 
     Raises:
         SpecError: There is no such file, or it is a folder, not readable, too large, or not UTF-8.
@@ -53,13 +53,13 @@ def is_outside(path: Path, folder: Path) -> bool:
 
 
 def outside(name: str, confine: Path, key: str, location: Location | None) -> Diagnostic:
-    """The diagnostic about a file that a spec names and may not read."""
+    """Return the diagnostic about a file that a spec names and may not read."""
     message = f"{key} names {name}, which lies outside {confine}"
     return Diagnostic("file-outside", message, "move the file there, or widen --confine", key, location)
 
 
 def decode(raw: bytes, file: str) -> str:
-    """The text of UTF-8 bytes; a byte order mark is dropped.
+    """Return the text of UTF-8 bytes; a byte order mark is dropped.
 
     Raises:
         SpecError: `file-encoding`, with the place of the first wrong byte.

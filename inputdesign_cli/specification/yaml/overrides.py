@@ -12,14 +12,14 @@ from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import MAX_DEPTH, Tree, read
 
 KEY = "include"
-# These describe one thing: what two files say of it cannot be put together.
+# The parts of these blocks belong together and cannot be joined from two files.
 _WHOLE = ("plant", "noise")
-# What is estimated holds at its own sample time only: two files may say the same one.
+# An estimate holds at its own sample time only: two files may state the same one.
 _CLOCK = ("sample_time", "time_unit")
 
 
 def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], confine: FilePath | None) -> None:
-    """Put the blocks of included files where the spec has none; other mappings are joined key by key.
+    """Add the blocks of included files that the spec does not have; join other mappings key by key.
 
     A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
     the `known` blocks: it may be any file of the machine.
@@ -41,7 +41,7 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
         included = _read(tree, path, folder, name)
         if not isinstance(included.data, dict) or KEY in included.data:
             what = "includes others itself" if isinstance(included.data, dict) else "holds no blocks"
-            raise _refused(tree, path, f"{name} {what}", "name a file of blocks such as plant: and noise:")
+            raise _refused(tree, path, f"{name} {what}", "name a file with plant: and noise:")
         if not known & included.data.keys():
             raise _refused(
                 tree, path, f"{name} holds no block of a spec", "name a file with plant: and noise:"
@@ -112,7 +112,7 @@ def compose(
     known: Collection[str],
     confine: FilePath | None = None,
 ) -> None:
-    """The spec with the files that it includes, then the overrides; `--set include=..` comes first.
+    """Join included files to the spec, then apply overrides; `--set include=..` comes first.
 
     Args:
         tree: the spec as it is written.
@@ -152,7 +152,7 @@ def replace_values(tree: Tree, changes: Mapping[str, Plain], file: str) -> None:
 
     Args:
         tree: changed in place.
-        changes: values by key, such as `{"experiment.samples": 600}`.
+        changes: values by key, as in `{"experiment.samples": 600}`.
         file: what diagnostics about the new values name as their file.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Where things stand: key paths such as `plant.B[1]` and the lines and columns they were read from."""
+"""Paths of keys, as `plant.B[1]`, and the lines and columns that they were read from."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _INDEX = re.compile(r"\[(\d+)\]$")
 
 
 def format_key(path: Sequence[str | int]) -> str:
-    """The dotted form of a path: `("plant", "B", 1)` is `plant.B[1]`; the whole spec is the empty text."""
+    """Return a path in dotted form: `("plant", "B", 1)` is `plant.B[1]`; the whole spec is the empty text."""
     parts: list[str] = []
     for step in path:
         if isinstance(step, int):
@@ -28,7 +28,7 @@ def format_key(path: Sequence[str | int]) -> str:
 
 
 def parse_key(key: str) -> Path:
-    """The steps of a dotted key. `B[1]` is an index, `b3[1,2]` is a parameter name and stays whole.
+    """Return the steps of a dotted key. `B[1]` is an index, `b3[1,2]` is a parameter name and stays whole.
 
     A step of digits (`B.1`) stays text: only the tree knows whether it stands in a list.
     """
@@ -43,7 +43,7 @@ def parse_key(key: str) -> Path:
 
 
 class Mark(NamedTuple):
-    """A place: which source (0 is the spec file, then one per override), line and column from 1."""
+    """A place: the number of its source (0 is the spec file), line and column from 1."""
 
     source: int
     line: int
@@ -54,8 +54,8 @@ class Mark(NamedTuple):
 class Places:
     """The marks of every key and value, by path.
 
-    `keys` holds where a key is written, `values` what a diagnostic about its value points at: the value
-    itself, but for a mapping its key, because a block mapping begins on the line below.
+    `keys` holds where a key is written. `values` holds where a diagnostic about its value points: to the
+    value, and for a mapping to its key, because a block mapping begins on the line below.
     """
 
     sources: list[tuple[str, list[str]]] = field(default_factory=list)
@@ -63,14 +63,14 @@ class Places:
     values: dict[Path, Mark] = field(default_factory=dict)
 
     def mark(self, path: Path, *, at_key: bool = False) -> Mark | None:
-        """The mark of `path`, or of its deepest ancestor that was written."""
+        """Return the mark of `path`, or of its deepest ancestor that was written."""
         found = self._known(path)
         if at_key and found == path and found in self.keys:
             return self.keys[found]
         return self.values.get(found)
 
     def location(self, mark: Mark | None) -> Location | None:
-        """The mark as a `Location` with its file and the text of its line."""
+        """Return the mark as a `Location` with its file and the text of its line."""
         if mark is None or mark.source >= len(self.sources):
             return None
         file, lines = self.sources[mark.source]
@@ -106,7 +106,7 @@ class Places:
 
 @dataclass
 class Source:
-    """What a spec remembers of its file; empty for a spec that was built in Python."""
+    """The data, places and folder of a spec's file; empty for a spec that was built in Python."""
 
     data: dict[str, Plain] = field(default_factory=dict)
     places: Places = field(default_factory=Places)

@@ -16,10 +16,9 @@ from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.specification.yaml.scalars import NUMBER
 
 Plain = Any
-"""A number, a text, true, false or nothing, or lists and mappings of them: not checked by any model yet.
+"""A number, a text, true, false or nothing, or lists and mappings of them, not checked by any model yet.
 
-This is the one place where the type is open. A union that names itself would have every reader ask again
-for the type of each step; the models do that once.
+The type is open here only: with a recursive union every reader would have to check the type of each step.
 """
 
 FORBIDDEN_IN_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
@@ -28,7 +27,7 @@ _DEEPEST = 50
 
 
 def plain(value: object, where: str = "", depth: int = 0) -> Plain:
-    """Mappings, lists and tuples, numbers and arrays of numpy, names of files as plain data.
+    """Return mappings, lists, tuples, numbers, arrays of numpy and paths of files as plain data.
 
     Args:
         value: of any type.
@@ -36,7 +35,7 @@ def plain(value: object, where: str = "", depth: int = 0) -> Plain:
         depth: how many mappings and lists are around it.
 
     Raises:
-        SpecError: `bad-argument` for what no file could hold.
+        SpecError: `bad-argument` for values that no file could hold.
     """
     if depth > _DEEPEST:
         raise _no_data("holds itself, or is too deep", where)
@@ -63,7 +62,7 @@ def _no_data(message: str, where: str) -> SpecError:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes whatever our reader or a YAML 1.1 reader would not read as text; writes no aliases."""
+    """Quotes texts that our reader or a YAML 1.1 reader would read as other values; writes no aliases."""
 
     def ignore_aliases(self, data: Plain) -> bool:
         return True
@@ -73,7 +72,7 @@ _Dumper.add_implicit_resolver("tag:yaml.org,2002:float", NUMBER, list("-+.012345
 
 
 def to_yaml(data: dict[str, Plain]) -> str:
-    """Plain data as YAML: keys in their order, lists of numbers on one line."""
+    """Return plain data as YAML: keys in their order, lists of numbers on one line."""
     return yaml.dump(
         data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=2**20
     )

@@ -24,7 +24,7 @@ MAX_NODES = 100_000
 _PARSER: Plain = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PLAIN_TAGS = (None, "!")
-# What PyYAML says (a pattern: its C and its Python parser word it differently), what it means, what to do.
+# A pattern of PyYAML's message (its C and Python parsers word it differently), its meaning, and a remedy.
 _MEANINGS = (
     ("',' or ']'", "a list is not closed, or a comma is missing", 'close it with "]"'),
     ("',' or '}'", "a mapping is not closed, or a comma is missing", 'close it with "}"'),
@@ -162,7 +162,7 @@ class Document:
         return Location(self.file, mark.line, mark.column, text)
 
     def _expanded(self, parser: Plain) -> Iterator[Event]:
-        """Yield the events of values; an alias yields those of its anchor, the first one at its own place."""
+        """Yield the events of values; an alias yields the events of its anchor, from its own place."""
         anchors: dict[str, list[Event]] = {}
         recording: dict[str, tuple[int, list[Event]]] = {}
         depth = documents = 0
@@ -262,7 +262,7 @@ class Document:
         return data
 
     def _inside(self) -> Iterator[Event]:
-        """Yield the first events of what a list or mapping holds; the caller reads on in each."""
+        """Yield the first event of each item of a list or mapping; the caller reads the rest of the item."""
         for event, mark in self.events:
             if isinstance(event, yaml.CollectionEndEvent):
                 return
@@ -286,7 +286,7 @@ class Document:
 
 
 def syntax_error(error: yaml.YAMLError, file: str, lines: list[str], shift: int = 0) -> SpecError:
-    """The parser's error as a `SpecError` with its place; `shift` columns are added on the first line."""
+    """Return the parser's error with its place; `shift` columns are added on the first line."""
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
     column += shift if line == 1 else 0

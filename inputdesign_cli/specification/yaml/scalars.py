@@ -1,4 +1,4 @@
-"""What an unquoted word of the file means: the core rules of YAML 1.2, and why a word is not a number.
+"""The value of an unquoted word by the core rules of YAML 1.2, and why a word is not a number.
 
 PyYAML follows YAML 1.1, where `1e-3` is text, `no` is false, `1:30` is ninety and `010` is eight. Here
 `true` and `false` are the only booleans, `1e-3` is a number, and whatever reads differently from one YAML
@@ -25,7 +25,7 @@ Scalar = str | int | float | bool | None
 
 
 def resolve(word: str) -> Scalar:
-    """The value of an unquoted word. Numbers that a double cannot hold stay text (see `why_not_number`)."""
+    """Return the value of an unquoted word. Numbers beyond doubles stay text (see `why_not_number`)."""
     if word in _NULL:
         return None
     if word in _TRUE:
@@ -43,10 +43,10 @@ def resolve(word: str) -> Scalar:
 
 
 def plain_number(text: str) -> float:
-    """The number that a text writes in the digits 0 to 9: `float` takes `1_0` and those of other scripts too.
+    """Return the number of a text in digits 0 to 9; `float` would accept `1_0` and digits of other scripts.
 
     Raises:
-        ValueError: the text is none.
+        ValueError: the text is no number.
     """
     if not NUMBER.fullmatch(text.strip()):
         raise ValueError(f"{clip(text)} is no number")
@@ -54,7 +54,7 @@ def plain_number(text: str) -> float:
 
 
 def why_not_number(word: str) -> tuple[str, str, str]:
-    """Code, what is wrong (after the key's name), and hint for a text where a number should stand."""
+    """Return code, message (after the key's name) and hint for a text in place of a number."""
     text = word.strip()
     quoted = clip(word)
     if _NOT_FINITE.fullmatch(text):
@@ -78,7 +78,7 @@ def why_not_number(word: str) -> tuple[str, str, str]:
 
 
 def clip(text: str, width: int = 40) -> str:
-    """The text in double quotes on one line, shortened in the middle of nowhere when it is long."""
+    """Return the text in double quotes on one line, cut off when it is long."""
     flat = "".join(c if c.isprintable() else " " for c in text)
     return f'"{flat[:width]}..."' if len(flat) > width else f'"{flat}"'
 

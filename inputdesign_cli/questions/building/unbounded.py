@@ -1,0 +1,249 @@
+"""Spec -> whether a design has a best value.
+
+It has no best value if some excitation informs about the parameters and is neither paid for nor limited.
+Combinations of the inputs may be free, and frequencies: at a pole of the plant on the unit circle, a loop
+takes all power of the input away, while the power of the output there informs about the pole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.convex.cost import weights_of
+from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.plant import graded_grid, local_maxima
+from inputdesign_cli.questions.building.header import build_units
+from inputdesign_cli.questions.common.reach import Reach
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.spectrum import matrices
+
+PricedPower = tuple[PowerKind, int | None, float]
+
+# Where the price of directions is looked at, in shares of the band: away from what controllers favour.
+_PLACES = np.array([0.137, 0.293, 0.461, 0.618, 0.787, 0.911])
+_SINGULAR = 1e-12
+# A price this many decades below the typical one may be a zero between the points of a grid.
+_ZERO = 6.0
+# Distances to a free frequency at which the information is looked at, in units of the next pole's distance.
+_DISTANCES = np.geomspace(1e-2, 1e-4, 9)
+# The information at unit price grows at least with the inverse square of the distance, from step to step.
+_GROWS, _EARLIER = 2.5, 4
+# Lines and poles nearer to a frequency than this share of the band are on it.
+_ON = 1e-6
+# Shares of the band that are left out: around a free frequency in a hint, and at an end for the bound.
+_MARGIN, _OFF = 0.01, 1e-6
+_OUTCOMES = {
+    "cost": "with power ever nearer to it the accuracy costs as little as you like",
+    "factor": "with power ever nearer to it the accuracy grows without end",
+    "samples": "with power ever nearer to it the experiment is as short as you like",
+}
+
+
+def check_every_direction_counts(spec: Spec, question: Question) -> None:
+    """Refuse a design in which some combination of the inputs may have any power.
+
+    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero.
+
+    Raises:
+        SpecError: `no-cost` or `needs-limits`.
+    """
+    priced = priced_powers(question)
+    if priced is None:
+        return
+    lo, hi = question.experiment.band
+    density = price_density(question.experiment, priced, lo + (hi - lo) * _PLACES)
+    size = np.sqrt(np.einsum("naa->na", density).real)
+    unit = np.where(size > 0.0, size, 1.0)
+    correlation = density / (unit[:, :, None] * unit[:, None, :])
+    if np.linalg.eigvalsh(correlation)[:, 0].max() <= _SINGULAR:
+        raise _free_direction(spec, np.flatnonzero(np.all(size == 0.0, axis=0)))
+
+
+def _free_direction(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:
+    which = f"a combination of the {spec.plant.inputs} inputs"
+    if silent.size:
+        which = f"the power of input {silent[0] + 1}"
+    if spec.goal == "least_cost":
+        unseen = "" if silent.size else ": it does not show in the powers that are paid for"
+        hint = "give input_power a weight for every input, however small"
+        return spec.complain("no-cost", f"{which} costs nothing{unseen}", hint=hint, key="cost")
+    unseen = "" if silent.size else ": it does not show in the powers that are limited"
+    hint = "add limits.input_power, or limits.excitation_power in closed loop"
+    return spec.complain("needs-limits", f"nothing limits {which}{unseen}", hint=hint, key="limits")
+
+
+def check_reach(spec: Spec, question: Question) -> Reach:
+    """Return what a bound over every spectrum may claim; refuse a family that has no best spectrum.
+
+    Raises:
+        SpecError: `no-cost` or `needs-limits`.
+    """
+    found = free_information(question)
+    if found is None:
+        return Reach()
+    units = build_units(spec)
+    places = " and ".join(units.named(w) for w in found.frequencies)
+    free = f"excitation at {places} informs about the parameters and {_uncounted(question)}"
+    others, band = _others(spec, question), _band(spec, question, found)
+    lo, hi = question.experiment.band
+    off = 2.0 * _OFF * hi
+    ends = [any(abs(w - end) < off for w in found.frequencies) for end in (lo, hi)]
+    # Lines are kept off an end of the band; they close in on a frequency inside it from both sides.
+    inside = question.goal == "factor" and any(lo + off <= w <= hi - off for w in found.frequencies)
+    on_it = question.goal == "factor" and found.reached and not question.basis.free
+    approached = "the best is approached with power ever nearer to it"
+    outcome = _OUTCOMES[question.goal] if found.unbounded else approached
+    if found.reached and (found.unbounded or inside or on_it):
+        section = "cost" if question.goal == "cost" else "limits"
+        add = "give a weight, however small, to" if section == "cost" else "add"
+        avoid = f"leave it out by {band}" if question.basis.free else "choose other lines"
+        raise spec.complain(
+            "no-cost" if question.goal == "cost" else "needs-limits",
+            f"{free}: {outcome}, and no spectrum is the best",
+            hint=f"{add} {others}; or {avoid}",
+            key=section,
+        )
+    if found.unbounded or inside:
+        return Reach(
+            bounded=False,
+            note="the design is the best of its spectrum type, and there is no bound over every spectrum: "
+            f"{free}, so that {outcome}; with {others} there is one",
+        )
+    inner = (lo + ends[0] * _OFF * hi, hi - ends[1] * _OFF * hi)
+    if not question.basis.free:
+        return Reach(attained=False, band=inner)
+    note = f"{free}: {approached}, which no record can follow; add {others}, or leave it out by {band}"
+    return Reach(attained=False, band=inner, note=note)
+
+
+def _uncounted(question: Question) -> str:
+    if question.goal == "cost":
+        return "costs nothing"
+    keys = dict.fromkeys(limit.key for limit in question.limits if limit.upper)
+    return f"is not limited by {', '.join(keys)}"
+
+
+def _others(spec: Spec, question: Question) -> str:
+    """What else to pay for or to limit."""
+    section = "cost" if question.goal == "cost" else "limits"
+    if spec.experiment.controller is None:
+        return f"{section}.input_power"
+    priced = {kind for kind, _, _ in priced_powers(question) or []}
+    # At a pole in the loop the output has power where the input has none.
+    output = "" if "output" in priced else f"{section}.output_power or "
+    return f"{output}{section}.excitation_power"
+
+
+def _band(spec: Spec, question: Question, found: FreeInformation) -> str:
+    """The widest band that keeps off the frequencies, as its key."""
+    lo, hi = question.experiment.band
+    margin, inner = _MARGIN * hi, np.array(sorted(found.frequencies))
+    starts, ends = np.append(lo, inner + margin), np.append(inner - margin, hi)
+    widest = int(np.argmax(ends - starts))
+    unit = build_units(spec).frequency
+    start = "0" if starts[widest] == 0.0 else f"{starts[widest] / unit:.3g}"
+    return f"limits: {{band: [{start}, {ends[widest] / unit:.6g}]}}"
+
+
+@dataclass(frozen=True)
+class FreeInformation:
+    """Frequencies at which the information per unit of price grows without bound.
+
+    Attributes:
+        frequencies: in the unit of the experiment.
+        unbounded: whether power ever nearer to them meets all requirements at no price, or the criterion has
+            no bound; otherwise the best value is only approached there.
+        reached: whether spectra of the family can have power there.
+    """
+
+    frequencies: tuple[float, ...]
+    unbounded: bool
+    reached: bool
+
+
+def free_information(question: Question) -> FreeInformation | None:
+    """Return the frequencies of the band at which the information per unit of price has no bound.
+
+    None without one, and for robust designs: the poles of other plants lie elsewhere.
+    """
+    priced = priced_powers(question)
+    if priced is None or question.others:
+        return None
+    experiment = question.experiment.whitened(1.0)
+    found = [
+        (w, gain) for w in _free_frequencies(experiment, priced) if (gain := _gain(experiment, priced, w))
+    ]
+    if not found:
+        return None
+    places = tuple(w for w, _ in found)
+    before, after = (sum(gain[n] for _, gain in found) for n in (0, 1))
+    requirements = [make(experiment) for make in question.requirements]
+
+    def level(information: Array) -> float:
+        return 2.0 * float(np.log(max(one.worst(information).ratio for one in requirements)))
+
+    gained = level(np.eye(experiment.size) + before) - level(np.eye(experiment.size) + after)
+    # The determinant of all k parameters gains the k-th part of the gain of one direction.
+    grown = float(np.log(np.trace(after) / np.trace(before)))
+    basis = question.basis
+    reached = basis.free
+    if not reached and not basis.has_density:
+        lines = basis.lines(basis.even)[0]
+        reached = bool(np.any(np.abs(lines[:, None] - np.array(places)) <= _ON * experiment.band[1]))
+    return FreeInformation(places, gained > 0.5 * grown / experiment.size, reached)
+
+
+def priced_powers(question: Question) -> list[PricedPower] | None:
+    """Return the powers that are paid for, or all with an upper limit, each with its weight.
+
+    None if the density of the excitation itself is limited.
+    """
+    if question.goal == "cost":
+        return weights_of(question.cost)
+    if any(density.upper for density in question.densities):
+        return None
+    return [(limit.kind, limit.channel, 1.0 / limit.bound) for limit in question.limits if limit.upper]
+
+
+def price_density(experiment: Experiment, priced: list[PricedPower], w: Array) -> NDArray:
+    """Return the price (n, r, r) of a unit of excitation at frequencies (n,)."""
+    parts = [
+        weight * matrices(experiment.power_density(kind, w, channel)) for kind, channel, weight in priced
+    ]
+    return np.asarray(np.sum(parts, axis=0))
+
+
+def _free_frequencies(experiment: Experiment, priced: list[PricedPower]) -> list[float]:
+    """Frequencies at which some direction of the excitation costs nothing."""
+    near = np.concatenate([experiment.singularities, experiment.model.singularities])
+    grid = graded_grid(near, *experiment.band)
+    typical = float(np.median(np.linalg.eigvalsh(price_density(experiment, priced, grid))[:, -1]))
+
+    def cheapness(w: Array) -> Array:
+        least = np.linalg.eigvalsh(price_density(experiment, priced, w))[:, 0]
+        return np.asarray(-np.log10(np.maximum(least / typical, np.finfo(float).tiny)))
+
+    return local_maxima(cheapness, grid, cheapness(grid), above=_ZERO)[0].tolist()
+
+
+def _gain(experiment: Experiment, priced: list[PricedPower], place: float) -> tuple[Array, Array] | None:
+    """The information (k, k) at unit price near a frequency, and much nearer; None if it does not grow."""
+    hi = experiment.band[1]
+    distance = np.abs(experiment.singularities - place)
+    scale = float(np.min(distance[distance > _ON * hi], initial=0.1 * hi))
+    w = place + scale * _DISTANCES * (1.0 if place + scale * _DISTANCES[0] <= hi else -1.0)
+    values, vectors = np.linalg.eigh(price_density(experiment, priced, w))
+    roots = vectors / np.sqrt(np.maximum(values, np.finfo(float).tiny))[:, None, :]
+    rows = np.einsum("nkpr,nrs->nkps", experiment.excitation_gradient(w), roots)
+    flat = rows.reshape(*rows.shape[:2], -1)
+    information = np.asarray((flat @ flat.conj().swapaxes(1, 2)).real)
+    sizes = np.trace(information, axis1=1, axis2=2)
+    if not sizes[-1] > _GROWS * sizes[-2]:
+        return None
+    return information[-1 - _EARLIER], information[-1]
