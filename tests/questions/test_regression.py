@@ -205,7 +205,7 @@ BAD = [
     (["experiment.prior={information: [[1]]}"], "not-supported", "prior"),
     (["objective=shortest_experiment"], None, ""),
     (["limits.amplitude=1"], "not-supported", "limits.amplitude"),
-    (["solver.method=lmi"], "not-supported", "grid program"),
+    (["solver.method=lmi"], "not-supported", "solver.method"),
     (["signal.type=multisine"], "not-supported", "signal.type"),
     (["cost={input_power: 2}"], "not-supported", "weigh powers"),
 ]

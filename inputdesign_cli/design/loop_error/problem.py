@@ -35,21 +35,6 @@ class PowerLimit:
     most: float
     channel: int | None = None
 
-    @classmethod
-    def of_input(cls, most: float, channel: int | None = None) -> PowerLimit:
-        """Of the inputs."""
-        return cls("input", most, channel)
-
-    @classmethod
-    def of_output(cls, most: float, channel: int | None = None) -> PowerLimit:
-        """Of the part of the outputs that the inputs cause."""
-        return cls("output", most, channel)
-
-    @classmethod
-    def of_moves(cls, most: float, channel: int | None = None) -> PowerLimit:
-        """Of the moves of the inputs from sample to sample."""
-        return cls("moves", most, channel)
-
     def metric(self, w: ArrayLike, G: ComplexArray) -> ComplexArray:
         """M (K, n, n), G that of the plant at the frequencies."""
         size = G.shape[1] if self.kind == "output" else G.shape[2]

@@ -1,4 +1,4 @@
-"""Spec -> the question of `accuracy.closed_loop_error`, checked before anything is computed."""
+"""Build the question of `accuracy.closed_loop_error` from its spec, and check it before it is computed."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ from inputdesign_cli.design.loop_error import (
     PowerLimit,
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
-from inputdesign_cli.errors import bad_spec, refuse
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
-from inputdesign_cli.questions.building.signal_settings import build_bounds, stated_moves, stated_peaks
+from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
+from inputdesign_cli.questions.building.signal_settings import build_bounds, stated_peaks
+from inputdesign_cli.questions.building.unhandled import check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
 from inputdesign_cli.questions.loop_error.build_plant import estimated_model, matrix_plant
 from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms
@@ -77,12 +80,12 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
 
 
 def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tuple[str, ControlLaw]:
-    """The key of the control law, and the law."""
+    """Return the key of the control law, and the law."""
     control = error.control
     if control.minimum_variance:
         return "minimum_variance", MinimumVariance(plant)
     if control.internal_model is not None:
-        # The delay and the zeros to be kept are read off the inverse, so it must exist first.
+        # The inverse gives the delay and the zeros to be kept, so it must exist first.
         check_invertible(plant, key=key)
         return "internal_model", InternalModel.build(plant, _transfer(spec, control.internal_model))
     target = control.model_reference
@@ -101,38 +104,21 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tu
 
 
 def _transfer(spec: Spec, transfer: Transfer) -> Rational:
-    """A transfer function of the spec, sampled by a zero-order hold where it is given in s."""
+    """Return a transfer function of the spec, sampled by a zero-order hold if it is given in s."""
     return rational(transfer) if transfer.kind == "discrete" else held(transfer, spec.sample_time)
 
 
 def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
-    found: list[PowerLimit] = []
-    limits = spec.limits
-    for key, limit, kind in (
-        ("input_power", limits.input_power, PowerLimit.of_input),
-        ("excitation_power", limits.excitation_power, PowerLimit.of_input),
-        ("output_power", limits.output_power, PowerLimit.of_output),
-    ):
-        if limit is None:
-            continue
-        if limit.min is not None:
-            raise refuse(f"limits.{key}.min", what="enforce least powers here", hint="remove min")
-        if isinstance(limit.max, tuple):
-            found += [kind(most, channel) for channel, most in enumerate(limit.max)]
-        elif limit.max is not None:
-            found.append(kind(limit.max))
-    samples = ((PowerLimit.of_input, stated_peaks(spec)[0]), (PowerLimit.of_moves, stated_moves(spec)))
-    found += [
-        kind(float(most) ** 2, channel)
-        for kind, bounds in samples
-        if bounds is not None
-        for channel, most in enumerate(bounds)
-        if np.isfinite(most)
-    ]
-    if spec.limits.amplitude is not None and spec.limits.amplitude.output is not None:
-        what = "enforce peaks of outputs for closed_loop_error"
-        raise refuse("limits.amplitude.output", what=what, hint="limit output_power")
-    return tuple(found)
+    """Return the limits on powers; in open loop the excitation is the input."""
+    stated = sorted(build_power_limits(spec), key=lambda one: one.kind == "output")
+    return tuple(
+        PowerLimit(
+            "input" if one.kind == "excitation" else one.kind,
+            one.bound,
+            one.channel or 0 if one.implied else one.channel,
+        )
+        for one in (*stated, *implied_limits(spec))
+    )
 
 
 def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalSettings:
@@ -168,14 +154,7 @@ def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalS
 
 def _trial(spec: Spec, error: ClosedLoopError, problem: LoopErrorProblem) -> LossTrial:
     simulation = spec.simulation or Simulation()
-    for name in simulation.compare:
-        if name != "white":
-            raise bad_spec(
-                "not-supported",
-                f"this version compares the design with white noise, not with {name}",
-                hint="write compare: [white]",
-                key="simulation.compare",
-            )
+    check_compared(simulation.compare, "white")
     true = problem.plant
     if simulation.plant is not None or simulation.noise is not None:
         true = matrix_plant(
@@ -187,36 +166,29 @@ def _trial(spec: Spec, error: ClosedLoopError, problem: LoopErrorProblem) -> Los
     )
 
 
-_LIMITS = ("energy", "spectrum")
 _SIGNAL_KEYS = ("hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation", "scale", "also")
 
 
 def _check_supported(spec: Spec) -> None:
-    for name in spec.accuracy.requirements:
-        what = f"handle {name} beside closed_loop_error"
-        raise refuse(f"accuracy.{name}", what=what, hint="keep one of them")
-    for name in spec.limits.stated(*_LIMITS):
-        what, hint = f"enforce limits.{name} for closed_loop_error", "limit powers, amplitude, rate or band"
-        raise refuse(f"limits.{name}", what=what, hint=hint)
-    spectrum, signal = spec.spectrum, spec.signal
-    if spectrum is not None and spectrum.type not in ("pointwise", "free"):
-        kind = spectrum.phrase.replace(":", "")
-        what = f"design spectra of {kind} for closed_loop_error"
-        raise refuse("spectrum", what=what, hint="use type: pointwise, which is best at every frequency")
-    if spec.closed_loop:
-        what, hint = "design closed-loop experiments here", "remove the controller"
-        raise refuse("experiment.controller", what=what, hint=hint)
-    if spec.report.ellipses is not None:
-        raise refuse("report.ellipses", what="draw ellipses for closed_loop_error", hint="remove report")
-    if spec.experiment.prior is not None:
-        raise refuse("experiment.prior", what="use prior information here", hint="remove it")
-    if spec.solver.method != "exchange":
-        what = f"use the method {spec.solver.method} here"
-        raise refuse("solver.method", what=what, hint="remove method")
-    if signal.type not in (None, "multisine", "filtered_noise"):
-        what = f"make {signal.type} signals here"
-        raise refuse("signal.type", what=what, hint="use multisine or filtered_noise")
-    for name in signal.stated(*_SIGNAL_KEYS):
-        raise refuse(f"signal.{name}", what=f"apply signal.{name} here", hint="remove it")
-    if signal.phases not in (None, "random"):
-        raise refuse("signal.phases", what=f"choose {signal.phases} phases here", hint="use random")
+    """Refuse what is not done for a closed-loop error, rather than ignore it."""
+    limits = "limit powers from above, amplitude of inputs, rate or band"
+    mins = [f"limits.{kind}_power.min" for kind in POWER_KINDS]
+    remedies = {
+        **{f"accuracy.{name}": "keep one requirement" for name in spec.accuracy.requirements},
+        **dict.fromkeys(("limits.energy", "limits.spectrum", "limits.amplitude.output", *mins), limits),
+        "spectrum.type": "use type: pointwise, which is best at every frequency",
+        "experiment.controller": "remove the controller",
+        "report.ellipses": "remove report",
+        "experiment.prior": "remove it",
+        "solver.method": "remove method",
+        "signal.type": "use multisine or filtered_noise",
+        **dict.fromkeys((f"signal.{name}" for name in _SIGNAL_KEYS), "remove it"),
+        "signal.phases": "use random",
+    }
+    handled = {
+        "spectrum.type": ("pointwise", "free"),
+        "solver.method": ("exchange",),
+        "signal.type": ("multisine", "filtered_noise"),
+        "signal.phases": ("random",),
+    }
+    refuse_unhandled(spec, "closed_loop_error", remedies, handled)

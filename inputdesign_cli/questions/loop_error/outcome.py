@@ -1,4 +1,4 @@
-"""A design for the closed-loop error -> its outcome, tables and curves."""
+"""Write the outcome, tables and curves of a design for the closed-loop error, and of its study."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
+from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.design.loop_error.weight import adjoint
+from inputdesign_cli.monte_carlo.loop_error import LossStudy
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.outcome import (
     Baseline,
     ClosedLoopError,
@@ -25,13 +28,15 @@ from inputdesign_cli.outcome import (
     Spectrum,
     White,
 )
-from inputdesign_cli.outcome.curves import Curves, DirectionCurves, SpectrumCurves
+from inputdesign_cli.outcome.curves import Curves, DirectionCurves, LossCurves, SpectrumCurves
 from inputdesign_cli.outcome.loop_error import ActivePower, LossMoments, TheoreticalLoss
 from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.questions.common.status import proof_status
+from inputdesign_cli.signal.lines import Lines
 
 # Frequencies of the plots, and what share of the band they reach down to.
 _POINTS = 800
@@ -40,7 +45,7 @@ _LOWEST = 1e-3
 
 @dataclass(frozen=True)
 class LoopErrorTerms:
-    """The question, as far as its results repeat it.
+    """The parts of the question that its results state.
 
     Attributes:
         law: the control law as the spec calls it.
@@ -116,7 +121,7 @@ def design_outcome(
 def spectrum_results(
     terms: LoopErrorTerms, design: LoopErrorDesign
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
-    """spectrum.csv on the grid that the spec asks for, and the figures."""
+    """Return spectrum.csv on the grid that the spec asks for, and the figures."""
     units, (lo, hi) = terms.header.units, design.problem.band
     if design.of_lines:
         w, Phi, white = design.frequencies, design.spectrum, None
@@ -204,5 +209,50 @@ def _loop_input(problem: LoopErrorProblem) -> Mapping[str, object]:
 
 
 def _tidy(matrix: ComplexArray) -> Array | ComplexArray:
-    """The real part of a matrix that is real up to rounding."""
+    """Return a matrix that is real up to rounding as a real one."""
     return matrix.real if np.abs(matrix.imag).max() <= 1e-13 * np.abs(matrix).max() else matrix
+
+
+def loss_results(
+    criterion: ParametricCriterion,
+    studies: Mapping[str, LossStudy],
+    inputs: Mapping[str, Lines],
+    samples: int,
+) -> tuple[dict[str, TriedInput], Improvement | None, dict[str, Curves]]:
+    """Return what each input gave, the improvement over white noise, and the histogram where runs count.
+
+    Args:
+        criterion: of the true system.
+        inputs: the spectra that were tried.
+    """
+    theory, entries = {}, {}
+    for name, lines in inputs.items():
+        information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))
+        theory[name] = loss_theory(criterion, information)
+        entries[name] = _tried(theory[name], studies[name], samples * information)
+    losses = {name: study.loss for name, study in studies.items() if study.loss.size > 1}
+    improvement = None
+    if {"design", "white"} <= losses.keys():
+        measured = 1 - float(losses["design"].mean() / losses["white"].mean())
+        improvement = Improvement(measured, 1 - theory["design"].mean / theory["white"].mean)
+    means = {name: theory[name].mean for name in losses}
+    return entries, improvement, {"loss": LossCurves(losses, means)} if losses else {}
+
+
+def _tried(theory: LossTheory, study: LossStudy, information: Array) -> TriedInput:
+    several, counted = len(study.estimates) > 1, study.loss.size > 1
+    return TriedInput(
+        theory=theory_of(theory),
+        unstable=study.unstable,
+        mean_estimate=study.estimates.mean(axis=0),
+        power=tuple(np.ravel(study.power).tolist()),
+        covariance_eigenvalues=whitened_eigenvalues(study.estimates, information) if several else None,
+        loss=_moments(study.loss) if counted else None,
+        squared=_moments(study.loss**2) if counted else None,
+        exact=ExactLoss(_moments(study.exact), _moments(study.exact**2)) if counted else None,
+    )
+
+
+def _moments(values: Array) -> LossMoments:
+    sd = float(values.std(ddof=1))
+    return LossMoments(float(values.mean()), sd, sd / float(np.sqrt(values.size)))

@@ -1,9 +1,9 @@
-"""The input for the model that a controller is designed on: the least error of the loop."""
+"""Design the input of the model for a controller, so that the error of the loop is least."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
@@ -11,12 +11,16 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.unstable_runs import unstable_runs
 from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
-from inputdesign_cli.outcome import Signal, Simulation, read_plain, write_plain
+from inputdesign_cli.outcome import Simulation
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.questions.common.plain_signal import signal_of, signal_results
+from inputdesign_cli.questions.common.plain_signal import signal_results
 from inputdesign_cli.questions.common.study import timing, with_study
-from inputdesign_cli.questions.loop_error.losses import loss_results
-from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms, design_outcome, spectrum_results
+from inputdesign_cli.questions.loop_error.outcome import (
+    LoopErrorTerms,
+    design_outcome,
+    loss_results,
+    spectrum_results,
+)
 from inputdesign_cli.questions.loop_error.signal import (
     LoopErrorSignalSettings,
     design_lines,
@@ -47,7 +51,7 @@ class LoopErrorTask:
     trial: LossTrial
 
     def solve(self) -> Results:
-        """The design, its proof, its signal and its curves.
+        """Return the design with its proof, its signal and its curves.
 
         Raises:
             SpecError: `not-identifiable`.
@@ -56,7 +60,7 @@ class LoopErrorTask:
         return self._solved()[1]
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """The same with the entry `simulation` and the histogram of the loss.
+        """Return the design with its Monte Carlo study and the histogram of the loss.
 
         Raises:
             SpecError: `not-supported` for true systems that are not ARX, or minimum-variance control; see
@@ -86,20 +90,12 @@ class LoopErrorTask:
         started = time.perf_counter()
         design = design_loop_error(self.problem, self.terms.covariance, tolerance=self.terms.tolerance)
         solved = time.perf_counter()
-        made = realise(design, self.signal)
-        signal = replace(signal_of(made.samples), type=made.method)
-        signal = read_plain(Signal, write_plain(signal) | made.details)
+        samples, signal = realise(design, self.signal)
         outcome = design_outcome(self.terms, design, signal, timing(started, solved))
         header = self.terms.header
         tables, curves = spectrum_results(self.terms, design)
-        table, record = signal_results(header.units, made.samples)
-        return design, Results(
-            outcome,
-            header.resolved_spec,
-            header.units.time_unit,
-            {**tables, "signal": table},
-            {**curves, "signal": record},
-        )
+        tables["signal"], curves["signal"] = signal_results(header.units, samples)
+        return design, Results(outcome, header.resolved_spec, header.units.time_unit, tables, curves)
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
@@ -114,7 +110,7 @@ def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
         raise bad_spec(
             "not-supported",
             "this version identifies by least squares, which estimates every coefficient of a plant in q^-1: "
-            "neither named parameters nor those of a plant in s, and none is known",
+            "neither named parameters nor coefficients in s, and none is known",
             hint="run idesign solve, which computes what theory expects; or write A and B as numbers",
             key="plant",
         )

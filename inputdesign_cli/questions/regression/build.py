@@ -1,8 +1,9 @@
-"""Spec -> a regression with neglected terms, and the least error that its moments buy."""
+"""Build the question of a regression with neglected terms from its spec."""
 
 from __future__ import annotations
 
 from functools import partial
+from typing import get_args
 
 import numpy as np
 
@@ -11,23 +12,27 @@ from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
+from inputdesign_cli.questions.building.unhandled import check_compared, refuse_unhandled
 from inputdesign_cli.questions.regression.outcome import RegressionTerms
 from inputdesign_cli.questions.regression.regressors import RegressorSettings
-from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, TrueNoise
+from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
 _STRUCTURED_TOLERANCE = 1e-6
-_SIGNAL_KEYS = (
-    *("type", "phases", "hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation"),
-    *("scale", "also", "candidates"),
-)
+_SIGNAL_KEYS = [
+    f"signal.{name}"
+    for name in (
+        *("type", "phases", "hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation"),
+        *("scale", "also", "candidates"),
+    )
+]
 
 _refuse = partial(refuse, who="a regression design")
 
 
 def build_regression_task(spec: Spec) -> RegressionTask:
-    """The task, with all that can be wrong with it already complained of.
+    """Return the task; everything that can be wrong with its spec is reported here.
 
     Raises:
         SpecError: the spec asks for what a regression design does not do.
@@ -46,7 +51,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
     if not any(error.estimated):
         raise bad_spec(
             "zero-weights",
-            "all weights of the estimated parameters are zero: no experiment tells anything of the quantity",
+            "all weights of the estimated parameters are zero: no experiment changes the quantity",
             hint="give at least one of them a weight other than 0",
             key=f"{KEY}.estimated",
         )
@@ -64,13 +69,13 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         target=error.target,
         energy=spec.limits.energy if error.target is None else None,
     )
-    seed = signal.seed or 0
     return RegressionTask(
         terms=terms,
         alternating=solver.method == "alternating",
         tolerance=solver.tolerance if "tolerance" in solver.model_fields_set else _STRUCTURED_TOLERANCE,
-        seed=seed,
-        signal=RegressorSettings(spec.signal_samples, signal.periods, signal.start or "steady", seed),
+        signal=RegressorSettings(
+            spec.signal_samples, signal.periods, signal.start or "steady", signal.seed or 0
+        ),
         trial=_trial(spec),
     )
 
@@ -80,30 +85,20 @@ def _trial(spec: Spec) -> RegressionTrial | None:
     true = None if simulation is None else simulation.plant
     if simulation is None or true is None or true.kind != "parameters":
         return None
-    contenders: list[Contender] = []
-    for name in simulation.compare:
-        if name not in ("white", "binary"):
-            raise bad_spec(
-                "not-supported",
-                f"{name} inputs are not available for regressions",
-                hint="compare with white or binary",
-                key="simulation.compare",
-            )
-        contenders.append(name)
-    noise = None
+    check_compared(simulation.compare, *get_args(Contender))
+    contenders: list[Contender] = [name for name in get_args(Contender) if name in simulation.compare]
+    variance = relative = None
     if simulation.noise is not None:
         _refuse_coloured(simulation.noise, "simulation.noise")
-        variance = simulation.noise.variance
-        noise = TrueNoise(
-            variance=None if variance is None else float(np.ravel(np.asarray(variance, dtype=float))[0]),
-            relative_std=simulation.noise.relative_std,
-        )
+        relative = simulation.noise.relative_std
+        if simulation.noise.variance is not None:
+            variance = float(np.ravel(np.asarray(simulation.noise.variance, dtype=float))[0])
     theta = np.array(true.parameters, dtype=float)
-    return RegressionTrial(theta, simulation.runs, simulation.seed, tuple(contenders), noise)
+    return RegressionTrial(theta, simulation.runs, simulation.seed, tuple(contenders), variance, relative)
 
 
 def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
-    """The theory is that of white noise."""
+    """Raise `SpecError` (`not-supported`) unless noise is white, as the theory takes it."""
     for name, polynomial in (("C", noise.C), ("D", noise.D)):
         if np.ravel(polynomial).tolist() != [1.0]:
             raise bad_spec(
@@ -115,30 +110,23 @@ def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
 
 
 def _check_supported(spec: Spec) -> None:
-    """Say plainly what is not done for regressions, rather than ignore it."""
+    """Refuse what is not done for regressions, rather than ignore it."""
     _refuse_coloured(spec.noise, "noise")
     if "cost" in spec.model_fields_set:
         raise _refuse("cost", what="weigh powers", hint="remove it: what counts is the energy, trace R")
     if spec.goal == "shortest_experiment":
         hint = "use least_cost or best_accuracy"
         raise _refuse("objective", what="look for the shortest experiment", hint=hint)
-    if spec.closed_loop:
-        raise _refuse("experiment.controller", what="run in closed loop", hint="remove the controller")
-    if spec.experiment.prior is not None:
-        raise _refuse("experiment.prior", what="use prior information", hint="remove it")
-    for name, stated in spec.limits:
-        if name != "energy" and stated is not None:
-            hint = "remove it, or use limits.energy"
-            raise _refuse(f"limits.{name}", what=f"enforce limits.{name}", hint=hint)
-    error = spec.accuracy.mean_squared_error
-    if spec.limits.energy is not None and error is not None and error.target is not None:
+    if spec.at("accuracy", "mean_squared_error", "target") is not None and spec.limits.energy is not None:
         hint = "remove it: the least energy for the target is found; or remove the target"
         raise _refuse("limits.energy", what="enforce limits.energy beside a target", hint=hint)
-    if spec.report.ellipses is not None:
-        raise _refuse("report.ellipses", what="draw ellipses", hint="remove report")
-    if spec.solver.method == "lmi":
-        hint = "use exchange (the default) or alternating"
-        raise _refuse("solver.method", what="have a grid program", hint=hint)
-    for name in spec.signal.stated(*_SIGNAL_KEYS):
-        hint = "remove it; samples, periods, seed and start count"
-        raise _refuse(f"signal.{name}", what=f"apply signal.{name}", hint=hint)
+    limits = [f"limits.{name}" for name, _ in spec.limits if name != "energy"]
+    remedies = {
+        "experiment.controller": "remove the controller",
+        "experiment.prior": "remove it",
+        **dict.fromkeys(limits, "remove it, or use limits.energy"),
+        "report.ellipses": "remove report",
+        "solver.method": "use exchange (the default) or alternating",
+        **dict.fromkeys(_SIGNAL_KEYS, "remove it; samples, periods, seed and start count"),
+    }
+    refuse_unhandled(spec, "a regression design", remedies, {"solver.method": ("exchange", "alternating")})

@@ -1,4 +1,4 @@
-"""A design of moments -> its outcome and the curves of its error."""
+"""Write the outcome of a design of moments, and the curves of its error."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class MomentsDesign:
     """R with its proof.
 
     Attributes:
-        rho: (n,) autocorrelations, if the moments are those of one input.
+        rho: (n,) autocorrelations, if one input has these moments.
         bound: no R of the structure does better.
         tolerance: relative gap up to which the design counts as optimal.
         how: how it was found.
@@ -83,7 +83,7 @@ def moments_outcome(
     terms: RegressionTerms, design: MomentsDesign, signal: Signal | None, timing: dict[str, float]
 ) -> Outcome:
     """Return what result.json says of a design."""
-    regression, split, target = terms.regression, design.split, terms.target
+    regression, split, target, n = terms.regression, design.split, terms.target, terms.regression.n
     if target is not None:
         kind, value, of = "least_cost", design.energy, "energy"
         changes = energy_sensitivity(regression, design.energy, target, split)
@@ -106,7 +106,14 @@ def moments_outcome(
         mean_squared_error=MeanSquaredError(
             split.total, split.bias_squared, split.variance, target, others=asdict(split)
         ),
-        moments=_moments(terms, design),
+        moments=Moments(
+            structure="toeplitz" if terms.toeplitz else "free",
+            estimated=regression.m,
+            trace=design.energy,
+            R=design.R,
+            entries={f"R_{i + 1}_{j + 1}": float(design.R[i, j]) for i in range(n) for j in range(i, n)},
+            autocorrelations=design.rho,
+        ),
         sensitivity=Sensitivity(
             of,
             changes.neglected_norm,
@@ -122,7 +129,7 @@ def moments_outcome(
 
 
 def error_curves(terms: RegressionTerms, design: MomentsDesign) -> ErrorCurves:
-    """Squared bias and variance of the design's shape over the energy, and those of white regressors."""
+    """Return squared bias and variance over the energy, beside the error of white regressors."""
     regression = terms.regression
     energy = design.energy * np.geomspace(0.1, 10.0, _POINTS)
     white = regression.error(np.eye(regression.n) / regression.n)
@@ -153,18 +160,6 @@ def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Es
         energy=float(np.trace(G)),
         mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
         mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
-    )
-
-
-def _moments(terms: RegressionTerms, design: MomentsDesign) -> Moments:
-    R, n = design.R, terms.regression.n
-    return Moments(
-        structure="toeplitz" if terms.toeplitz else "free",
-        estimated=terms.regression.m,
-        trace=design.energy,
-        R=R,
-        entries={f"R_{i + 1}_{j + 1}": R[i, j] for i in range(n) for j in range(i, n)},
-        autocorrelations=design.rho,
     )
 
 

@@ -1,8 +1,7 @@
-"""Moments -> the regressors of a regression experiment, and what these very samples give."""
+"""Make the regressors of an experiment from their moments, with the error that these samples give."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +19,7 @@ from inputdesign_cli.signal.moments import Start
 
 @dataclass(frozen=True)
 class RegressorSettings:
-    """Length of the record, its number of equal periods (None: as suits), its past, and the seed."""
+    """The length of the record, its number of equal periods (None: free), its past, and the seed."""
 
     samples: int
     periods: int | None
@@ -28,7 +27,7 @@ class RegressorSettings:
     seed: int
 
     def period(self, least: int) -> int | None:
-        """Samples a period, at least so many; None where no periods are asked for.
+        """Return the samples of a period, `least` or more; None if no periods are asked for.
 
         Raises:
             SpecError: `bad-period`.
@@ -47,27 +46,22 @@ class RegressorSettings:
 
 
 @dataclass(frozen=True)
-class PowerLines:
-    """Lines of one periodic input: frequencies (L,) in rad/sample and mean squares (L,)."""
-
-    frequencies: Array
-    powers: Array
-
-
-@dataclass(frozen=True)
 class RegressorRecord:
-    """Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their description."""
+    """Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their description.
+
+    `lines` of one periodic input are its frequencies (L,) in rad/sample and mean squares (L,).
+    """
 
     Phi: NDArray[np.float64]
     channels: NDArray[np.float64]
     signal: Signal
-    lines: PowerLines | None = None
+    lines: tuple[Array, Array] | None = None
 
 
 def realise_regressors(
     settings: RegressorSettings, regression: Regression, R: Array, rho: Array | None, target: float | None
 ) -> RegressorRecord | None:
-    """The record that is asked for; None when it is too short for any.
+    """Return the record that is asked for; None when it is too short for any.
 
     Args:
         R: (n, n) moments summed over the samples.
@@ -77,61 +71,33 @@ def realise_regressors(
     Raises:
         SpecError: `bad-period` when signal.periods does not fit.
     """
+    samples, least = settings.samples, rank(R) if rho is None else regression.n
+    if samples < least:
+        return None
+    period, details, lines = settings.period(least), dict[str, object](), None
     if rho is None:
-        return _free(settings, regression, R)
-    return _delayed(settings, regression, R, rho, target)
+        period = period or (least if samples % least == 0 else samples)
+        Phi = channels = free_regressors(R, samples, period)
+    else:
+        period = period or samples
+        found = design_periodic(regression, rho, float(np.trace(R)), period, target=target)
+        power = found.energy / (least * samples)
+        u = periodic_input(found.shares, power, samples, period, np.random.default_rng(settings.seed))
+        Phi, channels = delayed_regressors(u, least, settings.start), u[:, None]
+        at_rest = _attained(regression, delayed_regressors(u, least, "zero"), R)
+        details = {"start": settings.start, "on_grid": found.exact, "from_rest": at_rest}
+        used = np.flatnonzero(found.shares > 0.0)
+        lines = 2.0 * np.pi * used / period, found.shares[used] * power
+    attained = _attained(regression, Phi, R)
+    error = attained.pop("mean_squared_error", None)
+    details = {**attained, "period": period, **details}
+    signal = replace(signal_of(channels), details=details, mean_squared_error=error)
+    return RegressorRecord(Phi, channels, signal, lines)
 
 
-def _free(settings: RegressorSettings, regression: Regression, R: Array) -> RegressorRecord | None:
-    samples, directions = settings.samples, rank(R)
-    if samples < directions:
-        return None
-    period = settings.period(directions)
-    if period is None:
-        period = directions if samples % directions == 0 else samples
-    Phi = free_regressors(R, samples, period)
-    details = {**_attained(regression, Phi, R), "period": period}
-    return RegressorRecord(Phi, Phi, _with_error(signal_of(Phi), regression, Phi, details))
-
-
-def _delayed(
-    settings: RegressorSettings, regression: Regression, R: Array, rho: Array, target: float | None
-) -> RegressorRecord | None:
-    samples, n = settings.samples, regression.n
-    if samples < n:
-        return None
-    period = settings.period(n) or samples
-    found = design_periodic(regression, rho, float(np.trace(R)), period, target=target)
-    power = found.energy / (n * samples)
-    u = periodic_input(found.shares, power, samples, period, np.random.default_rng(settings.seed))
-    Phi = delayed_regressors(u, n, settings.start)
-    rest = delayed_regressors(u, n, "zero")
-    details = {
-        **_attained(regression, Phi, R),
-        "period": period,
-        "start": settings.start,
-        "on_grid": found.exact,
-        "from_rest": {**_attained(regression, rest, R), **_error(regression, rest)},
-    }
-    signal = _with_error(signal_of(u[:, None]), regression, Phi, details)
-    used = np.flatnonzero(found.shares > 0.0)
-    lines = PowerLines(2.0 * np.pi * used / period, found.shares[used] * power)
-    return RegressorRecord(Phi, u[:, None], signal, lines)
-
-
-def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, object]:
-    """Return the energy of the Gram matrix of these samples, and its distance to R."""
+def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
+    """Return the energy of the Gram matrix of these samples, its distance to R, and the error if finite."""
     G = Phi.T @ Phi
-    return {"energy": float(np.trace(G)), "moments_error": float(np.abs(G - R).max() / np.abs(R).max())}
-
-
-def _error(regression: Regression, Phi: Array) -> dict[str, float]:
-    """Return the error of these samples where it is finite."""
-    total = regression.error(Phi.T @ Phi).total
-    return {"mean_squared_error": total} if np.isfinite(total) else {}
-
-
-def _with_error(signal: Signal, regression: Regression, Phi: Array, details: Mapping[str, object]) -> Signal:
-    """Return the signal with its details and the error of its samples."""
-    error = _error(regression, Phi).get("mean_squared_error")
-    return replace(signal, details=details, mean_squared_error=error)
+    found = {"energy": float(np.trace(G)), "moments_error": float(np.abs(G - R).max() / np.abs(R).max())}
+    error = regression.error(G).total
+    return {**found, "mean_squared_error": error} if np.isfinite(error) else found

@@ -44,48 +44,43 @@ KEY = "accuracy.mean_squared_error"
 
 
 @dataclass(frozen=True)
-class TrueNoise:
-    """The noise of the true system: its variance, or its size relative to the output without it."""
-
-    variance: float | None
-    relative_std: float | None
-
-    def of(self, quiet: Array) -> float:
-        """Its variance, from the output (N,) without noise."""
-        if self.relative_std is not None:
-            return float(self.relative_std**2 * np.mean(quiet**2))
-        assert self.variance is not None
-        return self.variance
-
-
-@dataclass(frozen=True)
 class RegressionTrial:
-    """The Monte Carlo study: the true parameters, other inputs to try, and noise if not the nominal."""
+    """The Monte Carlo study: the true parameters and the other inputs to try.
+
+    `variance` of the true noise, or its deviation relative to the output without noise, are None if they are
+    nominal.
+    """
 
     theta: Array
     runs: int
     seed: int
     compare: tuple[Contender, ...]
-    noise: TrueNoise | None
+    variance: float | None
+    relative_std: float | None
+
+    def of(self, nominal: Regression, Phi: Array) -> Regression:
+        """Return the regression with the true variance of the noise, for regressors Phi (N, n)."""
+        variance = nominal.variance if self.variance is None else self.variance
+        if self.relative_std is not None:
+            variance = float(self.relative_std**2 * np.mean((Phi @ self.theta) ** 2))
+        return replace(nominal, variance=variance)
 
 
 @dataclass(frozen=True)
 class RegressionTask:
     """A design of moments, and its study where the spec has the true parameters.
 
-    `alternating` and `tolerance` (the relative gap to be proved) are for Toeplitz moments, `seed` for
-    their starts.
+    `alternating` and `tolerance` (the relative gap to be proved) concern Toeplitz moments.
     """
 
     terms: RegressionTerms
     alternating: bool
     tolerance: float
-    seed: int
     signal: RegressorSettings
     trial: RegressionTrial | None
 
     def solve(self) -> Results:
-        """The design, its proof, its signal and its curves.
+        """Return the design with its proof, its signal and its curves.
 
         Raises:
             SpecError: `bad-period` when signal.periods does not fit.
@@ -95,7 +90,7 @@ class RegressionTask:
         return self._solved()[1]
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """The same, and least-squares estimates of theta_1 in many runs of y = Phi theta + v.
+        """Return the design with least-squares estimates of theta_1 in many runs of y = Phi theta + v.
 
         Raises:
             SpecError: there is no simulation, or the record is too short, or an input to compare with is
@@ -117,11 +112,16 @@ class RegressionTask:
                 hint="set experiment.samples",
                 key="experiment.samples",
             )
-        begun, regression = time.perf_counter(), self.terms.regression
-        if trial.noise is not None:
-            regression = replace(regression, variance=trial.noise.of(record.Phi @ trial.theta))
+        begun, regression = time.perf_counter(), trial.of(self.terms.regression, record.Phi)
         seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
-        inputs = {"design": self._tried(trial, regression, record.Phi, seeds[0], executor)}
+
+        def tried(Phi: Array, seed: np.random.SeedSequence) -> TriedInput:
+            found = run_experiments(
+                regression, Phi, trial.theta, runs=trial.runs, seed=seed, executor=executor
+            )
+            return tried_regressors(regression, Phi, trial.theta, found)
+
+        inputs = {"design": tried(record.Phi, seeds[0])}
         for name, drawn, noise in zip(trial.compare, seeds[1::2], seeds[2::2], strict=True):
             Phi = contending_regressors(
                 name,
@@ -130,19 +130,8 @@ class RegressionTask:
                 energy=float(np.sum(record.Phi**2)),
                 rng=np.random.default_rng(drawn),
             )
-            inputs[name] = self._tried(trial, regression, Phi, noise, executor)
+            inputs[name] = tried(Phi, noise)
         return with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
-
-    def _tried(
-        self,
-        trial: RegressionTrial,
-        regression: Regression,
-        Phi: Array,
-        seed: np.random.SeedSequence,
-        executor: Executor | None,
-    ) -> TriedInput:
-        found = run_experiments(regression, Phi, trial.theta, runs=trial.runs, seed=seed, executor=executor)
-        return tried_regressors(regression, Phi, trial.theta, found)
 
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
         started = time.perf_counter()
@@ -152,14 +141,13 @@ class RegressionTask:
         record = realise_regressors(self.signal, terms.regression, design.R, design.rho, terms.target)
         signal = None if record is None else record.signal
         outcome = moments_outcome(terms, design, signal, timing(started, solved))
-        units = terms.header.units
-        tables: dict[str, Table] = {}
+        units, tables = terms.header.units, dict[str, Table]()
         curves: dict[str, Curves] = {"error": error_curves(terms, design)}
         moments = MomentsCurves(design.R, terms.regression.m)
         if record is not None:
             tables["signal"], curves["signal"] = signal_results(units, record.channels)
             if record.lines is not None:
-                w, power = record.lines.frequencies / units.frequency, record.lines.powers
+                w, power = record.lines[0] / units.frequency, record.lines[1]
                 tables["spectrum"] = Table({units.frequency_header: w, "line_power": power})
                 nyquist = np.pi / units.sample_time
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
@@ -185,15 +173,14 @@ class RegressionTask:
                 target=terms.target,
                 energy=terms.energy,
                 tolerance=self.tolerance,
-                rng=np.random.default_rng(self.seed),
+                rng=np.random.default_rng(self.signal.seed),
                 alternating=self.alternating,
             )
         except OutOfReachError as error:
             assert terms.target is not None
             raise _out_of_reach(terms.regression, terms.target, error) from error
         how: dict[str, object] = {"starts": found.starts, "solves": found.solves, "nodes": found.nodes}
-        if found.assumed:
-            how["assumed_smallest_eigenvalue"] = found.assumed
+        how |= {"assumed_smallest_eigenvalue": found.assumed} if found.assumed else {}
         method = "alternating" if self.alternating else "sequential_convex"
         solver = Solver(method, self.tolerance, details=how)
         return MomentsDesign(found.R, found.rho, found.split, found.bound, self.tolerance, solver)
@@ -202,24 +189,26 @@ class RegressionTask:
 def _out_of_reach(
     regression: Regression, target: float, error: OutOfReachError
 ) -> InfeasibleError | InaccurateError:
+    """Return the error that no Toeplitz moments reach the target, as far as it is proved."""
     bias = error.bias * float(np.linalg.norm(regression.estimated))
     smallest, largest = (regression.neglected_norm * bias) ** 2, float(np.sqrt(target)) / bias
-    hint = (
-        f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}; "
-        "or estimate more parameters"
+    key, hint = (
+        f"{KEY}.target",
+        (
+            f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}; "
+            "or estimate more parameters"
+        ),
     )
     if not error.proved:
         message = (
             f"no Toeplitz moments were found that reach a mean-squared error of {target:.7g} (the least "
-            f"biased ones leave {smallest:.7g} at any energy), nor was it proved that there are none"
+            f"biased ones have {smallest:.7g} at any energy), nor was it proved that there are none"
         )
-        return InaccurateError.because("target-undecided", message, hint=hint, key=f"{KEY}.target")
+        return InaccurateError.because("target-undecided", message, hint=hint, key=key)
     unit = regression.n * regression.variance * float(np.sum(regression.estimated**2)) / target
-    proof = f"proved for every energy up to {error.proved * unit:.3g}"
-    if error.assumed:
-        proof += f" and R11 / r_0 with eigenvalues above {SMALLEST_EIGENVALUE:g}"
+    assumed = f" and R11 / r_0 with eigenvalues above {SMALLEST_EIGENVALUE:g}" if error.assumed else ""
     message = (
-        f"no Toeplitz moments reach a mean-squared error of {target:.7g} ({proof}): the bias alone "
-        f"leaves {smallest:.7g}"
+        f"no Toeplitz moments reach a mean-squared error of {target:.7g} (proved for every energy up to "
+        f"{error.proved * unit:.3g}{assumed}): the bias alone is {smallest:.7g}"
     )
-    return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=f"{KEY}.target")
+    return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=key)

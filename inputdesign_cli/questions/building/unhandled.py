@@ -1,0 +1,40 @@
+"""Refuse what a spec states and a kind of question does not handle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.specification import Spec
+
+
+def refuse_unhandled(
+    spec: Spec,
+    question: str,
+    remedies: Mapping[str, str],
+    handled: Mapping[str, tuple[str, ...]] | None = None,
+) -> None:
+    """Raise `SpecError` (`not-supported`) at the first key that a kind of question does not handle.
+
+    Args:
+        question: its name in the message.
+        remedies: the keys that are not handled, and what to do about each.
+        handled: the values of some of these keys that are handled.
+    """
+    for key, remedy in remedies.items():
+        value = spec.at(*key.split("."))
+        if value is not None and value not in (handled or {}).get(key, ()):
+            stated = f"{key}: {value}" if isinstance(value, str) else key
+            raise bad_spec("not-supported", f"{question} does not handle {stated}", hint=remedy, key=key)
+
+
+def check_compared(inputs: Iterable[str], *known: str) -> None:
+    """Raise `SpecError` (`not-supported`) for inputs that this kind of question does not compare with."""
+    for name in inputs:
+        if name not in known:
+            raise bad_spec(
+                "not-supported",
+                f"this version compares the design with {' or '.join(known)} inputs here, not with {name}",
+                hint=f"write compare: [{', '.join(known)}]",
+                key="simulation.compare",
+            )
