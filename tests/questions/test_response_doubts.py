@@ -116,10 +116,9 @@ def test_a_drift_and_a_nonlinearity_are_both_named(write, question):
     assert causes(found) == ["drift", "nonlinearity"]
 
 
-@pytest.mark.parametrize("samples", [[1234], [700, 2222], [1800, 1801, 1802]])
-def test_spikes_are_named_and_nothing_is_made_of_them(write, question, samples):
+def test_spikes_of_several_samples_are_named_and_nothing_is_made_of_them(write, question):
     spec, u = question
-    y = answer(u, 1)
+    y, samples = answer(u, 1), [1800, 1801, 1802]
     y[samples] += 60.0
     found = judged(write, spec, u, y)
     assert causes(found) == ["spikes"]
@@ -129,6 +128,19 @@ def test_spikes_are_named_and_nothing_is_made_of_them(write, question, samples):
     assert "nonlinearity" not in told["frequency_response"]
     y[samples] = np.nan
     assert judged(write, spec, u, y).verdict in ("met", "undecided")
+
+
+@pytest.mark.parametrize("samples", [[1234], [700, 2222]])
+def test_single_spikes_decide_nothing(write, question, samples):
+    """They are replaced as the file is read, which a finding says."""
+    spec, u = question
+    y = answer(u, 1)
+    plain = judged(write, spec, u, y)
+    y[samples] += 60.0
+    found = judged(write, spec, u, y)
+    (replaced,) = [one for one in found.results.outcome.findings if one.code == "spikes-replaced"]
+    assert replaced.figures["rows"] == [at + 2 for at in samples]
+    assert found.verdict == plain.verdict == "met"
 
 
 def test_a_spike_that_does_not_count_is_none(write, question):
