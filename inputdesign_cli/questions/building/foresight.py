@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.questions.building.knowledge import build_knowledge
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.prior import build_earlier
@@ -21,7 +21,7 @@ _RICHER = ("{type: fir, order: 12}", "{type: fir, order: 60}")
 
 
 def build_foresight(
-    spec: Spec, nominal: Experiment, design: Callable[[Spec], Result] | None
+    spec: Spec, nominal: Experiment, design: Callable[[Spec], Outcome] | None
 ) -> Foresight | None:
     """How rivals are foreseen; None for plants without dead times that are estimated.
 
@@ -38,7 +38,7 @@ def build_foresight(
     # Several plants take their time, and noise of a filter has no other spectrum beside it.
     alone = spec.uncertainty is not None or stated is None or stated.type == "fir"
 
-    def solved(words: str) -> Result:
+    def solved(words: str) -> Outcome:
         assert design is not None
         overrides, folder = [f"spectrum={words}"], spec.resolve_path(".")
         return design(parse_spec(spec.to_yaml(), "other spectrum", overrides, folder=folder))

@@ -22,8 +22,7 @@ from inputdesign_cli.questions.building.parameter_draws import Draw, Unsure, dra
 from inputdesign_cli.questions.building.parameters import check_known
 from inputdesign_cli.questions.building.requirements import build_asked
 from inputdesign_cli.questions.building.system import build_loop
-from inputdesign_cli.questions.common.region import Region
-from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants
+from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.specification.models.uncertainty import SOURCES
