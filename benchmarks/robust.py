@@ -79,8 +79,8 @@ def times_of(name: str, order: int) -> dict[str, str | int | float]:
     taken = []
     for _ in range(REPEATS):
         # Built anew, since a plant keeps what was asked of it.
-        alone = build_convex(parse_spec(text_of(name, order))).question
-        many = build_convex(parse_spec(text_of(name, order), overrides=[uncertain])).question
+        alone = build_convex(parse_spec(text_of(name, order))).asked.question
+        many = build_convex(parse_spec(text_of(name, order), overrides=[uncertain])).asked.question
         (one, single), (hundred, robust) = timed(alone), timed(many)
         taken.append((one, hundred))
     one, hundred = np.median(taken, axis=0).tolist()
@@ -112,25 +112,28 @@ def main() -> None:
         for seed in SEEDS:
             stated = f"{{covariance: {covariance}, scenarios: {scenarios}, fresh: {fresh}, seed: {seed}}}"
             task = build_convex(parse_spec(text_of(name), overrides=[f"uncertainty={stated}"]))
-            done, _ = task.designed()
-            assert task.plants is not None
-            told = robust_result(done, task.plants).entry
-            kept = told["fresh"]["share"] <= told["risk"]["after"]
+            done = task.designed()
+            assert task.asked.plants is not None
+            found = robust_result(done, task.asked.plants).entry
+            fresh, risk = found.fresh, found.risk
+            assert fresh is not None
+            assert risk is not None
+            kept = fresh.share <= risk.after
             violations.append(
                 {
                     "plant": name,
                     "seed": seed,
-                    "support": told["support"],
-                    "risk": told["risk"]["after"],
-                    "missed": told["fresh"]["share"],
-                    "limits": told["fresh"]["limits"],
+                    "support": found.support,
+                    "risk": risk.after,
+                    "missed": fresh.share,
+                    "limits": fresh.limits,
                     "kept": kept,
                 }
             )
-            print(f"  seed {seed}: {told['fresh']['share']:.4f} of eps({told['support']})", end="")
-            print(f" = {told['risk']['after']:.4f} {'kept' if kept else 'MISSED'}")
-    found = {"scenarios": scenarios, "fresh": fresh, "times": times, "violations": violations}
-    Path(asked.json).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+            print(f"  seed {seed}: {fresh.share:.4f} of eps({found.support})", end="")
+            print(f" = {risk.after:.4f} {'kept' if kept else 'MISSED'}")
+    listed = {"scenarios": scenarios, "fresh": fresh, "times": times, "violations": violations}
+    Path(asked.json).write_text(json.dumps(listed, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

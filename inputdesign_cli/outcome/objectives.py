@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.design import White
 
 
 @dataclass(frozen=True)
@@ -86,13 +85,18 @@ def objective(kind: str | None) -> Objective:
 WHITE = ("white", "white, same cost")
 
 
-def white_labels(result: Mapping[str, Json]) -> tuple[str, str]:
-    """What curves of white excitation are called: that of the baseline, and that with equal means."""
-    found = result.get("objective", {})
-    spent, white = objective(found.get("kind")).spent, result.get("baseline", {}).get("white", {})
+def white_labels(kind: str | None, white: White, samples: int) -> tuple[str, str]:
+    """Return what curves of white excitation are called: the baseline, and that with equal means.
+
+    Args:
+        kind: of the objective; None without one.
+        white: the baseline.
+        samples: of the design.
+    """
+    spent = objective(kind).spent
     if not spent:
-        return ("white, same limits" if found else WHITE[1]), WHITE[1]
-    ratio = white.get("ratio", 1.0)
+        return ("white, same limits" if kind else WHITE[1]), WHITE[1]
+    ratio = 1.0 if white.ratio is None else white.ratio
     if spent == "length":
-        ratio = white.get("samples", 0) / max(result.get("samples", 1), 1)
+        ratio = (white.samples or 0) / max(samples, 1)
     return f"white, {ratio:.3g} × the {spent}", f"white, same {spent}"

@@ -26,7 +26,7 @@ from inputdesign_cli.signal.phases import (
     low_peak_phases as low_peak_phases,
     schroeder_phases as schroeder_phases,
 )
-from inputdesign_cli.signal.selection import Record as Record, best_record as best_record
+from inputdesign_cli.signal.selection import LONG as LONG, Record as Record, best_record as best_record
 from inputdesign_cli.signal.settings import (
     LineVectors as LineVectors,
     Quantiser as Quantiser,

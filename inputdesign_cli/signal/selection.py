@@ -25,8 +25,8 @@ _CLIPPED = (1.0, 1.4, 2.0, 3.0)
 _FAR = 40.0
 # So often at most the times of switching of ramps between two levels are changed.
 _SWITCHINGS = 600
-# Beyond this length the search for better times of switching makes fewer tries, so that it takes no longer.
-_LONG = 2000
+LONG = 2000
+"""Samples beyond which a record takes seconds to make, so that searches for a better one try less."""
 # Other phases hardly change the ratio of a record. Luck does not make up for a larger miss than this if the
 # record has enough samples, nor for one of more than some times what a few candidates differ by.
 _HOPELESS, _SAMPLES, _TRIES, _SPREADS = 1.15, 100, 3, 2.0
@@ -177,7 +177,7 @@ class _Candidates:
 
         period = values[: len(values) // settings.periods]
         meets = evaluator.target.meets
-        tries = _SWITCHINGS * _LONG // max(len(values) * settings.hold, _LONG) if meets else _SWITCHINGS
+        tries = _SWITCHINGS * LONG // max(len(values) * settings.hold, LONG) if meets else _SWITCHINGS
         better = better_switching(period, figure, rng, tries, 1.0 if meets else None)
         return np.tile(better, (settings.periods, 1))
 

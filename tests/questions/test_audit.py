@@ -7,9 +7,10 @@ import pytest
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.outcome import Outcome, read_plain, write_plain
 from inputdesign_cli.outcome.text_formats import plain
 from inputdesign_cli.questions.least_cost.audit import audit
-from inputdesign_cli.questions.least_cost.outcome import design_result
+from inputdesign_cli.questions.least_cost.outcome import design_outcome
 from inputdesign_cli.questions.task import build_task
 
 PLANT = """
@@ -44,19 +45,19 @@ DESIGNS = {
 @pytest.fixture(scope="module", params=DESIGNS)
 def designed(request):
     task = build_task(parse_spec(DESIGNS[request.param]))
-    done, how = task.designed()
-    return done, plain(design_result(done, how, task.tolerance))
+    done = task.designed()
+    return done, plain(write_plain(design_outcome(done)))
 
 
 def refused(done, result):
     with pytest.raises(InaccurateError) as caught:
-        audit(done, result, on_grid=False)
+        audit(done, read_plain(Outcome, result), on_grid=False)
     assert caught.value.diagnostics[0].code == "internal-disagreement"
 
 
 def test_a_right_result_passes(designed):
     done, result = designed
-    audit(done, result, on_grid=False)
+    audit(done, read_plain(Outcome, result), on_grid=False)
 
 
 @pytest.mark.parametrize("factor", [0.999, 1.001])

@@ -24,7 +24,7 @@ GRID = np.linspace(0.0, np.pi, 801)
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
-    return build_convex(spec).designed()[0].design
+    return build_convex(spec).designed().design
 
 
 def plain_program(design, order, upper, lower, power):

@@ -21,13 +21,13 @@ from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCES
 )
 def test_plants_are_drawn_from_what_is_known(prior):
     spec = parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, scenarios: 150}}"])
-    thetas = build_convex(spec).plants.batch.thetas
+    thetas = build_convex(spec).asked.plants.batch.thetas
     assert thetas.shape == (150, 3)
     mean, spread = thetas.mean(axis=0), thetas.std(axis=0)
     assert mean == pytest.approx([3.6, -0.9, -0.7], abs=0.03)
     b1, c1, f1 = (0.1, 0.0316, 0.02) if "intervals" not in prior else (0.1732, 0.0, 0.02887)
     assert spread == pytest.approx([b1, 0.0 if "b1, f1" in prior else c1, f1], rel=0.2)
-    again = build_convex(spec).plants.batch.thetas
+    again = build_convex(spec).asked.plants.batch.thetas
     np.testing.assert_array_equal(thetas, again)
 
 
@@ -39,7 +39,7 @@ def test_a_record_and_a_model_file_tell_how_well_the_plant_is_known(tmp_path):
     )
     for asked in ("information: first.csv", "covariance: model.yaml", "information: model.yaml"):
         spec = parse_spec(FIRST, overrides=[f"uncertainty={{{asked}, scenarios: 100}}"], folder=tmp_path)
-        thetas = build_convex(spec).plants.batch.thetas
+        thetas = build_convex(spec).asked.plants.batch.thetas
         if "model" in asked:
             assert thetas.std(axis=0) == pytest.approx([0.1, 0.0316, 0.02], rel=0.2)
         else:
@@ -56,7 +56,7 @@ def test_the_risk_sets_the_number_of_plants():
     for order, risk, number in ((10, 0.1, 235), (6, 0.2, 85)):
         asked = f"uncertainty={{covariance: {COVARIANCE}, risk: {risk}}}"
         spec = parse_spec(FIRST, overrides=[asked, f"spectrum.order={order}"])
-        assert len(build_convex(spec).plants.batch.plants) == number
+        assert len(build_convex(spec).asked.plants.batch.plants) == number
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_the_risk_sets_the_number_of_plants():
 def test_what_is_no_plant_is_drawn_again_and_counted(text, intervals, name):
     """A fifth of the interval is a negative dead time; the root of a negative number is no gain."""
     prior = f"uncertainty={{intervals: {{{intervals}}}, scenarios: 40, seed: 1}}"
-    batch = build_convex(parse_spec(text, overrides=[prior])).plants.batch
+    batch = build_convex(parse_spec(text, overrides=[prior])).asked.plants.batch
     assert len(batch.plants) == 40
     assert 2 <= batch.rejected <= 25
     index = batch.plants[0].experiment.model.names.index(name)
@@ -76,7 +76,7 @@ def test_what_is_no_plant_is_drawn_again_and_counted(text, intervals, name):
 def test_unstable_loops_are_drawn_again_and_counted():
     """In this loop f1 < -1.02 or so is unstable."""
     prior = "intervals: {f1: [-1.2, -0.6]}, scenarios: 60, seed: 3"
-    batch = build_convex(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}}}"])).plants.batch
+    batch = build_convex(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}}}"])).asked.plants.batch
     assert len(batch.plants) == 60
     assert batch.rejected > 0
     for plant in batch.plants:

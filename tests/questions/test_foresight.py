@@ -7,6 +7,7 @@ import scipy.signal
 
 from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.questions.common import foresight, simulation
 from inputdesign_cli.questions.least_cost.build import build_convex
 from tests.support.heater import said
@@ -110,7 +111,7 @@ def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
 def test_without_time_nothing_is_begun():
     asked = build_convex(load_spec("specs/heater.yaml"))
     with time_limit(0.01):
-        foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), (), {})
+        foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), (), Outcome())
     assert foreseen.entry is None
     (found,) = foreseen.findings
     assert found.code == "other-minima-not-looked-at"

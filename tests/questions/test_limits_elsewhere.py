@@ -32,7 +32,7 @@ def peaks(u, plants):
 def test_drawn_plants_keep_limits_and_others_are_counted():
     found = solve(parse_spec(SPEC))
     u = found.tables["signal"].columns["u1"]
-    done, _ = build_convex(parse_spec(SPEC)).designed()
+    done = build_convex(parse_spec(SPEC)).designed()
     assert max(peaks(u, done.plants.batch.plants)) <= 1.0
     others = [size for batch in done.plants.afresh() for size in peaks(u, batch.plants)]
     told = found.result["robust"]["fresh"]["beyond_limits"]

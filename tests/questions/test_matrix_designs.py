@@ -43,7 +43,7 @@ def test_spectrum_file_has_the_information_of_the_result(design):
     ).transpose(2, 0, 1)
     assert np.linalg.eigvalsh(phi).min() >= -1e-9 * phi.real.max()
     spec = load_spec(SPECS / "two_by_two.yaml")
-    model = build_convex(spec).experiment.model
+    model = build_convex(spec).simulation.nominal.model
     F = model.plant_gradient(w)
     integrand = np.einsum("nlpa,nab,nmpb->nlm", F, phi, F.conj(), optimize=True).real / np.pi
     M = scipy.integrate.trapezoid(integrand, w, axis=0)
@@ -123,8 +123,8 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
     assert result["objective"]["relative_gap"] <= 1e-5
     assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
     task = build_convex(spec)
-    experiment = task.experiment.whitened(result["baseline"]["white"]["cost"])
-    basis, k = task.question.basis, experiment.size
+    experiment = task.simulation.nominal.whitened(result["baseline"]["white"]["cost"])
+    basis, k = task.asked.question.basis, experiment.size
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     power = basis.integrals(lambda w: experiment.power_density("input", w), experiment.singularities)
     scale = result["baseline"]["white"]["cost"]
@@ -149,7 +149,7 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
     grid = np.concatenate(
         [np.linspace(1e-9, np.pi, 5), np.array(result["model_error"]["active_frequencies"])]
     )
-    for make in task.question.requirements:
+    for make in task.asked.question.requirements:
         requirement = make(experiment)
         for w in grid:
             R = requirement.cut(float(w)).matrix
@@ -190,7 +190,7 @@ def test_weighted_variance_in_continuous_time_holds_for_every_entry():
     assert result["objective"]["relative_gap"] <= 1e-6
     P = np.array(result["information"]["covariance"])
     w = np.linspace(0.0, 2.0, 500)
-    gradient = build_convex(spec).experiment.model.plant_gradient(w)
+    gradient = build_convex(spec).simulation.nominal.model.plant_gradient(w)
     variance = np.einsum("nkij,kl,nlij->nij", gradient.conj(), P, gradient).real / (1 + w**2)[:, None, None]
     assert variance.max() == pytest.approx(0.01, rel=1e-4)
 
@@ -217,4 +217,4 @@ spectrum: {{type: polynomial, order: 8, band: [0, 2.0]}}
 
 def test_the_spec_of_the_example_is_that_of_the_tests():
     task = build_convex(load_spec(SPECS / "two_by_two_arx.yaml"))
-    assert task.experiment.model.names == Experiment(arx(), 1).model.names
+    assert task.simulation.nominal.model.names == Experiment(arx(), 1).model.names

@@ -36,7 +36,7 @@ def test_the_units_of_the_inputs_do_not_matter(spectrum, asked, same):
     found = []
     for overrides in (asked, [*same, MILLI]):
         spec = changed(GAINS, f"spectrum={spectrum}", *overrides)
-        found.append(build_convex(spec).designed()[0].design)
+        found.append(build_convex(spec).designed().design)
     assert found[1].result.objective == pytest.approx(found[0].result.objective, rel=1e-6)
     bounds = [design.any_spectrum.certificate.bound for design in found]
     assert bounds[1] == pytest.approx(bounds[0], rel=2e-5)
@@ -50,7 +50,7 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
         "accuracy: {criterion: E}\nspectrum: {type: fir, order: 6}\n"
         "limits: {input_power: [1000000.0, 2.5]}\n"
     )
-    result = build_convex(spec).designed()[0].design.result
+    result = build_convex(spec).designed().design.result
     assert result.gap < 1e-6
 
 
@@ -74,4 +74,4 @@ def test_free_spectra_of_unequal_limits_are_proved():
         "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
         "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
     )
-    assert build_convex(spec).designed()[0].design.result.gap < 1e-6
+    assert build_convex(spec).designed().design.result.gap < 1e-6

@@ -62,7 +62,7 @@ def test_limits_hold_at_every_plant():
     robust = solve(parse_spec(FIRST, overrides=[*asked, "uncertainty={scenarios: [{f1: -0.9}]}"]))
     design = build_convex(
         parse_spec(FIRST, overrides=[*asked, "uncertainty={scenarios: [{f1: -0.9}]}"])
-    ).designed()[0]
+    ).designed()
     powers = [design.problem.power("output", None, s).at(design.design.result.x) for s in (0, 1)]
     assert powers[1] == pytest.approx(5.0, rel=1e-6)
     assert powers[0] < 4.0
@@ -75,7 +75,7 @@ def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
     scenarios = "uncertainty={scenarios: [{f1: -0.75}, {f1: -0.85}], cost: %s}"
     of_each = {"nominal": lambda paid: paid[0], "mean": np.mean, "worst": max}
     for cost, of in of_each.items():
-        found = build_convex(parse_spec(LOOP, overrides=[scenarios % cost])).designed()[0]
+        found = build_convex(parse_spec(LOOP, overrides=[scenarios % cost])).designed()
         at, x = found.problem, found.design.result.x
         paid = [sum(at.power(kind, None, s).at(x) for kind in ("input", "output")) for s in range(3)]
         assert found.design.result.objective == pytest.approx(of(paid), rel=1e-9)
@@ -112,10 +112,10 @@ def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
 def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
     prior = "uncertainty={covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 3, fresh: 60, cost: worst}"
     task = build_convex(parse_spec(LOOP, overrides=[prior]))
-    done, _ = task.designed()
+    done = task.designed()
     tried = [
         one.kept
-        for batch in task.plants.afresh()
+        for batch in task.asked.plants.afresh()
         for one in tried_on(done.design, done.experiment.samples, batch)
     ]
     less = {n for n, one in enumerate(tried) if one.share > 1.0 + 1e-6}
@@ -161,9 +161,9 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
         "noise.variance=0.5",
     ]
     nominal = build_convex(load_spec(path))
-    oracle = build_convex(load_spec(path, true)).question
+    oracle = build_convex(load_spec(path, true)).asked.question
     assert solve_design(oracle, tolerance=1e-7).result.objective == pytest.approx(7.7804, abs=1e-3)
-    design = solve_design(nominal.question, tolerance=1e-7)
+    design = solve_design(nominal.asked.question, tolerance=1e-7)
     # What it costs on the true plant: by numpy sums alone, with a plain program for the design, 12.444049.
     spectrum, true_plant = design.result, oracle.experiment
     cost = sum(
@@ -173,7 +173,7 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     )
     assert cost == pytest.approx(12.444049, rel=1e-5)
     own = Alternative(oracle.experiment, oracle.requirements)
-    estimated = replace(own, requirements=nominal.question.requirements)
+    estimated = replace(own, requirements=nominal.asked.question.requirements)
     by_own, by_estimate = (
         one.kept for one in tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
     )
@@ -189,7 +189,7 @@ def test_the_record_serves_every_plant_by_its_own_samples(asked):
     found = solve(spec)
     samples = found.tables["signal"].columns["u1"][:, None]
     ratios = []
-    for plant in build_convex(spec).question.plants:
+    for plant in build_convex(spec).asked.question.plants:
         scenario = plant.at(plant.experiment.whitened(1.0))
         told = FiniteRecord(scenario.experiment, len(samples)).information(samples)
         ratios.append(scenario.requirements[0].worst(told).ratio)
@@ -259,16 +259,16 @@ def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
 def test_fresh_plants_are_tried_as_long_as_there_is_time():
     """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
-    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     batches = list(done.plants.afresh())
     shares = [
         one.kept.share for batch in batches for one in tried_on(done.design, done.experiment.samples, batch)
     ]
     whole = robust_result(done, done.plants)
-    assert whole.entry["fresh"]["draws"] == len(shares) == 120
-    assert whole.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares) > 0
-    assert whole.entry["fresh"]["largest"] == pytest.approx(max(shares), rel=1e-12)
-    assert whole.notes == ()
+    assert whole.entry.fresh.draws == len(shares) == 120
+    assert whole.entry.fresh.missed == sum(share > 1.0 + 1e-6 for share in shares) > 0
+    assert whole.entry.fresh.largest == pytest.approx(max(shares), rel=1e-12)
+    assert whole.findings == ()
     with stoppable() as stop:
 
         def ends_after_the_first():
@@ -278,9 +278,10 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
 
         cut = robust_result(done, replace(done.plants, afresh=ends_after_the_first))
     first = len(batches[0].plants)
-    assert cut.entry["fresh"]["draws"] == first
-    assert cut.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares[:first])
-    assert f"after {first} of 120" in cut.notes[0]
+    assert cut.entry.fresh.draws == first
+    assert cut.entry.fresh.missed == sum(share > 1.0 + 1e-6 for share in shares[:first])
+    assert [one.code for one in cut.findings] == ["fresh-plants-cut-short"]
+    assert cut.findings[0].figures == {"tried": first, "asked": 120}
 
 
 def test_what_data_will_tell_of_the_worst_plant_is_foreseen():
@@ -310,7 +311,7 @@ signal: {candidates: 1, seed: 1}
 def test_plants_that_are_tried_together_keep_what_each_keeps_alone():
     """Also where the experiment tells one of them nothing: a plant without its input."""
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 20}}"
-    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    done = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
     (batch,) = done.plants.afresh()
     alone = [tried_on(done.design, 500, batch.only([place]))[0].kept for place in range(20)]
     together = [one.kept for one in tried_on(done.design, 500, batch)]

@@ -54,7 +54,7 @@ plant:
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
-    return build_convex(spec).designed()[0].design.result
+    return build_convex(spec).designed().design.result
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def motor(theta, w):
 def test_the_motor_against_a_plain_program():
     """The least cost of r of order 3: relative parameters, sums over a circle, LMIs at 180 frequencies."""
     spec = load_spec(MOTOR, ["spectrum.order=3"])
-    found = build_convex(spec).designed()[0].design.result
+    found = build_convex(spec).designed().design.result
     theta, samples, variance, order = np.array([2.0, 20.02, 12.0]), 600, 2.5e-5, 3
 
     def gradient(w):

@@ -36,7 +36,7 @@ GRID = np.linspace(1e-3, np.pi, 400)
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
-    return build_convex(spec).designed()[0].design
+    return build_convex(spec).designed().design
 
 
 @pytest.fixture(scope="module")

@@ -200,7 +200,7 @@ def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(m
 
     short = f"experiment: {{samples: 1500}}\nobjective: best_accuracy\nsignal: {{type: {method}}}\n"
     task = build_task(parse_spec(LONG + short))
-    design = task.designed()[0].design
+    design = task.designed().design
     design = replace(design, problem=replace(design.problem, goal="cost"))
     with patch.object(SignalGenerator, "values", values):
         record = make_record(task.record, design, 1500)

@@ -1,5 +1,6 @@
 """Estimates of simulated experiments, by which an exact confidence is calibrated."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,8 +9,9 @@ import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage
+from inputdesign_cli.findings.simulated_runs import confidence_missed
+from inputdesign_cli.outcome.design import Coverage as Reached
 from inputdesign_cli.questions.common import simulated_estimates
-from inputdesign_cli.questions.common.confidence import missed
 from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates
 
 SPEC = """
@@ -58,11 +60,10 @@ def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
 def test_less_than_what_is_asked_is_told(kept, told):
     runs = 4000
     limits = scipy.stats.binomtest(round(kept * runs), runs).proportion_ci(0.95)
-    entry = {"runs": runs, "kept": kept, "kept_limits": [limits.low, limits.high]}
-    result = {"model_error": {"confidence": {"asked": 0.95, **entry}}, "signal": {"confidence": entry}}
-    notes = missed(result)
-    assert len(notes) == 2 * told
-    assert all("fewer than the 95 %" in note for note in notes)
+    reached = Reached(1000, kept, (0.9, 1.0), kept, runs, kept, (limits.low, limits.high))
+    found = confidence_missed(replace(reached, asked=0.95), reached)
+    assert [one.code for one in found] == ["confidence-missed"] * 2 * told
+    assert all(one.figures["asked"] == 0.95 for one in found)
 
 
 @pytest.mark.slow

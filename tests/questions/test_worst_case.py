@@ -37,16 +37,16 @@ def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, cov
     overrides = [f"uncertainty={{covariance: {covariance}, scenarios: 5, fresh: 0, worst_case: 0.9}}"]
     spec = parse_spec(text, overrides=overrides)
     task = build_convex(spec)
-    done, _ = task.designed()
+    done = task.designed()
     share = done.plants.searched.kept.share
     assert share <= 1.0 + 1e-3
     assert done.plants.searched.added >= 1
     covariance = np.array(json.loads(covariance))
-    rng, nominal = np.random.default_rng(1), task.experiment.model.theta
+    rng, nominal = np.random.default_rng(1), task.simulation.nominal.model.theta
     z = rng.standard_normal((200, nominal.size))
     z /= np.sqrt(np.einsum("ni,ij,nj->n", z, np.linalg.inv(covariance), z))[:, None]
     radius = {2: 4.605170, 3: 6.251389}[nominal.size] ** 0.5  # of tables of chi-squared, 90 %
-    plants = build_plants(spec, task.question.experiment, task.question.basis)
+    plants = build_plants(spec, task.asked.question.experiment, task.asked.question.basis)
     tried = [(theta, plants.region.at(theta)) for theta in nominal + radius * z]
     thetas, alternatives = zip(*[one for one in tried if one[1] is not None], strict=True)
     assert len(thetas) > 150

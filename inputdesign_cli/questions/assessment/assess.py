@@ -25,7 +25,7 @@ from inputdesign_cli.findings.measured_response import response_note
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.findings.top_up_levels import level_notes, prior_left_out
 from inputdesign_cli.identification import frequency_response, response_delays
-from inputdesign_cli.outcome import Assessment as Judged, RequirementMet, read_plain
+from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
 from inputdesign_cli.outcome.assessment import Verdict
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results, Table
@@ -39,7 +39,7 @@ from inputdesign_cli.questions.assessment.identify import (
     told,
 )
 from inputdesign_cli.questions.assessment.responses import response_of_data
-from inputdesign_cli.questions.least_cost.outcome import requirement_entry
+from inputdesign_cli.questions.least_cost.outcome import requirement_met
 from inputdesign_cli.records import Preparation
 
 _ROUNDING = 1e-9
@@ -156,10 +156,7 @@ def _compared(
     if question is None:
         return [], [], None
     units, information, estimate = task.header.units, question.information, found.estimate
-    listed = [
-        read_plain(RequirementMet, requirement_entry(units, one, information))
-        for one in question.requirements
-    ]
+    listed = [requirement_met(units, one, information) for one in question.requirements]
     without = neglected(found.model, estimate, question.asked, information)
     asked, foreseen = bool(question.asked), task.foreseen
     factor = estimate.factor

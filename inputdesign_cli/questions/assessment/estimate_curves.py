@@ -11,7 +11,7 @@ from inputdesign_cli.accuracy import worst
 from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.outcome import ModelError as Bound, read_plain
+from inputdesign_cli.outcome import ModelError as Bound
 from inputdesign_cli.outcome.curves import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
@@ -71,7 +71,7 @@ def bound_of_data(
         errors: what has r_u; `asked` says whether requirements state r_adm.
         information: (k, k) of the data.
     """
-    bound = read_plain(Bound, {"alpha": confidence.alpha, **confidence.entry})
+    bound = Bound(confidence.alpha, confidence=confidence.reported)
     if asked:
         violation = worst([error.worst(information) for error in errors])
         frequency = violation.frequency

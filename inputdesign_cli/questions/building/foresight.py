@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.knowledge import build_knowledge
 from inputdesign_cli.questions.building.model_error import unstated_errors
@@ -21,7 +21,7 @@ _ORDERS = (12, 60)
 
 
 def build_foresight(
-    spec: Spec, nominal: Experiment, design: Callable[[Spec], Result] | None
+    spec: Spec, nominal: Experiment, design: Callable[[Spec], Outcome] | None
 ) -> Foresight | None:
     """Return how rival dead times are foreseen; None for plants that have none to be estimated.
 
@@ -38,7 +38,7 @@ def build_foresight(
     # Designs for several plants take long, and filtered noise needs no other spectrum.
     alone = spec.uncertainty is not None or stated is None or stated.type == "fir"
 
-    def solved(order: int) -> Result:
+    def solved(order: int) -> Outcome:
         assert design is not None
         return design(spec.with_(spectrum={"type": "fir", "order": order}))
 

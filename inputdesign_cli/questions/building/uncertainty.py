@@ -21,8 +21,7 @@ from inputdesign_cli.questions.building.integrators import on_finite_information
 from inputdesign_cli.questions.building.knowledge import KEY, Draw, Unsure
 from inputdesign_cli.questions.building.requirements import build_asked
 from inputdesign_cli.questions.building.system import build_loop
-from inputdesign_cli.questions.common.region import Region
-from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants
+from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.specification.models.uncertainty import SOURCES

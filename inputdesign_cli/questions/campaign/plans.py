@@ -14,7 +14,6 @@ from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
-from inputdesign_cli.outcome import read_plain
 from inputdesign_cli.outcome.campaign import PlanClaim, PlanKind
 from inputdesign_cli.plant import Model, close_loop
 from inputdesign_cli.questions.assessment.identify import ModelQuestion
@@ -24,7 +23,7 @@ from inputdesign_cli.questions.campaign.schedule import REACHED, Planned, Rules,
 from inputdesign_cli.questions.common.record import design_cost, given_record
 from inputdesign_cli.questions.given.solve import GivenExcitation
 from inputdesign_cli.questions.least_cost.audit import audit
-from inputdesign_cli.questions.least_cost.outcome import Designed, design_result
+from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.signal import DesignedSpectrum
@@ -228,9 +227,8 @@ class Planner:
 
     def _designed(self, model: Model | None, change: Change) -> _Found:
         task = self.designs.at(model, change)
-        kind: PlanKind = "white" if change.white else "nominal" if task.plants is None else "robust"
-        done, how = task.designed()
-        return _Found(task, done, how, kind)
+        kind: PlanKind = "white" if change.white else "nominal" if task.asked.plants is None else "robust"
+        return _Found(task, task.designed(), kind)
 
     def _pilot(self, power: float, take: int, seed: int) -> Planned:
         """Return white noise of this power, even over the inputs."""
@@ -243,7 +241,7 @@ class Planner:
     def _stopgap(self, rules: Rules, cost: float, rest: int, seed: int, why: IdesignError) -> Planned:
         """Return white noise of this cost a sample; of the power of the pilot if nothing else was applied."""
         nominal, task = self.nominal, self.designs.at(None, Change(rest, seed))
-        unit = weighted_sum(task.cost, GivenExcitation.even(nominal, 1.0).power)
+        unit = weighted_sum(task.asked.cost, GivenExcitation.even(nominal, 1.0).power)
         power = cost / unit if np.isfinite(cost) else rules.pilot_power or 0.0
         flat = FlatBasis(nominal.inputs, nominal.band)
         spectrum = DesignedSpectrum.of(flat, np.array([power]), inputs=nominal.inputs, step=task.record.step)
@@ -259,7 +257,6 @@ class _Found:
 
     task: ConvexTask
     done: Designed
-    how: dict[str, object]
     kind: PlanKind
 
     @cached_property
@@ -282,9 +279,11 @@ class _Found:
         Raises:
             InaccurateError: `internal-disagreement`.
         """
-        result = design_result(self.done, dict(self.how), self.task.tolerance)
-        audit(self.done, result, on_grid=False)
-        return read_plain(PlanClaim, result)
+        found = design_outcome(self.done)
+        audit(self.done, found, on_grid=False)
+        assert found.objective is not None
+        assert found.spectrum is not None
+        return PlanClaim(self.done.answer.status, found.objective, found.spectrum)
 
 
 def _fits(found: _Found | None, cap: float) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from inputdesign_cli.accuracy.calibration import Calibration, Coverage
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
-from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome.design import Coverage as Reported
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates
 
@@ -59,28 +59,29 @@ class Confidence:
         return cls(alpha, usual, calibration, coverage)
 
     @property
-    def entry(self) -> dict[str, Json]:
-        """`model_error.confidence` of the result; empty where nothing was calibrated."""
-        told, by = self.coverage, self.calibration
-        if told is None or by is None:
-            return {}
-        entry = {"asked": by.probability, "chi_squared_alpha": self.usual, **covered(told)}
-        return {"confidence": entry | ({"excess": by.excess} if told.runs else {})}
+    def reported(self) -> Reported | None:
+        """The confidence as the outcome has it; None if nothing was calibrated."""
+        if self.coverage is None or self.calibration is None:
+            return None
+        return replace(
+            covered(self.coverage),
+            asked=self.calibration.probability,
+            chi_squared_alpha=self.usual,
+            excess=self.calibration.excess if self.coverage.runs else None,
+        )
 
 
-def covered(coverage: Coverage) -> dict[str, Json]:
-    """The shares of estimates within r_adm with their 95 % limits: of draws by the exact G, and of runs."""
+def covered(coverage: Coverage) -> Reported:
+    """Return the shares of estimates within r_adm with their 95 % limits: of draws and of runs."""
     draws, runs = coverage.draws, coverage.runs
-    entry: dict[str, Json] = {
-        "draws": draws,
-        "exact": coverage.exact / draws,
-        "exact_limits": list(binomial_limits(coverage.exact, draws)),
-        "linear": coverage.linear / draws,
-    }
-    if runs:
-        limits = list(binomial_limits(coverage.kept, runs))
-        entry |= {"runs": runs, "kept": coverage.kept / runs, "kept_limits": limits}
-    return entry
+    found = Reported(
+        draws, coverage.exact / draws, binomial_limits(coverage.exact, draws), coverage.linear / draws
+    )
+    if not runs:
+        return found
+    return replace(
+        found, runs=runs, kept=coverage.kept / runs, kept_limits=binomial_limits(coverage.kept, runs)
+    )
 
 
 def too_few(coverage: Coverage, probability: float) -> bool:
@@ -91,23 +92,6 @@ def too_few(coverage: Coverage, probability: float) -> bool:
 def too_many(coverage: Coverage, probability: float) -> bool:
     """Whether more of them do."""
     return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[0] > probability)
-
-
-def missed(result: Mapping[str, Json]) -> list[str]:
-    """Notes where the design of a result, or its record, keeps less than was asked, by more than chance."""
-    notes = []
-    design = result.get("model_error", {}).get("confidence", {})
-    for of, told in (
-        ("of this design", design),
-        ("with this record", result.get("signal", {}).get("confidence", {})),
-    ):
-        if "kept_limits" in told and told["kept_limits"][1] < design["asked"]:
-            notes.append(
-                f"{100 * told['kept']:.1f} % of {told['runs']} simulated experiments {of} keep r_adm, fewer "
-                f"than the {100 * design['asked']:g} % that are asked for by more than chance: ask for more "
-                "runs (confidence: {exact: .., runs: ..}), which tell alpha more sharply"
-            )
-    return notes
 
 
 def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:

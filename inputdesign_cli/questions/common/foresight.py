@@ -28,8 +28,9 @@ from inputdesign_cli.findings.rivals import (
 from inputdesign_cli.identification import Earlier, Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.searched_runs import searched_run
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.design import Foreseen as Entry
-from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome.simulation import Searched
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.knowledge import Knowledge
 
@@ -44,7 +45,7 @@ _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
 
 @dataclass(frozen=True)
 class Foreseen:
-    """`foreseen` of the result, None where it is not known, and findings."""
+    """`foreseen` of the outcome, None if it is not known, and findings."""
 
     entry: Entry | None = None
     findings: tuple[Finding, ...] = ()
@@ -61,7 +62,7 @@ class Foresight:
         advice: what to do about rivals, where nothing better is known.
         knowledge: what the spec says of the parameters, which rules rivals out.
         looks: whether rivals are looked for at all.
-        richer: by its words in a spec the result of the same design with another spectrum; none where there
+        richer: by its words in a spec the outcome of the same design with another spectrum; empty if there
             is no other.
     """
 
@@ -72,9 +73,9 @@ class Foresight:
     advice: str
     knowledge: Knowledge | None = None
     looks: bool = True
-    richer: Mapping[str, Callable[[], Result]] = field(default_factory=dict)
+    richer: Mapping[str, Callable[[], Outcome]] = field(default_factory=dict)
 
-    def foreseen(self, record: Array, requirements: Sequence[Requirement], design: Result) -> Foreseen:
+    def foreseen(self, record: Array, requirements: Sequence[Requirement], design: Outcome) -> Foreseen:
         """The rivals that a record (n, r) of a design would leave, and what to do about them."""
         reason = self._not_now(len(record))
         if reason:
@@ -88,20 +89,20 @@ class Foresight:
         remedy = self._remedy(design) if found else ""
         return Foreseen(entry, tuple(foreseen_rivals(self.units, estimate, found, remedy)))
 
-    def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> dict[str, int]:
-        """Of some records how many end `elsewhere`, and how many leave such `rivals`; empty if untold."""
-        counts = {"runs": runs, "elsewhere": 0, "rivals": 0}
+    def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> Searched | None:
+        """Return how many of some records end elsewhere, and how many leave rivals; None if not known."""
+        elsewhere, rivals = 0, 0
         for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
             tell(Counted("records searched from several starts", done, runs))
             try:
                 estimate, at_home = self._searched(record, rng)
                 found = self._beyond(record, estimate, requirements)
             except _ENDS:
-                return {}
+                return None
             better = any(one.rival.excess < 0.0 for one in found)
-            counts["elsewhere"] += better and not at_home
-            counts["rivals"] += bool(found)
-        return counts
+            elsewhere += better and not at_home
+            rivals += bool(found)
+        return Searched(runs, elsewhere, rivals)
 
     def _searched(self, record: Array, rng: np.random.Generator) -> tuple[Estimate, bool]:
         return searched_run(self.nominal, record, self.units.step, rng, self.earlier)
@@ -130,7 +131,7 @@ class Foresight:
         except OutOfTimeError:
             return f"{what_ended()} left no time"
 
-    def _remedy(self, design: Result) -> str:
+    def _remedy(self, design: Outcome) -> str:
         """The advice, and before it the cheapest spectrum that is found to leave no rivals."""
         best = (np.inf, "")
         for words, solved in self.richer.items():
@@ -139,7 +140,7 @@ class Foresight:
                 other = solved()
             except _ENDS:
                 continue
-            if other.get("foreseen", {}).get("rivals") == []:
+            if other.foreseen is not None and not other.foreseen.rivals:
                 best = min(
                     best, (_price(other), f"spectrum: {words} leaves none{_instead(design, other)}; or ")
                 )
@@ -148,17 +149,17 @@ class Foresight:
         return best[1] + self.advice
 
 
-def _price(design: Result) -> float:
-    """What a design takes: its cost, or its samples; nothing where it is the best of a given cost."""
-    kind = design["objective"]["kind"]
-    return float(design["cost"] if kind == "least_cost" else design["samples"])
+def _price(design: Outcome) -> float:
+    """Return what a design takes: its cost, or its samples; nothing if it is the best of a given cost."""
+    cheapest = design.objective is not None and design.objective.kind == "least_cost"
+    return float((design.cost if cheapest else design.samples) or 0)
 
 
-def _instead(design: Result, other: Result) -> str:
-    """What another design takes."""
-    kind = design["objective"]["kind"]
+def _instead(design: Outcome, other: Outcome) -> str:
+    """Return what another design takes, for a sentence."""
+    kind = None if design.objective is None else design.objective.kind
     if kind == "shortest_experiment":
-        return f", with {other['samples']} samples instead of {design['samples']}"
+        return f", with {other.samples} samples instead of {design.samples}"
     if kind == "least_cost":
-        return f", at a cost of {other['cost']:.4g} instead of {design['cost']:.4g}"
+        return f", at a cost of {other.cost:.4g} instead of {design.cost:.4g}"
     return ""

@@ -14,9 +14,9 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weights_of
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.finding import Finding
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.signal import (
     Bounds,
@@ -115,12 +115,7 @@ class Made:
     request: RecordRequest
     design: Design
     input_power: float | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def entry(self) -> dict[str, Json]:
-        """What `signal` of the result adds about another spectrum."""
-        return {} if self.input_power is None else {"spectrum_of": {"input_power": self.input_power}}
+    findings: tuple[Finding, ...] = ()
 
 
 def make_record(

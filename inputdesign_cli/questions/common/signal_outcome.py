@@ -1,9 +1,10 @@
-"""The record as it is applied: what `result.json` says of it, its table, other files of it."""
+"""The record as it is applied: what the outcome says of it, its tables, the outputs it causes, its files."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,19 +12,21 @@ from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.outcome.curves import SignalCurves
-from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome import Signal, write_plain
+from inputdesign_cli.outcome.curves import PredictedPanel, SignalCurves
+from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.signal_files import WRITERS
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.predicted import predicted_output
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest
 from inputdesign_cli.signal import Bounds, DesignedSpectrum, Lines, Record
 
 _LAGS = 50
 _LOST = 1e-6  # of the largest sample
+# Noise whose deviation has grown by less than this in the second half of the record stands still.
+_SETTLED = 0.02
 
 
-def signal_entry(
+def signal_of(
     request: RecordRequest,
     units: Units,
     experiment: Experiment,
@@ -32,48 +35,69 @@ def signal_entry(
     *,
     designed: Array | None = None,
     spectrum: DesignedSpectrum | None = None,
-) -> dict[str, Json]:
-    """What `result.json` says of a record: powers and peaks by channel, and what it achieves.
+) -> Signal:
+    """Return what the outcome says of a record: powers and peaks by channel, and what it achieves.
 
-    Of a criterion that is its value for an experiment of its own length that goes on as the record does, so
-    that it compares with that of the design, and its share of that; of other requirements their worst ratio.
+    The value of a criterion is for an experiment of its own length that goes on as the record does, so that
+    it compares with the design. Other requirements have their worst ratio.
 
     Args:
+        request: what was asked of the record.
+        units: of the spec.
+        experiment: that the record is for.
+        record: as it was made.
+        requirements: in the coordinates of the experiment.
         designed: information matrix (k, k) of the design.
         spectrum: of the design, for the error of that of the record.
     """
-    samples = record.samples
+    samples, made = record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)
-    entry: dict[str, Json] = {"type": record.method}
-    if record.method == "multisine":
-        entry["phases"] = request.settings.phases
-    entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
-    criterion = criterion_of(requirements)
+    criterion, value, efficiency, ratio = criterion_of(requirements), None, None, None
     if criterion is not None:
         level = criterion.level(plant.information_of_experiment(samples))
-        entry["criterion"] = criterion.value(level)
-        if designed is not None:
-            entry["efficiency"] = level / criterion.level(designed)
+        value = criterion.value(level)
+        efficiency = None if designed is None else level / criterion.level(designed)
     elif requirements and np.isfinite(record.worst_ratio):
-        entry["worst_ratio"] = record.worst_ratio
-    if record.method != "given":
-        entry["extra_power"] = record.extra_power
-    if spectrum is not None:
-        entry["spectrum_error"] = _spectrum_error(spectrum.lines(len(samples)), samples)
-    limits = _limits(request, units, record)
-    if limits:
-        entry["limits"] = {name: list(pair) for name, pair in limits.items()}
-    reached = _of_limits(request.bounds, entry)
-    if reached:
-        entry["of_limits"] = reached
-    if record.factor_residual is not None:
-        entry["spectral_factor_residual"] = record.factor_residual
-    delivery = request.delivery
-    if delivery.operating_points is not None and record.method != "given":
-        entry["operating_point"] = delivery.operating_points.tolist()
-    if "wav" in delivery.also:
-        entry["wav_full_scale"] = _full_scale(delivery, record)
-    return entry
+        ratio = record.worst_ratio
+    delivery, y, u = request.delivery, plant.signals("output", samples), plant.signals("input", samples)
+    peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
+    found = Signal(
+        samples=len(samples),
+        type=record.method,
+        sample_time=units.sample_time,
+        power=_channels(rms**2),
+        peak=_channels(peak),
+        crest_factor=_channels(peak / np.maximum(rms, 1e-300)),
+        input_power=_channels(np.mean(u**2, axis=0)),
+        output_power=_channels(np.mean(y**2, axis=0)),
+        input_peak=_channels(np.abs(u).max(axis=0)),
+        input_move=_channels(_largest_moves(u)),
+        output_peak=_channels(np.abs(y).max(axis=0)),
+        criterion=value,
+        efficiency=efficiency,
+        worst_ratio=ratio,
+        extra_power=record.extra_power if made else None,
+        spectrum_error=None if spectrum is None else _spectrum_error(spectrum.lines(len(samples)), samples),
+        limits=_limits(request, units, record) or None,
+        spectral_factor_residual=record.factor_residual,
+        operating_point=None
+        if delivery.operating_points is None or not made
+        else _channels(delivery.operating_points),
+        wav_full_scale=_full_scale(delivery, record) if "wav" in delivery.also else None,
+        details={"phases": request.settings.phases} if record.method == "multisine" else {},
+    )
+    return replace(found, of_limits=_of_limits(request.bounds, found) or None)
+
+
+def signal_entry(
+    request: RecordRequest, units: Units, experiment: Experiment, record: Record
+) -> dict[str, object]:
+    """Return the same as plain data, for an outcome that is put together from them."""
+    return dict(write_plain(signal_of(request, units, experiment, record)))
+
+
+def _channels(values: Array) -> tuple[float, ...]:
+    return tuple(values.tolist())
 
 
 def signal_curves(
@@ -99,6 +123,49 @@ def signal_curves(
         levels=points is not None and bool(np.any(points)),
     )
     return {"signal": Table(columns), "predicted_output": predicted}, curves
+
+
+def predicted_output(
+    units: Units, experiment: Experiment, record: Array, output_limits: Array | None = None
+) -> tuple[Table, tuple[PredictedPanel, ...]]:
+    """What samples (n, r) cause from rest, and the standard deviation of the noise.
+
+    Args:
+        output_limits: (p,) of |y|, for the figure.
+    """
+    n = len(record)
+    y = FiniteRecord(experiment, n, units.step).signals("output", record)
+    noise = noise_deviation(experiment, n, units.step)
+    columns: dict[str, Array] = {units.time_header: units.sample_time * np.arange(n, dtype=np.float64)}
+    panels = []
+    for i in range(units.outputs):
+        name = f"y{i + 1}"
+        most = None if output_limits is None else float(output_limits[i])
+        limits = None if most is None else (-most, most)
+        panels.append(PredictedPanel(name, y[:, i], noise[:, i], limits, units.label(name)))
+        columns |= {units.header(name): y[:, i], f"{name}_noise_deviation": noise[:, i]}
+    return Table(columns), tuple(panels)
+
+
+def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
+    """(n, p): standard deviations of the noise at the outputs, in the loop where there is one.
+
+    From the response to an impulse of e, whose squares add up. Noise that settles within the record has been
+    there before; one that drifts grows from the start on.
+
+    Args:
+        step: time between samples in the unit of the experiment's frequencies.
+    """
+    model, p = experiment.model, experiment.model.outputs
+    e = np.zeros((p, samples, p))
+    e[:, 0] = np.linalg.cholesky(model.covariance).T
+    rest = np.zeros((p, samples, model.inputs))
+    caused = (
+        model.simulate(rest, e, step)[1] if experiment.loop is None else experiment.loop.signals(rest, e)[0]
+    )
+    grown = np.sqrt(np.cumsum(np.sum(caused**2, axis=0), axis=0))
+    still = grown[samples // 2] >= (1.0 - _SETTLED) * grown[-1]
+    return np.where(still, grown[-1], grown)
 
 
 def applied_columns(request: RecordRequest, units: Units, record: Record) -> dict[str, Array]:
@@ -132,14 +199,14 @@ def _largest_moves(u: Array) -> Array:
     return np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0)
 
 
-def _of_limits(bounds: Bounds, sizes: Mapping[str, Json]) -> dict[str, float]:
-    """The largest share over the channels of each limit on single samples that the record takes."""
+def _of_limits(bounds: Bounds, found: Signal) -> dict[str, float]:
+    """Return the largest share over the channels of each limit on single samples that the record takes."""
     stated = (
-        ("amplitude.input", bounds.amplitude, "input_peak"),
-        ("amplitude.output", bounds.output, "output_peak"),
-        ("rate", bounds.rate, "input_move"),
+        ("amplitude.input", bounds.amplitude, found.input_peak),
+        ("amplitude.output", bounds.output, found.output_peak),
+        ("rate", bounds.rate, found.input_move),
     )
-    return {key: float(np.max(sizes[name] / most)) for key, most, name in stated if most is not None}
+    return {key: float(np.max(np.array(sizes) / most)) for key, most, sizes in stated if most is not None}
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
@@ -184,26 +251,10 @@ def _full_scale(delivery: Delivery, record: Record) -> float:
     return float(np.abs(applied(delivery, record)).max())
 
 
-def _sizes(plant: FiniteRecord, samples: Array) -> dict[str, list[float]]:
-    """Powers and peaks by channel of a record (n, r)."""
-    y, u = plant.signals("output", samples), plant.signals("input", samples)
-    peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
-    return {
-        "power": (rms**2).tolist(),
-        "peak": peak.tolist(),
-        "crest_factor": (peak / np.maximum(rms, 1e-300)).tolist(),
-        "input_power": np.mean(u**2, axis=0).tolist(),
-        "output_power": np.mean(y**2, axis=0).tolist(),
-        "input_peak": np.abs(u).max(axis=0).tolist(),
-        "input_move": _largest_moves(u).tolist(),
-        "output_peak": np.abs(y).max(axis=0).tolist(),
-    }
-
-
 def _spectrum_error(lines: Lines, samples: Array) -> float:
-    """The largest error of the record's correlations, lags 0 to 50, against those of the design.
+    """The largest error of the record's correlations, lags 0 to 50, compared with the design.
 
-    Those of inputs i and j are relative to the roots of their powers; the total power does not count.
+    Correlations of inputs i and j are relative to the roots of their powers; the total power does not count.
     """
     n = len(samples)
     lags = np.arange(min(_LAGS, n // 4) + 1)

@@ -7,7 +7,7 @@ Every run draws a new realisation of the spectrum (scaled to its power exactly) 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -19,25 +19,28 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.findings.simulated_runs import (
+    initial_estimate_off,
+    one_minimum,
+    other_length,
+    runs_miss_confidence,
+)
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
 from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_truth
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.outcome.curves import BoundCurves, Curves
-from inputdesign_cli.outcome.results import Json, Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.simulation import TriedInput
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.questions.common.bound import bound_curves
+from inputdesign_cli.questions.common.delivery import Delivered
 from inputdesign_cli.questions.common.simulation_curves import cloud, disturbance, error_bands
 from inputdesign_cli.questions.common.simulation_outcome import (
-    confidence_notes,
     covariance_in_theory,
-    fractions,
-    gap_notes,
-    input_entry,
-    length_notes,
-    searched_notes,
-    study_entry,
+    study_outcome,
+    tried_input,
 )
 from inputdesign_cli.signal.settings import LEVELLED, Method
 
@@ -90,27 +93,6 @@ class Simulation:
     entries: Sequence[ModelError]
 
 
-@dataclass(frozen=True)
-class Delivered:
-    """What a design or an analysis delivers to be tried.
-
-    Attributes:
-        results: what has been computed so far.
-        record: (n, r), about its operating point; None if no excitation is needed.
-        renewed: realises the spectrum anew in each run; None for a record that was given.
-        alpha: of r_u, see the contract.
-        of_length: curves `bound` and `ellipses` for another number of samples than the results count.
-        rivals: tries so many records with a search from several starts, where that finds other minima.
-    """
-
-    results: Results
-    record: Array | None
-    renewed: Excitation | None
-    alpha: float
-    of_length: Callable[[int], Mapping[str, Curves]] = lambda _: {}
-    rivals: Callable[[int], Mapping[str, int]] | None = None
-
-
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
     """The results of the design with the study of its excitation added.
 
@@ -134,27 +116,25 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
             hint="ask for more accuracy or a longer signal, or give an excitation under spectrum.given",
             key="accuracy",
         )
+    outcome = results.outcome
+    assert outcome.power is not None
+    assert outcome.samples is not None
     excitations = _excitations(plan, delivered, delivered.record)
     nominal = replace(plan.nominal, samples=len(delivered.record))
-    result = dict(results.result)
-    true = nominal if plan.truth is None else plan.truth.experiment(nominal, result["power"]["output"])
+    true = nominal if plan.truth is None else plan.truth.experiment(nominal, outcome.power.output or ())
     study = Study(nominal, true, plan.runs, plan.seed, units.step)
-    counted, simulated = result["samples"], len(delivered.record)
+    counted, simulated = outcome.samples, len(delivered.record)
     foretold = results.curves if counted == simulated else delivered.of_length(simulated)
     predicted = _predicted(plan, foretold, delivered.alpha, excitations[0].information(nominal))
-    inputs: dict[str, Json] = {}
+    inputs: dict[str, TriedInput] = {}
     curves: dict[str, Curves] = {name: foretold[name] for name in ("ellipses",) if name in foretold}
     tables: dict[str, Table] = {}
     for excitation in excitations:
         name = excitation.name
         tried = tried_on_truth(study, excitation, executor)
         errors = tried.trials.errors(predicted)
-        inputs[name] = input_entry(units, tried, predicted, errors, plan.cost)
         modelled = tried_on_model(study, excitation, executor)
-        if modelled is not None:
-            inputs[name]["on_design_model"] = fractions(
-                modelled, predicted, modelled.trials.errors(predicted)
-            )
+        inputs[name] = tried_input(units, tried, predicted, errors, plan.cost, modelled)
         curves[f"errors_{name}"] = error_bands(units, predicted, errors, name)
         theory = None if tried.information is None else covariance_in_theory(tried.information)
         drawn = cloud(tried.trials, theory)
@@ -163,23 +143,22 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
         if true.loop is not None:
             shown = disturbance(units, true.loop, tried.trials.first)
             tables[f"disturbance_{name}"], curves[f"disturbance_{name}"] = shown
-    searched: Mapping[str, int] = {}
-    if result.get("foreseen", {}).get("rivals") and delivered.rivals is not None:
+    searched = None
+    if outcome.foreseen is not None and outcome.foreseen.rivals and delivered.rivals is not None:
         searched = delivered.rivals(_SEARCHED)
-        inputs["design"] |= {"searched": dict(searched)} if searched else {}
-    result["simulation"] = study_entry(study, inputs, excitation="new" if plan.renewed else "record")
-    notes = [
-        *length_notes(counted, simulated),
-        *gap_notes(units, inputs),
-        *confidence_notes(result, inputs),
-        *searched_notes(searched),
+        inputs["design"] = replace(inputs["design"], searched=searched)
+    asked = None if outcome.model_error is None else outcome.model_error.confidence
+    findings = [
+        *other_length(counted, simulated),
+        *initial_estimate_off(units, inputs),
+        *(runs_miss_confidence(asked, inputs["design"]) if "design" in inputs else []),
+        *one_minimum(searched),
     ]
-    if notes:
-        result["notes"] = [*result.get("notes", []), *notes]
-    result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
+    simulation = study_outcome(study, inputs, excitation="new" if plan.renewed else "record")
+    timing = {**(outcome.timing_s or {}), "simulation": time.perf_counter() - started}
     return replace(
         results,
-        outcome=typed(result),
+        outcome=replace(outcome, simulation=simulation, timing_s=timing).saying(findings),
         tables={**results.tables, **tables},
         curves={**results.curves, **curves},
     )
@@ -187,14 +166,17 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
 
 def _excitations(plan: Simulation, delivered: Delivered, record: Array) -> list[Excitation]:
     """The design, what is compared at equal power, and white noise of the power that it would need."""
-    result, step, samples = delivered.results.result, plan.units.step, len(record)
-    power = float(np.sum(result["power"]["excitation"]))
+    outcome, step, samples = delivered.results.outcome, plan.units.step, len(record)
+    assert outcome.power is not None
+    power = float(np.sum(outcome.power.excitation or 0.0))
     renewed = delivered.renewed if plan.renewed else None
     listed: list[Excitation] = [renewed or Recorded("design", record, step)]
     listed += [_flat(plan, kind, kind, power, samples) for kind in plan.compare]
-    needed = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation")
-    if needed and result.get("objective", {}).get("kind") == "least_cost" and "white" in plan.compare:
-        listed.append(_flat(plan, "white", "white_that_suffices", float(np.sum(needed)), samples))
+    white = None if outcome.baseline is None else outcome.baseline.white
+    cheapest = outcome.objective is not None and outcome.objective.kind == "least_cost"
+    if white is not None and white.power is not None and cheapest and "white" in plan.compare:
+        needed = float(np.sum(white.power.excitation or 0.0))
+        listed.append(_flat(plan, "white", "white_that_suffices", needed, samples))
     return listed
 
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.outcome import Spectrum
 from inputdesign_cli.outcome.curves import OptimalityCurves, SpectrumCurves
-from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum, best_directions, matrices
 
@@ -42,7 +43,7 @@ def distinct(w: Array, highest: float) -> Array:
 
 
 def _apart(w: Array, relative: float, absolute: float) -> Array:
-    """The frequencies in order, without those that hardly differ from the one before."""
+    """Return the frequencies in order, each some distance from the one before."""
     ordered = np.sort(w)
     return ordered[np.diff(ordered, prepend=-np.inf) > np.maximum(relative * ordered, absolute)]
 
@@ -98,7 +99,7 @@ def with_periodogram(
 ) -> tuple[Table, SpectrumCurves]:
     """The spectrum with the smoothed periodogram of each channel of the record (n, r) over it.
 
-    Lines are left as they are.
+    A spectrum of lines is returned unchanged.
     """
     if curves.lines:
         return table, curves
@@ -124,8 +125,8 @@ def _smoothed_periodogram(samples: Array, step: float) -> tuple[Array, Array]:
 def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCurves] | None:
     """optimality.csv and its plot: the worth of the best direction at each frequency over its price.
 
-    By the bound over every spectrum: at most one everywhere, and one where power pays. None where there is
-    no such bound.
+    By the bound over every spectrum: at most one everywhere, and one where power pays. None if there is no
+    bound over every spectrum.
     """
     anything = design.any_spectrum
     if anything is None:
@@ -148,15 +149,7 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
     return table, OptimalityCurves(frequency, ratio, marks / units.frequency)
 
 
-def spectrum_entry(units: Units, basis: Basis, x: Array) -> dict[str, Json]:
-    """What `result.json` says of a designed spectrum."""
-    return {name: plain_complex(value) for name, value in basis.described(x, units.frequency).items()}
-
-
-def plain_complex(values: Json) -> Json:
-    """Complex numbers as {re, im}; all else as it is."""
-    if not isinstance(values, np.ndarray) or not np.iscomplexobj(values):
-        return values
-    if values.ndim == 0:
-        return {"re": float(values.real), "im": float(values.imag)}
-    return [plain_complex(part) for part in values]
+def described_spectrum(units: Units, basis: Basis, x: Array) -> Spectrum:
+    """Return what the outcome says of a designed spectrum."""
+    details = dict(basis.described(x, units.frequency))
+    return Spectrum(str(details.pop("type")), details)

@@ -11,7 +11,6 @@ from inputdesign_cli.design.convex.demands import Asked
 from inputdesign_cli.design.convex.exchange import ExchangeResult
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
 from inputdesign_cli.outcome.units import Units
 
@@ -24,8 +23,8 @@ _MOST_PLACES = 3
 class StatedBound:
     """A number of the spec that bounds an error, so that what is bought can be said in its words.
 
-    An error `factor` times as large as asked stands for `value` times factor ** `power`. A `fraction` is told
-    in per cent.
+    An error `factor` times as large as asked stands for `value` times factor ** `power`. A `fraction` is
+    shown in per cent.
     """
 
     key: str
@@ -38,10 +37,10 @@ class StatedBound:
         """What the spec would have to say for an error `factor` times as large."""
         return self.value * factor**self.power
 
-    def told(self, value: float) -> str:
-        """Such a number for a sentence, rounded towards less accuracy: what is printed can be met."""
-        shown = 100.0 * value if self.fraction else value
-        return f"{rounded_up(shown, 4) if self.power > 0 else rounded_down(shown, 4)}" + (
+    def shown(self, value: float) -> str:
+        """Return a number for a sentence, rounded towards less accuracy: what is printed can be met."""
+        number = 100.0 * value if self.fraction else value
+        return f"{rounded_up(number, 4) if self.power > 0 else rounded_down(number, 4)}" + (
             " %" if self.fraction else ""
         )
 
@@ -51,7 +50,7 @@ class Bought:
     """The best accuracy within limits: `nearest` solves `problem` (goal "factor"), which was asked.
 
     Args:
-        stated: the numbers of the spec that are loosened alike; none where that has no words.
+        stated: the numbers of the spec that are loosened alike; none if that has no words.
         limits: those of the spec; others of the problem are implied by them.
     """
 
@@ -76,8 +75,8 @@ class Bought:
         """What the limits buy, and where that is worst."""
         if self.stated:
             parts = [
-                f"{bound.label} {bound.told(bound.loosened(self.factor))} (asked: {bound.told(bound.value)})"
-                for bound in self.stated
+                f"{one.label} {one.shown(one.loosened(self.factor))} (asked: {one.shown(one.value)})"
+                for one in self.stated
             ]
             buys = " and ".join(parts)
         else:
@@ -95,7 +94,7 @@ class Bought:
 
     @property
     def details(self) -> dict[str, object]:
-        """The same as data; frequencies in the user's unit."""
+        """Return this as data, with frequencies in the user's unit."""
         return {
             "factor": self.factor,
             "factor_bound": self.proved,
@@ -131,9 +130,9 @@ class Bought:
             parts.append(f"at {self.units.named(w)}")
         return " ".join(parts)
 
-    def _listed(self, asked: Asked, w: float | None) -> dict[str, Json]:
+    def _listed(self, asked: Asked, w: float | None) -> dict[str, object]:
         requirement = asked.requirement
-        item: dict[str, Json] = {"name": requirement.name}
+        item: dict[str, object] = {"name": requirement.name}
         if requirement.entry is not None and not self.units.single:
             item["entry"] = self.units.entry(*requirement.entry)
         if w is not None:
@@ -144,15 +143,20 @@ class Bought:
 
 
 def named(limit: PowerLimit) -> str:
-    """A limit for a sentence: the power of input 2; what a peak leaves of it."""
-    of = limit.kind if limit.channel is None else f"{limit.kind} {limit.channel + 1}"
-    of = of.replace("moves", "moves of input") if limit.kind == "moves" else of
-    peak = f" that {limit.of_samples} of {np.sqrt(limit.bound):.6g} leaves" if limit.implied else ""
-    return f"the power of {of}{peak}" if limit.channel is not None else f"the {of} power{peak}"
+    """Return the power that a limit bounds, for a sentence: the input power; the power of input 2."""
+    number = "" if limit.channel is None else f" {limit.channel + 1}"
+    if limit.kind == "moves":
+        power = f"the power of the moves of input{number}" if number else "the power of the input's moves"
+    else:
+        power = f"the power of {limit.kind}{number}" if number else f"the {limit.kind} power"
+    if not limit.implied:
+        return power
+    bound = "rate limit" if limit.kind == "moves" else "amplitude limit"
+    return f"{power}, which the {bound} {np.sqrt(limit.bound):.6g} bounds,"
 
 
-def _entry(limit: PowerLimit, share: float) -> dict[str, Json]:
-    entry: dict[str, Json] = {"name": limit.key.removeprefix("limits.")}
+def _entry(limit: PowerLimit, share: float) -> dict[str, object]:
+    entry: dict[str, object] = {"name": limit.key.removeprefix("limits.")}
     if limit.channel is not None:
         entry["channel"] = limit.channel + 1
     return entry | {"max" if limit.upper else "min": limit.bound, "share": share}

@@ -28,8 +28,9 @@ from inputdesign_cli.questions.building.system import (
     record_step,
 )
 from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.common.delivery import Shown
 from inputdesign_cli.questions.common.robust import Plants
-from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
+from inputdesign_cli.questions.given.solve import GivenAsked, GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
@@ -78,23 +79,24 @@ def build_given(spec: Spec) -> GivenTask:
     requirements = build_requirements(spec, experiment)
     experiment.whitened(1.0)  # says which parameters cannot be told apart
     check_pairs(spec, experiment.model.names)
+    asked = GivenAsked(
+        requirements,
+        build_criterion(spec, experiment),
+        build_cost(spec),
+        model_error_alpha(spec, experiment.model),
+        build_calibration(spec),
+        build_simulator(spec, experiment),
+        _limits(spec),
+        _build_plants(spec, experiment),
+    )
     return GivenTask(
-        header=build_header(spec),
-        experiment=experiment,
-        requirements=requirements,
-        unstated=unstated_errors(spec, experiment),
-        excitation=_excitation(spec, spec.spectrum, experiment),
-        cost=build_cost(spec),
-        alpha=model_error_alpha(spec, experiment.model),
-        calibration=build_calibration(spec),
-        simulator=build_simulator(spec, experiment),
-        limits=_limits(spec),
-        record=build_record_request(spec, experiment.size),
-        ellipses=spec.report.ellipses,
-        simulation=build_simulation(spec, experiment),
-        foresight=build_foresight(spec, experiment, None),
-        criterion=build_criterion(spec, experiment),
-        plants=_build_plants(spec, experiment),
+        experiment,
+        _excitation(spec, spec.spectrum, experiment),
+        asked,
+        build_record_request(spec, experiment.size),
+        Shown(build_header(spec), unstated_errors(spec, experiment), spec.report.ellipses),
+        build_simulation(spec, experiment),
+        build_foresight(spec, experiment, None),
     )
 
 
@@ -190,7 +192,7 @@ def _excitation(spec: Spec, stated: GivenSpectrum, experiment: Experiment) -> Gi
 
 
 def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
-    """Frequencies (L,) in the unit of the experiment and amplitudes (L, r), of those that are not zero."""
+    """Return frequencies (L,) in the unit of the experiment and amplitudes (L, r) that are not zero."""
     frequencies = np.array(given.frequencies) * build_units(spec).frequency
     if spec.plant.sampled:
         frequencies = np.minimum(frequencies, np.pi)

@@ -18,10 +18,9 @@ from inputdesign_cli.questions.common.robust import MET, Batch, Kept, Plants, Se
 from inputdesign_cli.questions.least_cost.floor import floor_at
 from inputdesign_cli.questions.least_cost.robust_outcome import (
     RobustResult,
-    floors_and_search,
-    fresh_entry,
-    plants_entry,
-    scenario_table,
+    fresh_findings,
+    fresh_plants,
+    plants_kept,
 )
 from inputdesign_cli.questions.least_cost.worst_case import worst_plant
 
@@ -49,7 +48,7 @@ class AtPlants:
             return Tried(Kept(np.inf), asked)
 
     def on_each(self, batch: Batch, above: float = 0.0) -> list[Tried]:
-        """Return the same of every plant of a batch, to the last digit also up to `above`."""
+        """Return this for every plant of a batch, to the last digit also up to `above`."""
         return [self.on(plant) for plant in batch.plants]
 
 
@@ -77,7 +76,7 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
     shares = np.array([one.kept.share for one in tried])
     rising = np.argsort(shares, kind="stable").tolist()
     kept = sorted(rising[: len(rising) - plants.discard])
-    at_each, numbers = [nominal, *(tried[place].kept for place in kept)], [0, *(place + 1 for place in kept)]
+    at_each = [nominal, *(tried[place].kept for place in kept)]
     looked_at = list(at_each)
     if plants.region is not None:
         starts = [centre, *(batch.thetas[place] for place in reversed(rising))]
@@ -92,11 +91,12 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
             key="uncertainty",
         )
     binding = [int(np.argmax([one.share for one in at_each]))]
+    floors = [floor_at(tried[place].asked) for place in kept]
+    found_there = plants_kept(units, plants, kept, at_each, binding, floors)
+    fresh = None if plants.afresh is None else fresh_plants(plants, plants.afresh(), at.on_each)
     missed = sum(one.share > MET for one in looked_at)
-    entry = plants_entry(units, plants, numbers, at_each, binding) | {"missed": missed}
-    more, notes = floors_and_search(units, plants, kept, [floor_at(tried[place].asked) for place in kept])
-    entry |= more
-    if plants.afresh is not None:
-        fresh, fewer = fresh_entry(plants, plants.afresh(), at.on_each)
-        entry, notes = entry | fresh, (*notes, *fewer)
-    return RobustResult(entry, {"scenarios": scenario_table(units, plants, numbers, at_each)}, {}, notes)
+    return replace(
+        found_there,
+        entry=replace(found_there.entry, missed=missed, fresh=fresh),
+        findings=(*found_there.findings, *fresh_findings(plants, fresh)),
+    )

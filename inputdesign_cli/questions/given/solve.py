@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, ModelError, Requirement, model_errors, worst
+from inputdesign_cli.accuracy import Criterion, Requirement, model_errors, worst
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
@@ -17,19 +17,24 @@ from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.limits_not_kept import StatedLimits, limits_not_kept
+from inputdesign_cli.findings.table_spectra import met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
-from inputdesign_cli.outcome import Powers, read_plain
-from inputdesign_cli.outcome.curves import Curves
+from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectrum, White
 from inputdesign_cli.outcome.objectives import white_labels
-from inputdesign_cli.outcome.results import Json, Results, Table, typed
-from inputdesign_cli.outcome.units import Header
-from inputdesign_cli.questions.common.bound import bound_curves
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.confidence import Confidence
-from inputdesign_cli.questions.common.ellipses import Pairs, experiment_ellipses
-from inputdesign_cli.questions.common.foresight import Foreseen, Foresight
-from inputdesign_cli.questions.common.nyquist import nyquist_curves
-from inputdesign_cli.questions.common.of_length import curves_of_length
+from inputdesign_cli.questions.common.delivery import (
+    Delivered,
+    Report,
+    Shown,
+    begun_anywhere,
+    record_findings,
+    searching,
+)
+from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.record import (
     RecordRequest,
     as_long,
@@ -37,15 +42,13 @@ from inputdesign_cli.questions.common.record import (
     least_period,
     worst_ratio,
 )
-from inputdesign_cli.questions.common.record_notes import record_notes
 from inputdesign_cli.questions.common.robust import Plants
-from inputdesign_cli.questions.common.signal_outcome import other_files, signal_curves, signal_entry
+from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates, Simulator
-from inputdesign_cli.questions.common.simulation import Delivered, Simulation, simulate
-from inputdesign_cli.questions.common.spectrum import plain_complex, spectrum_curves
-from inputdesign_cli.questions.common.unknown_start import begun_anywhere
+from inputdesign_cli.questions.common.simulation import Simulation, simulate
+from inputdesign_cli.questions.common.spectrum import spectrum_curves
 from inputdesign_cli.questions.given.build_plants import AtPlants, given_robust, kept_of
-from inputdesign_cli.questions.least_cost.outcome import information_entry, requirements_entry
+from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
@@ -104,6 +107,19 @@ class GivenExcitation:
         information = partial(spectral_information, basis, x)
         return cls(kind, found, information, basis, x, sinusoids)
 
+    def described(self, units: Units) -> Spectrum:
+        """Return what the outcome says of it."""
+        details: dict[str, object] = {"given": self.kind}
+        if isinstance(self.basis, LinesBasis) and self.x is not None:
+            frequencies, powers = self.basis.lines(self.x)
+            shown = powers[:, 0, 0].real if units.inputs == 1 else powers
+            details |= {"frequencies": frequencies / units.frequency, "powers": shown}
+        elif self.kind == "white":
+            details["power"] = self.power["excitation"]
+            if units.inputs == 1:
+                details["coefficients"] = self.power["excitation"]
+        return Spectrum("given", details)
+
     @classmethod
     def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
         """White excitation of this total power, flat over the band and even over the channels."""
@@ -112,32 +128,44 @@ class GivenExcitation:
 
 
 @dataclass(frozen=True)
-class GivenTask:
-    """The analysis of an excitation.
+class GivenAsked:
+    """What is looked at of a given excitation.
 
-    `unstated` are errors of the entries of G that have r_u where no requirement bounds it. The value of
-    `criterion` is computed, not bounded. `plants` are others that the true one might be.
+    Attributes:
+        requirements: are checked, not met.
+        criterion: its value is computed, not bounded.
+        cost: weights of the powers.
+        alpha: of r_u; `calibration` and `simulator` size it anew, see `Confidence`.
+        calibration: see there; None for the alpha as stated.
+        simulator: see there.
+        limits: that the excitation is compared with.
+        plants: others that the true one might be.
     """
 
-    header: Header
-    experiment: Experiment
     requirements: Sequence[RequirementFactory]
-    unstated: Sequence[ModelError]
-    excitation: GivenExcitation
+    criterion: Callable[[Experiment], Criterion] | None
     cost: dict[PowerKind, Weight]
     alpha: float
     calibration: Calibration | None
     simulator: Simulator | None
     limits: StatedLimits
+    plants: Plants | None
+
+
+@dataclass(frozen=True)
+class GivenTask:
+    """The analysis of an excitation: what is looked at, what is done with its record, what is reported."""
+
+    experiment: Experiment
+    excitation: GivenExcitation
+    asked: GivenAsked
     record: RecordRequest
-    ellipses: Pairs | None
+    shown: Shown
     simulation: Simulation
     foresight: Foresight | None = None
-    criterion: Callable[[Experiment], Criterion] | None = None
-    plants: Plants | None = None
 
     def solve(self) -> Results:
-        """r_u, information, predicted standard deviations and powers of the excitation.
+        """Return r_u, information, predicted standard deviations and powers of the excitation.
 
         Raises:
             SpecError: `not-exciting` when the excitation leaves parameters undetermined.
@@ -145,7 +173,7 @@ class GivenTask:
         return self._delivered().results
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """The same, with the excitation tried many times on the true system; see `common.simulation`.
+        """Return this with the excitation tried many times on the true system; see `common.simulation`.
 
         Raises:
             SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with; see `solve`.
@@ -154,142 +182,109 @@ class GivenTask:
 
     def _delivered(self) -> Delivered:
         started = time.perf_counter()
-        raw, excitation, units = self.experiment, self.excitation, self.header.units
-        experiment = raw.whitened(excitation.scale)
+        excitation, asked = self.excitation, self.asked
+        experiment = self.experiment.whitened(excitation.scale)
         if excitation.samples is not None:
             experiment = replace(experiment, samples=len(excitation.samples))
         information = excitation.information(experiment)
         _check_excites(experiment, information)
-        requirements = [make(experiment) for make in self.requirements]
+        requirements = [make(experiment) for make in asked.requirements]
         simulated = self._simulated(experiment)
-        confidence = Confidence.of(self.calibration, requirements, information, self.alpha, simulated)
+        confidence = Confidence.of(asked.calibration, requirements, information, asked.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
-        cost = weighted_sum(self.cost, excitation.power)
-        level = cost / weighted_sum(self.cost, GivenExcitation.even(raw, 1.0).power)
-        white = GivenExcitation.even(raw, level).information(experiment)
-        result = self._result(experiment, requirements, information, confidence)
-        tables = self._at_plants(result, experiment, requirements, information)
-        result |= {"cost": cost, "power": excitation.power, "spectrum": self._spectrum_entry()}
-        result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
-        curves: dict[str, Curves] = {}
-        stated = model_errors(requirements)
-        unstated = [replace(error, experiment=experiment) for error in self.unstated]
-        tables["bound"], curves["bound"] = bound_curves(
-            units,
-            stated or unstated,
-            information,
-            white=white,
-            white_labels=white_labels(result),
-            stated=bool(stated),
-        )
-        loops = nyquist_curves(units, (stated or unstated)[:1], information)
-        tables, curves = tables | loops[0], curves | loops[1]
-        if excitation.basis is not None and excitation.x is not None:
-            tables["spectrum"], curves["spectrum"] = spectrum_curves(
-                units,
-                excitation.basis,
-                excitation.x,
-                experiment.band,
-                white=level if units.inputs == 1 else None,
-            )
-        ellipses = experiment_ellipses(experiment, information, white, self.ellipses)
-        if ellipses is not None:
-            curves["ellipses"] = ellipses
-        record, files = self._record(experiment, worst_ratio(requirements)), {}
+        informed, white = self._informed(experiment, requirements, information)
+        report = self._report(informed, white, requirements, confidence)
+        record = self._record(experiment, worst_ratio(requirements))
+        findings = record_findings(self.record, experiment.samples, None) if record is None else []
         if record is not None:
-            result["signal"] = signal_entry(self.record, units, experiment, record, requirements)
-            drawn = signal_curves(self.record, units, experiment, record)
-            tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
-            files = other_files(self.record, units, record)
-        notes = result.pop("notes", [])
-        notes += record_notes(self.record, experiment.samples, record, {}) if record is None else []
-        if record is not None and np.isfinite(record.worst_ratio):
-            start = begun_anywhere(experiment, record.samples, self.record.step, requirements)
-            result["signal"] |= start.entry
-            notes += start.notes
-        foreseen = Foreseen()
-        if record is not None and self.foresight is not None:
-            foreseen = self.foresight.foreseen(record.samples, requirements, result)
-            result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
-        if notes:
-            result["notes"] = notes
-        result["timing_s"] = {"analysis": time.perf_counter() - started}
-        outcome = typed(result)
-        broken = limits_not_kept(
-            self.limits, experiment.samples, read_plain(Powers, excitation.power), outcome.signal
-        )
-        outcome = outcome.saying([*broken, *foreseen.findings])
-        results = Results(outcome, self.header.resolved_spec, units.time_unit, tables, curves, files)
+            signal = signal_of(self.record, informed.units, experiment, record, requirements)
+            if np.isfinite(record.worst_ratio):
+                step = self.record.step
+                signal, start = begun_anywhere(signal, experiment, record.samples, step, requirements)
+                findings += start
+            report = report.with_record(self.record, self.shown, experiment, record, signal)
+        power = _powers(excitation.power)
+        findings += limits_not_kept(asked.limits, experiment.samples, power, report.outcome.signal)
+        report = replace(report, outcome=report.outcome.saying(findings))
+        if record is not None:
+            report = report.foreseeing(self.foresight, record.samples, requirements)
+        results = report.results(self.shown.header, {"analysis": time.perf_counter() - started})
         if record is None:
             return Delivered(results, None, None, confidence.alpha)
-        renewed, seen = self._renewed(len(record.samples)), self.foresight
-        tried = None if seen is None else partial(seen.tried, record.samples, requirements)
-        of_length = partial(
-            curves_of_length,
-            units,
-            experiment,
-            information,
-            white,
-            stated or unstated,
-            stated=bool(stated),
-            ellipses=self.ellipses,
+        return Delivered(
+            results,
+            record.samples,
+            self._renewed(len(record.samples)),
+            confidence.alpha,
+            informed.of_length,
+            searching(self.foresight, record.samples, requirements),
         )
-        return Delivered(results, record.samples, renewed, confidence.alpha, of_length, tried)
 
-    def _result(
-        self,
-        experiment: Experiment,
-        requirements: Sequence[Requirement],
-        information: Array,
-        confidence: Confidence,
-    ) -> dict[str, Json]:
-        beyond, told_to = self._beyond(experiment, requirements, information)
-        met = beyond <= max(_ROUNDING, told_to)
-        result: dict[str, Json] = {
-            "format": 1,
-            "title": self.header.title,
-            "status": "given" if not requirements else "met" if met else "missed",
-            "samples": experiment.samples,
-            "information": information_entry(experiment, information),
-        }
-        if met and told_to:
-            result["notes"] = [
-                f"what is asked is met to the {told_to:.1g} to which the table tells the spectrum, linear "
-                "between its rows"
-            ]
-        if self.criterion is not None:
-            criterion = self.criterion(experiment)
-            value = criterion.value(criterion.level(information))
-            result["objective"] = {"kind": criterion.letter, "value": value}
-        nowhere = np.zeros(0)
-        units = self.header.units
-        return result | requirements_entry(units, confidence, requirements, information, nowhere)
+    def _informed(
+        self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
+    ) -> tuple[Informed, White]:
+        """Return what curves show of the excitation, and white excitation at the same cost."""
+        cost = weighted_sum(self.asked.cost, self.excitation.power)
+        level = cost / weighted_sum(self.asked.cost, GivenExcitation.even(self.experiment, 1.0).power)
+        white = GivenExcitation.even(self.experiment, level).information(experiment)
+        stated, units = model_errors(requirements), self.shown.header.units
+        errors = stated or [replace(error, experiment=experiment) for error in self.shown.unstated]
+        informed = Informed(units, experiment, information, white, errors, bool(stated), self.shown.ellipses)
+        return informed, White(cost=cost, excitation_power=level)
 
-    def _at_plants(
-        self,
-        result: dict[str, Json],
-        experiment: Experiment,
-        requirements: Sequence[Requirement],
-        information: Array,
-    ) -> dict[str, Table]:
-        """Add what the excitation buys at the other plants to the result, and return their table."""
-        if self.plants is None:
-            return {}
-        excited = AtPlants(self.excitation.information, self.excitation.scale, experiment.samples)
-        nominal, centre = kept_of(requirements, information), experiment.model.theta
-        found = given_robust(excited, self.plants, nominal, centre, self.header.units)
-        result["robust"] = found.entry
-        if found.entry["missed"]:
-            result["status"] = "missed"
-        result["notes"] = [*result.get("notes", []), *found.notes]
-        return dict(found.tables)
+    def _report(
+        self, informed: Informed, white: White, requirements: Sequence[Requirement], confidence: Confidence
+    ) -> Report:
+        """Return what the excitation buys, with its tables and curves."""
+        units, excitation, experiment = informed.units, self.excitation, informed.experiment
+        beyond, of_table = self._beyond(experiment, requirements, informed.information)
+        met = beyond <= max(_ROUNDING, of_table)
+        error, listed = accuracy_of(units, confidence, requirements, informed.information, np.zeros(0))
+        outcome = Outcome(
+            title=self.shown.header.title,
+            status="given" if not requirements else "met" if met else "missed",
+            objective=self._objective(experiment, informed.information),
+            cost=white.cost,
+            samples=experiment.samples,
+            power=_powers(excitation.power),
+            model_error=error,
+            requirements=listed,
+            information=information_of(experiment, informed.information),
+            spectrum=excitation.described(units),
+            baseline=Baseline(white),
+        )
+        if met and of_table:
+            outcome = outcome.saying([met_within_table(of_table)])
+        kind = outcome.objective and outcome.objective.kind
+        tables, curves = informed.curves(white_labels=white_labels(kind, white, experiment.samples))
+        if excitation.basis is not None and excitation.x is not None:
+            level = white.excitation_power if units.inputs == 1 else None
+            tables["spectrum"], curves["spectrum"] = spectrum_curves(
+                units, excitation.basis, excitation.x, experiment.band, white=level
+            )
+        plants = self.asked.plants
+        if plants is not None:
+            excited = AtPlants(excitation.information, excitation.scale, experiment.samples)
+            nominal, centre = kept_of(requirements, informed.information), experiment.model.theta
+            found = given_robust(excited, plants, nominal, centre, units)
+            status = "missed" if found.entry.missed else outcome.status
+            outcome = replace(outcome, robust=found.entry, status=status).saying(found.findings)
+            tables |= found.tables
+        return Report(outcome, tables, curves, {})
+
+    def _objective(self, experiment: Experiment, information: Array) -> Objective | None:
+        """Return the value of the criterion."""
+        if self.asked.criterion is None:
+            return None
+        criterion = self.asked.criterion(experiment)
+        return Objective(criterion.letter, criterion.value(criterion.level(information)))
 
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[float, float]:
-        """How far the largest ratio is above one, and the error of it that the rows of a table leave.
+        """Return how far the largest ratio is above one, and how far off it may be by the rows of a table.
 
-        That is looked at only where it decides; 0 else.
+        The second is 0 if it does not decide.
         """
 
         def largest(M: Array) -> float:
@@ -301,19 +296,6 @@ class GivenTask:
             return ratio - 1.0, 0.0
         raised = largest(spectral_information(basis.raised(_TABLE_SHARE), x, experiment))
         return ratio - 1.0, min(ratio - raised, _TABLE_ERROR)
-
-    def _spectrum_entry(self) -> dict[str, Json]:
-        excitation, units = self.excitation, self.header.units
-        entry: dict[str, Json] = {"type": "given", "given": excitation.kind}
-        if isinstance(excitation.basis, LinesBasis) and excitation.x is not None:
-            frequencies, powers = excitation.basis.lines(excitation.x)
-            entry["frequencies"] = frequencies / units.frequency
-            entry["powers"] = powers[:, 0, 0].real if units.inputs == 1 else plain_complex(powers)
-        elif excitation.kind == "white":
-            entry["power"] = excitation.power["excitation"]
-            if units.inputs == 1:
-                entry["coefficients"] = excitation.power["excitation"]
-        return entry
 
     def _record(self, experiment: Experiment, ratio: Callable[[Array], float]) -> Record | None:
         """The signal as given, or one record of the given spectrum; None for one too short."""
@@ -331,13 +313,13 @@ class GivenTask:
 
     def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
         """Estimates of such experiments, for an exact confidence."""
-        if self.simulator is None:
+        if self.asked.simulator is None:
             return None
         if self.excitation.samples is not None:
-            return self.simulator.of_record(self.excitation.samples)
+            return self.asked.simulator.of_record(self.excitation.samples)
         samples = as_long(self.record, experiment)
         renewed = None if samples is None else self._renewed(samples)
-        return None if samples is None or renewed is None else self.simulator.of(renewed, samples)
+        return None if samples is None or renewed is None else self.asked.simulator.of(renewed, samples)
 
     def _renewed(self, samples: int) -> Excitation | None:
         """What realises the spectrum anew; None for a record that was given."""
@@ -363,6 +345,10 @@ class GivenTask:
         rng = np.random.default_rng(request.settings.seed)
         record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)
         return Record(record, "multisine", _ratio_of(request, experiment, record, ratio))
+
+
+def _powers(found: Mapping[PowerKind, Sequence[float]]) -> Powers:
+    return Powers(**{kind: tuple(values) for kind, values in found.items()})
 
 
 def _ratio_of(

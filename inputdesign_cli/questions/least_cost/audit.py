@@ -7,7 +7,7 @@ its own: four Gauss points on intervals of the grid on which peaks are sought.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,7 +23,7 @@ from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.outcome import Objective, Outcome, read_plain, write_plain
 from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.questions.common.robust import kept_by
@@ -45,18 +45,21 @@ _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 
 
-def audit(done: Designed, result: Mapping[str, Json], *, on_grid: bool, loose: float = 0.0) -> None:
-    """Compare what the result claims with what its own spectrum gives, at the nominal plant and all others.
+def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0) -> None:
+    """Compare what the outcome claims with what its own spectrum gives, at the nominal plant and all others.
 
     Args:
+        done: the design.
+        outcome: what is about to be written.
         on_grid: the requirements hold on the grid of the papers' program only, and are not claimed between.
-        loose: what the value and its bounds may differ by where more than rounding parts them, as a share.
+        loose: what the value and its bounds may differ by if more than rounding parts them, as a share.
 
     Raises:
         InaccurateError: `internal-disagreement`.
     """
     apart = max(_APART, loose)
-    for claim in _Audit(done, json.loads(json_text(result)), apart).disagreements(on_grid):
+    reread = read_plain(_Written, json.loads(json_text(write_plain(outcome))))
+    for claim in _Audit(done, reread, apart).disagreements(on_grid):
         raise InaccurateError.because(
             "internal-disagreement",
             claim,
@@ -67,19 +70,43 @@ def audit(done: Designed, result: Mapping[str, Json], *, on_grid: bool, loose: f
 
 
 @dataclass(frozen=True)
+class _WrittenSpectrum:
+    """The spectrum of `result.json`: lines with powers, or a density by its type."""
+
+    type: str
+    frequencies: Array | None = None
+    powers: ComplexArray | None = None
+    power: float | None = None
+    coefficients: ComplexArray | None = None
+    order: int = 0
+    basis: str = ""
+    band: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class _Written:
+    """What is compared of `result.json`."""
+
+    status: str
+    objective: Objective
+    cost: float
+    spectrum: _WrittenSpectrum
+
+
+@dataclass(frozen=True)
 class _Audit:
     done: Designed
-    written: dict[str, Json]
+    written: _Written
     apart: float
 
     def disagreements(self, on_grid: bool) -> Iterator[str]:
-        """What the result claims and its spectrum does not give, one sentence each."""
+        """Yield a sentence for each claim that the spectrum does not bear out."""
         yield from self._bounds()
-        if self.written["status"] == "nothing_needed":
+        if self.written.status == "nothing_needed":
             return
-        goal, value = self.done.question.goal, self.written["objective"]["value"]
+        goal, value = self.done.question.goal, self.written.objective.value
         problem = self.done.design.problem
-        plants = [_Reread(self.done, self.written, scenario) for scenario in problem.scenarios]
+        plants = [_Reread(self.done, self.written.spectrum, scenario) for scenario in problem.scenarios]
         for reread in self._doubtful(plants) if not on_grid else ():
             yield from reread.missed(goal)
         if goal == "factor":
@@ -90,8 +117,8 @@ class _Audit:
             for number in problem.paying
         ]
         cost = paid_for(problem.paid, costs)
-        if not abs(cost - self.written["cost"]) <= _APART * cost:
-            yield f"the spectrum costs {cost:.10g}, not {self.written['cost']:.10g}"
+        if not abs(cost - self.written.cost) <= _APART * cost:
+            yield f"the spectrum costs {cost:.10g}, not {self.written.cost:.10g}"
         for limit in self.done.question.limits:
             for number in (problem.limits[index].scenario for index in limit.everywhere(problem.limits)):
                 power = plants[number].power(limit.kind, limit.channel)
@@ -100,20 +127,24 @@ class _Audit:
                     yield f"{limit.key} is {limit.bound:.6g}, but the spectrum has {power:.10g}"
 
     def _doubtful(self, plants: list[_Reread]) -> list[_Reread]:
-        """The nominal plant, and those that keep nearly all that is admitted."""
+        """Return the nominal plant, and others that keep nearly all that is admitted."""
         kept = kept_by(self.done.problem, self.done.design, self.done.experiment.samples)
         pairs = list(zip(plants, kept, strict=True))
         return [reread for n, (reread, one) in enumerate(pairs) if n == 0 or one.share > _DOUBTFUL]
 
     def _bounds(self) -> Iterator[str]:
         """No value lies beyond a bound that is called proved."""
-        objective = self.written["objective"]
-        value, largest = objective["value"], "upper_bound" in objective
-        size = max(abs(value), float(self.done.experiment.size) if objective["kind"] == "D" else 0.0)
-        for name in ("upper_bound", "lower_bound", "any_spectrum_bound"):
-            beyond = value - objective.get(name, value)
+        claimed = self.written.objective
+        value, largest = claimed.value, claimed.upper_bound is not None
+        size = max(abs(value), float(self.done.experiment.size) if claimed.kind == "D" else 0.0)
+        for name, bound in (
+            ("upper_bound", claimed.upper_bound),
+            ("lower_bound", claimed.lower_bound),
+            ("any_spectrum_bound", claimed.any_spectrum_bound),
+        ):
+            beyond = 0.0 if bound is None else value - bound
             if not (beyond if largest else -beyond) <= self.apart * size:
-                yield f"the value {value:.10g} lies beyond {name} ({objective[name]:.10g})"
+                yield f"the value {value:.10g} lies beyond {name} ({bound:.10g})"
 
     def _reached(self, plants: list[_Reread], value: float) -> Iterator[str]:
         """The value of the best accuracy is that of the plant at which it is worst."""
@@ -132,7 +163,7 @@ class _Reread:
     """The written spectrum at one plant."""
 
     done: Designed
-    written: dict[str, Json]
+    written: _WrittenSpectrum
     scenario: Scenario
 
     def missed(self, goal: Goal) -> Iterator[str]:
@@ -188,7 +219,7 @@ class _Reread:
 
     @cached_property
     def _information(self) -> Array:
-        """(k, k): what the written spectrum, the noise and what is known already tell."""
+        """Return the information (k, k) of the written spectrum, of the noise, and known before."""
         experiment = self._experiment
         total = experiment.prior_information.copy()
         for w, root in self._excitation:
@@ -210,48 +241,46 @@ class _Reread:
     @cached_property
     def _excitation(self) -> list[tuple[Array, ComplexArray]]:
         """Frequencies (n,) and roots (n, r, r) of the power at each; their powers add up."""
-        entry, unit = self.written["spectrum"], self.done.units.frequency
+        entry, unit = self.written, self.done.units.frequency
         r = self._experiment.inputs
-        if "frequencies" in entry:
-            powers = _complex(entry["powers"]).reshape(-1, r, r)
-            return [(np.array(entry["frequencies"]) * unit, _root(powers))]
+        if entry.frequencies is not None and entry.powers is not None:
+            return [(entry.frequencies * unit, _root(entry.powers.reshape(-1, r, r)))]
         lo, hi = self._experiment.band
-        if "band" in entry:
-            lo, hi = (edge * unit for edge in entry["band"])
-        found, known = self.done.design.result, entry["type"] in _KNOWN
+        if entry.band is not None:
+            lo, hi = (edge * unit for edge in entry.band)
+        found, known = self.done.design.result, entry.type in _KNOWN
         grid = graded_grid(self._experiment.singularities, lo, hi, knots=found.basis.knots)
-        steps = min(max(_FAST // max(entry.get("order", 0), 1), 1), _STEPS) if known else 1
+        steps = min(max(_FAST // max(entry.order, 1), 1), _STEPS) if known else 1
 
         def density(w: Array) -> ComplexArray:
             if known:
                 return _density(entry, w, (lo, hi), r)
-            return (
-                found.basis.density(found.x, w).reshape(-1, r, r).astype(complex)
-            )  # a family from elsewhere
+            # A family from elsewhere.
+            return found.basis.density(found.x, w).reshape(-1, r, r).astype(complex)
 
         return [(w, _root(density(w) * weight[:, None, None])) for w, weight in _rule(grid, steps)]
 
 
-def _density(entry: Mapping[str, Json], w: Array, band: tuple[float, float], r: int) -> ComplexArray:
-    """(n, r, r): the density that an entry of `result.json` describes, by its definition."""
+def _density(entry: _WrittenSpectrum, w: Array, band: tuple[float, float], r: int) -> ComplexArray:
+    """Return the density (n, r, r) that an entry of `result.json` describes, by its definition."""
     lo, hi = band
-    if entry["type"] == "white":
-        level = entry["power"] * np.pi / ((hi - lo) * r)
+    if entry.type == "white":
+        level = (entry.power or 0.0) * np.pi / ((hi - lo) * r)
         return np.broadcast_to(level * np.eye(r, dtype=complex), (w.size, r, r))
-    c = _complex(entry["coefficients"])
-    if entry["type"] == "fir":
+    c = np.zeros((1, r, r), dtype=complex) if entry.coefficients is None else entry.coefficients
+    if entry.type == "fir":
         lags = np.exp(-1j * np.outer(w, np.arange(1, len(c))))
         later = np.tensordot(lags, c.reshape(-1, r, r)[1:], axes=1)
         return np.asarray(c.reshape(-1, r, r)[0] + later + later.conj().swapaxes(1, 2))
-    m, x = entry["order"], 2.0 * (w - lo) / (hi - lo) - 1.0
+    m, x = entry.order, 2.0 * (w - lo) / (hi - lo) - 1.0
     norms = np.sqrt((2.0 * np.arange(m + 1) + 1.0) * np.pi / (hi - lo))
-    p = legendre.legvander(x, m) * norms if entry["basis"] == "legendre" else _TABLES[entry["basis"]](x, m)
+    p = legendre.legvander(x, m) * norms if entry.basis == "legendre" else _TABLES[entry.basis](x, m)
     S = c.reshape(m + 1, r, m + 1, r)
     return np.asarray(0.5 * np.einsum("na,aibj,nb->nij", p, S, p, optimize=True), dtype=complex)
 
 
 def _rule(grid: Array, steps: int) -> Iterator[tuple[Array, Array]]:
-    """Nodes and weights of (1 / pi) integral over intervals of so many steps of a grid, some at a time."""
+    """Yield nodes and weights of (1 / pi) integral over intervals of some steps of a grid."""
     grid = np.append(grid[:-1:steps], grid[-1])
     points, weights = legendre.leggauss(4)
     half = 0.5 * np.diff(grid)
@@ -274,10 +303,3 @@ def _outer(F: ComplexArray) -> NDArray[np.float64]:
     """Re sum of F_l F_m^* over frequencies and channels: (n, k, p, r) -> (k, k)."""
     flat = np.moveaxis(F, 1, 0).reshape(F.shape[1], -1)
     return np.asarray((flat @ flat.conj().T).real)
-
-
-def _complex(value: Json) -> ComplexArray:
-    """Nested lists of numbers, or of {re, im}."""
-    if isinstance(value, list):
-        return np.array([_complex(part) for part in value])
-    return np.asarray(complex(value["re"], value["im"]) if isinstance(value, dict) else complex(value))

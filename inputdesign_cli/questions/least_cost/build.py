@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.questions.building.demand import check_design
 from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header
@@ -25,10 +25,11 @@ from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.common.delivery import Shown
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
-from inputdesign_cli.questions.least_cost.factor_columns import FewColumns
-from inputdesign_cli.questions.least_cost.grid_method import GridMethod
+from inputdesign_cli.questions.least_cost.methods import FewColumns, GridMethod
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
+from inputdesign_cli.questions.least_cost.sought import Method, Sought
 from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
@@ -76,28 +77,18 @@ def build_convex(spec: Spec) -> ConvexTask:
     tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
     bounded = solver.any_spectrum and reach.bounded
     alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)
+    header = build_header(spec)
+    exact = None
+    if calibration is not None:
+        exact = ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment))
+    bound = solver.any_spectrum_tolerance if bounded else None
     return ConvexTask(
-        header=build_header(spec),
-        question=question,
-        experiment=experiment,
-        cost=cost,
-        alpha=alpha,
-        exact=None
-        if calibration is None
-        else ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment)),
-        tolerance=tolerance,
-        any_spectrum_tolerance=solver.any_spectrum_tolerance if bounded else None,
-        reach=reach,
-        most_samples=spec.limits.samples,
-        plants=plants,
-        ellipses=spec.report.ellipses,
-        grid=grid,
-        columns=_few_columns(spec, basis),
-        record=build_record_request(spec, experiment.size),
-        unstated=unstated_errors(spec, experiment),
-        stated=stated_bounds(spec),
-        simulation=build_simulation(spec, experiment),
-        foresight=build_foresight(spec, experiment, _designed_alone),
+        Sought(header, question, cost, alpha, exact, spec.limits.samples, plants, stated_bounds(spec)),
+        Method(tolerance, bound, reach, grid, _few_columns(spec, basis)),
+        build_record_request(spec, experiment.size),
+        Shown(header, unstated_errors(spec, experiment), spec.report.ellipses),
+        build_simulation(spec, experiment),
+        build_foresight(spec, experiment, _designed_alone),
     )
 
 
@@ -109,11 +100,12 @@ def _approaching(question: Question, band: tuple[float, float]) -> Question:
     return replace(question, experiment=experiment, basis=LinesBasis.anywhere(*band, experiment.inputs))
 
 
-def _designed_alone(spec: Spec) -> Result:
-    """The result of a design that is looked at beside another one: no bounds, and none beside it in turn."""
+def _designed_alone(spec: Spec) -> Outcome:
+    """Return the outcome of a design that another one is compared with: without bounds and comparisons."""
     task = build_convex(spec)
     alone = None if task.foresight is None else replace(task.foresight, richer={})
-    return replace(task, foresight=alone, any_spectrum_tolerance=None).solve().result
+    method = replace(task.method, any_spectrum_tolerance=None)
+    return replace(task, foresight=alone, method=method).solve().outcome
 
 
 def check_supported(spec: Spec) -> None:

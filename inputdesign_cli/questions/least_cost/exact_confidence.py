@@ -13,7 +13,6 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.questions.common.confidence import (
     SETTLED,
     Confidence,
@@ -36,7 +35,7 @@ _CORRECTIONS, _CORRECTED = 5, 0.01
 # Where other runs do not bear the correction out, so many times as many correct.
 _SETS = 4
 
-MakeDesign = Callable[[Question, Confidence], tuple[Designed, dict[str, Json]]]
+MakeDesign = Callable[[Question, Confidence], Designed]
 Known = Callable[[Record | None], Array | None]
 
 
@@ -44,7 +43,7 @@ Known = Callable[[Record | None], Array | None]
 class ExactConfidence:
     """The confidence that is asked of the answer to a question; `usual` is the chi-squared alpha.
 
-    Without a `simulator` asymptotic theory tells how estimates scatter.
+    Without a `simulator`, asymptotic theory says how estimates scatter.
     """
 
     calibration: Calibration
@@ -52,8 +51,8 @@ class ExactConfidence:
     question: Question
     simulator: Simulator | None
 
-    def designed(self, design: MakeDesign, request: RecordRequest) -> tuple[Designed, dict[str, Json]]:
-        """The design that needs just the alpha that it is for, and what the solver did.
+    def designed(self, design: MakeDesign, request: RecordRequest) -> Designed:
+        """Return the design that needs just the alpha that it is for.
 
         Raises:
             InfeasibleError, InaccurateError: see `settled_alpha`, `SimulatedEstimates.corrected`.
@@ -61,8 +60,8 @@ class ExactConfidence:
         calibration, designs, sets = self.calibration, 0, 1
         alpha, simulated, coverage = self._first_alpha(), None, None
         for _ in range(_CORRECTIONS):
-            done, how = self._settled(design, calibration, alpha)
-            designs += how["designs"]
+            done, made = self._settled(design, calibration, alpha)
+            designs += made
             alpha, simulated, coverage = done.confidence.alpha, self._simulated(done, request, sets), None
             if simulated is None:
                 break
@@ -78,13 +77,13 @@ class ExactConfidence:
             alpha *= corrected.excess / before
         coverage = coverage or self._coverage(done, done.information, simulated)
         confidence = Confidence(done.confidence.alpha, self.usual, done.confidence.calibration, coverage)
-        return replace(done, confidence=confidence), {**how, "designs": designs}
+        solver = done.answer.solver
+        solver = replace(solver, details={**solver.details, "designs": designs})
+        return replace(done, confidence=confidence, answer=replace(done.answer, solver=solver))
 
-    def _settled(
-        self, design: MakeDesign, calibration: Calibration, start: float
-    ) -> tuple[Designed, dict[str, Json]]:
-        """The design that needs just the alpha that it is for by this calibration."""
-        found = dict[float, tuple[Designed, dict[str, Json]]]()
+    def _settled(self, design: MakeDesign, calibration: Calibration, start: float) -> tuple[Designed, int]:
+        """Return the design that needs just the alpha that it is for, and how many were made."""
+        found = dict[float, Designed]()
 
         def needed(alpha: float) -> float | None:
             try:
@@ -93,19 +92,18 @@ class ExactConfidence:
                 )
             except InfeasibleError:  # a smaller alpha may do
                 return None
-            done = found[alpha][0]
+            done = found[alpha]
             return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
 
-        done, how = found[settled_alpha(needed, start)]
-        return done, {**how, "designs": len(found)}
+        return found[settled_alpha(needed, start)], len(found)
 
     def recorded(self, done: Designed, made: Made, request: RecordRequest, known: Known) -> Made:
-        """The record `made`, or one that keeps the confidence by its own samples.
+        """Return the record `made`, or one that keeps the confidence by its own samples.
 
         A record distributes its information otherwise than the design, so that it may need a larger alpha.
 
         Args:
-            known: the information (k, k) of a record; None where it leaves a parameter undetermined.
+            known: the information (k, k) of a record; None if it leaves a parameter undetermined.
         """
         design, alpha, sets = done.design, done.confidence.alpha, 1
         for _ in range(_RECORDS):
@@ -114,8 +112,8 @@ class ExactConfidence:
                 return made
             needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED) and sets == 1:
-                told = self.of_record(done, made.record, information)
-                if too_few(told, self.calibration.probability):
+                coverage = self.of_record(done, made.record, information)
+                if too_few(coverage, self.calibration.probability):
                     sets = _SETS
                     needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED):
@@ -131,7 +129,7 @@ class ExactConfidence:
         return replace(made, record=replace(made.record, worst_ratio=ratio))
 
     def _needed(self, done: Designed, record: Record, information: Array, sets: int) -> float:
-        """The alpha of these samples, which tell this much (k, k)."""
+        """Return the alpha of a record with this information (k, k)."""
         errors, calibration = bounded_errors(done.problem.requirements), self.calibration
         simulated = self._of_samples(record)
         if simulated is not None:
@@ -139,7 +137,7 @@ class ExactConfidence:
         return calibration.alpha(errors, information)
 
     def of_record(self, done: Designed, record: Record, information: Array) -> Coverage:
-        """How many of fresh estimates keep the bounds with these samples, which tell this much (k, k)."""
+        """Return how many fresh estimates keep the bounds with a record of this information (k, k)."""
         return self._coverage(done, information, self._of_samples(record))
 
     def _coverage(self, done: Designed, information: Array, simulated: SimulatedEstimates | None) -> Coverage:
@@ -149,9 +147,9 @@ class ExactConfidence:
         return coverage if simulated is None else simulated.checked(coverage, errors, within)
 
     def _simulated(self, done: Designed, request: RecordRequest, sets: int) -> SimulatedEstimates | None:
-        """Estimates of records of the designed spectrum; None where they are not asked for, or not made."""
+        """Return estimates of records of the designed spectrum; None if not asked for, or not made."""
         samples = as_long(request, done.experiment)
-        if self.simulator is None or samples is None or not done.design.result.x.any():
+        if self.simulator is None or samples is None or not done.excites:
             return None
         drawn = redrawn(request, done.design, done.experiment.inputs, samples)
         found = self.simulator.of(drawn, samples)

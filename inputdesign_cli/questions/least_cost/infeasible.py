@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, time_for_hints
 from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.outcome.rounding import rounded_up
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.within_limits import Bought, StatedBound, named
-from inputdesign_cli.questions.least_cost.needed_factor import needed_factor
 from inputdesign_cli.spectrum import LinesBasis
 
-_TOLERANCE = 1e-5
+_TOLERANCE, _EXACT = 1e-5, 1e-6
 _ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare
+_STEPS = 30
+_LONGEST_STEP, _MOST = 1e3, 1e9
+_NO_SHARE = 1e-5
 
 
 def explain(
@@ -138,7 +143,8 @@ def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
         least_peak = rounded_up(float(np.sqrt(least)))
         sample = limit.of_samples
         return (
-            f"{needs}, {sample} of {least_peak} at least, but {sample} of {peak:.6g} leaves {limit.bound:.6g}"
+            f"{needs}, so {sample} of {least_peak} at least; the limit, {sample} of {peak:.6g}, allows "
+            f"{limit.bound:.6g}"
         )
     return f"{needs}, limit is {limit.bound:.6g}"
 
@@ -168,3 +174,52 @@ def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError
         "lower min, or raise max",
         where,
     )
+
+
+def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -> float | None:
+    """Return the least factor on these limits together that allows the accuracy; None if none does.
+
+    The multipliers of the limits are the slope of the square of the best ratio: Newton's method, in
+    logarithms, between values that are proved too small and values that are known to do. Information of noise
+    or of a prior does not grow with the powers: the square of the ratio is not the factor.
+    """
+    stated = unreachable.problem.limits
+    bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}
+    places, found = list(bounds), unreachable.nearest
+    low, high, at = 1.0, np.inf, 1.0
+    for _ in range(_STEPS):
+        share = float(found.certificate.limits[places] @ np.array(list(bounds.values()))) * at
+        if found.certificate.bound > 1.0 + _EXACT:
+            low = at
+            if share < _NO_SHARE or low > _MOST:
+                return None
+            step = min(np.log(found.certificate.bound) / share, np.log(_LONGEST_STEP))
+            at = low * float(np.exp(step))
+        elif found.objective < 1.0 - _EXACT:
+            high = at
+        else:
+            return at
+        if high - low <= _EXACT * low:
+            return low
+        if at >= high:
+            at = float(np.sqrt(low * high))
+        problem = _raised(unreachable.problem.on(found.basis), bounds, at)
+        found = exchange(
+            problem,
+            found.x,
+            tolerance=0.3 * _EXACT,
+            interior=_padded(unreachable.within, problem.basis.size),
+            enough=lambda objective, _: objective < 1.0 - 1e-3,
+        )
+    return low if np.isfinite(high) else None
+
+
+def _raised(problem: Problem, bounds: Mapping[int, float], factor: float) -> Problem:
+    limits = list(problem.limits)
+    for index, bound in bounds.items():
+        limits[index] = replace(limits[index], bound=factor * bound)
+    return replace(problem, limits=tuple(limits), finer=None)
+
+
+def _padded(x: Array | None, size: int) -> Array | None:
+    return None if x is None else np.pad(x, (0, size - x.size))

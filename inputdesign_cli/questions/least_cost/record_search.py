@@ -17,6 +17,7 @@ from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.findings.designed_records import other_signal, other_spectrum
 from inputdesign_cli.questions.common.record import (
     Made,
     RecordRequest,
@@ -26,17 +27,15 @@ from inputdesign_cli.questions.common.record import (
     make_record,
     ratio_before,
 )
+from inputdesign_cli.questions.least_cost.no_record import refuse_too_short, too_tight
 from inputdesign_cli.questions.least_cost.shortest_record import (
-    LONG,
     ShortestRecord,
     Way,
     longest_search,
     pilot_length,
     reach,
 )
-from inputdesign_cli.questions.least_cost.too_short import refuse_too_short
-from inputdesign_cli.questions.least_cost.too_tight import too_tight
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal import LONG, Record
 
 # From the design towards the least input power that meets the accuracy, with a little room there.
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
@@ -93,7 +92,7 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
         other = Made(make_record(of, spectrum, samples), of, spectrum, power)
         if other.record is not None and other.record.met:
             if not request.stated_method or of is request:
-                return _told(request, design, other)
+                return _other_record(request, design, other)
             limited = "" if power is None else f" with limits.input_power: {power:.4g}"
             remedy = f"a record of this length does with signal.type: {of.settings.method}{limited}"
             break
@@ -139,23 +138,16 @@ def _of_less_power(question: Question, design: Design) -> Iterator[tuple[float, 
         yield power, solve_design(limited, tolerance=_TOLERANCE)
 
 
-def _told(request: RecordRequest, design: Design, other: Made) -> Made:
-    """Return the other record with its cost relative to the design that was asked for, and a note."""
+def _other_record(request: RecordRequest, design: Design, other: Made) -> Made:
+    """Return the other record with its cost relative to the design that was asked for, and a finding."""
     record = other.record
     assert record is not None
     asked, own = (design_cost(each, request.cost) for each in (design, other.design))
     extra = (1.0 + record.extra_power) * own / asked - 1.0
-    limit = other.input_power
-    spectrum = (
-        "that spectrum" if limit is None else f"another spectrum, that of limits.input_power: {limit:.4g}"
-    )
-    asked_for = "cheapest" if design.problem.goal == "cost" else "designed"
-    kind, limits = _WORDS.get(record.method, record.method), " and ".join(request.limit_keys)
-    note = (
-        f"no record of {_words(request)} with the {asked_for} spectrum was found that meets the accuracy "
-        f"within {limits}; the record is {kind} with {spectrum}"
-    )
-    return replace(other, record=replace(record, extra_power=extra), notes=(note,))
+    kind = _WORDS.get(record.method, record.method)
+    goal, power = design.problem.goal, other.input_power
+    found = other_spectrum(_words(request), kind, request.limit_keys, power, goal)
+    return replace(other, record=replace(record, extra_power=extra), findings=(found,))
 
 
 def _words(request: RecordRequest) -> str:
@@ -188,7 +180,7 @@ def _longer(
     found = search.search(misses, samples) if sought else None
     if found is not None:
         other = found.request.settings.method != request.settings.method
-        return replace(found, notes=(f"the record is {_words(found.request)}",) if other else ())
+        return replace(found, findings=(other_signal(_words(found.request)),) if other else ())
     longer, ended = None, False
     if allowed is not None:
         search.longest = longest

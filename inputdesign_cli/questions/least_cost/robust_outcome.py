@@ -1,23 +1,36 @@
-"""`robust` of the result: what the design keeps at the plants that were drawn, and at others like them."""
+"""`robust` of the outcome: what the design keeps at the plants that were drawn, and at others like them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import cycle, islice
 
 import numpy as np
 
+from inputdesign_cli.accuracy import OnModelError, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError, what_ended
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.uncertain_plants import fewer_plants, floor_findings, unstable_draws
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
-from inputdesign_cli.outcome.curves import Curves
-from inputdesign_cli.outcome.results import Json, Table
+from inputdesign_cli.outcome import Robust
+from inputdesign_cli.outcome.curves import Curves, FanCurves
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.robust import (
+    ActivePlant,
+    BeyondLimits,
+    DearestPlant,
+    DrawnEstimates,
+    FreshPlants,
+    Risk,
+    SearchedPlant,
+)
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.robust import (
     CONFIDENCE,
@@ -25,32 +38,32 @@ from inputdesign_cli.questions.common.robust import (
     Batch,
     Kept,
     Plants,
-    Searched,
     Tried,
+    delivered,
     estimate_from,
     kept_by,
     tried_on,
 )
-from inputdesign_cli.questions.least_cost.fan import fan_curves
-from inputdesign_cli.questions.least_cost.floor import Floor, floor_at, floor_entry, floor_notes, floor_of
+from inputdesign_cli.questions.common.spectrum import axis
+from inputdesign_cli.questions.least_cost.floor import Floor, floor_at, floor_of, floor_use
 from inputdesign_cli.questions.least_cost.outcome import Designed, costs_of
 
 # A plant binds when it keeps all but this share of what is admitted.
 _BINDS = 1e-5
 _LISTED = 12
-# Estimates that are foreseen, and the part of them that is told.
+# Estimates that are foreseen, and the share of them that counts.
 _ESTIMATES, _MOST_OF_THEM = 100, 0.95
-_FEWER = "{} ended the trial on fresh plants after {} of {} (uncertainty.fresh)"
+_GRID_POINTS = 300
 
 
 @dataclass(frozen=True)
 class RobustResult:
-    """`robust` of the result, with its tables and curves by the names of their files, and what to note."""
+    """`robust` of the outcome, with its tables and curves by the names of their files, and findings."""
 
-    entry: dict[str, Json]
+    entry: Robust
     tables: dict[str, Table]
-    curves: dict[str, Curves]
-    notes: tuple[str, ...]
+    curves: dict[str, Curves] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
 
 Peak = Callable[[Experiment], float]
@@ -58,154 +71,149 @@ Peak = Callable[[Experiment], float]
 
 
 def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> RobustResult:
-    """What the result says of the plants that were drawn, as far as the design is for them.
+    """Return what a design keeps at the plants that it is for.
 
     Args:
-        peak: None where no limit on single samples depends on the plant.
+        done: the design.
+        plants: all beside the plant of the spec.
+        peak: None if no limit on single samples depends on the plant.
     """
-    kept = done.kept
-    units = done.units
+    kept, units = done.kept, done.units
     at_each = kept_by(done.problem, done.design, done.experiment.samples)
-    shares = np.array([one.share for one in at_each])
     numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
-    binding = _binding(done, shares)
-    support = [place for place in binding if place > 0]
-    entry = plants_entry(units, plants, numbers, at_each, binding) | {"support": len(support)}
+    binding = _binding(done, np.array([one.share for one in at_each]))
+    support = sum(place > 0 for place in binding)
+    floors = [floor_at((*one.requirements, *one.side)) for one in done.problem.scenarios[1:]]
+    found = plants_kept(units, plants, kept, at_each, binding, floors)
+    entry = replace(found.entry, support=support)
     dearest_counts = plants.paid == "worst" and done.problem.goal == "cost"
     if dearest_counts:
         costs = costs_of(done, done.design.result.basis, done.design.result.x)
         dearest = int(np.argmax(costs))
-        entry["dearest"] = {"scenario": numbers[dearest], "cost": costs[dearest]}
-    floors = [floor_at((*one.requirements, *one.side)) for one in done.problem.scenarios[1:]]
-    found, notes = floors_and_search(units, plants, kept, floors)
-    entry |= found
+        entry = replace(entry, dearest=DearestPlant(numbers[dearest], costs[dearest]))
     if plants.afresh is not None:
-        entry |= _risk(plants, len(support), len(kept))
+        entry = replace(entry, risk=_risk(plants, support, len(kept)))
         promised = done.design.result.objective if dearest_counts else None
         tried = partial(tried_on, done.design, done.experiment.samples)
-        fresh, fewer = fresh_entry(plants, plants.afresh(), tried, peak, promised)
-        entry |= fresh | _estimates(done, plants, binding)
-        notes += fewer
-    tables, curves = {"scenarios": scenario_table(units, plants, numbers, at_each)}, dict[str, Curves]()
-    fan = fan_curves(done, numbers, binding)
-    if fan is not None and done.design.result.x.any():
-        tables["fan"], curves["fan"] = fan
-    return RobustResult(entry, tables, curves, notes)
-
-
-def plants_entry(
-    units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept], binding: Sequence[int]
-) -> dict[str, Json]:
-    """Return where the plants come from, how many count, and the worst of them.
-
-    Args:
-        units: of the spec.
-        plants: all beside the nominal one.
-        numbers: of those that count, the nominal one being 0.
-        at_each: what each of these keeps.
-        binding: places among them.
-    """
-    worst = int(np.argmax([one.share for one in at_each]))
-    return {
-        "source": plants.source,
-        "scenarios": len(plants.batch.plants),
-        "rejected": plants.batch.rejected,
-        "discarded": len(plants.batch.plants) + 1 - len(numbers),
-        "r_adm": plants.r_adm,
-        "cost": plants.paid,
-        "worst_share": at_each[worst].share,
-        "worst_scenario": numbers[worst],
-        "active": [_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]],
-    }
-
-
-def floors_and_search(
-    units: Units, plants: Plants, kept: Sequence[int], floors: Sequence[Floor]
-) -> tuple[dict[str, Json], tuple[str, ...]]:
-    """Return `floor` and `searched`, and the notes on floors and on plants that are none.
-
-    Args:
-        units: of the spec.
-        plants: all beside the nominal one.
-        kept: the numbers of those that count.
-        floors: of these.
-    """
-    numbers = [number + 1 for number in kept]
-    floored = floor_entry(floors, numbers, plants.names, plants.batch.thetas[list(kept)])
-    entry: dict[str, Json] = {"floor": floored} if floored else {}
-    if plants.searched is not None:
-        entry["searched"] = _searched(units, plants, plants.searched)
-    return entry, (*_unstable(plants.batch), *floor_notes(floored, len(kept)))
-
-
-def _unstable(batch: Batch) -> tuple[str, ...]:
-    """A note where most of what the plant is said to be is no plant that could be in operation."""
-    drawn = len(batch.plants) + batch.rejected
-    if 2 * batch.rejected <= drawn:
-        return ()
-    return (
-        f"{batch.rejected} of {drawn} draws were unstable, or no plants, and were drawn again: what is said "
-        "of the plants is said of the others alone; state what the plant can be in operation (uncertainty), "
-        "or check the controller",
+        fresh = fresh_plants(plants, plants.afresh(), tried, peak, promised)
+        entry = replace(entry, fresh=fresh, estimates=_estimates(done, plants, binding))
+    fan = fan_curves(done, numbers, binding) if done.excites else None
+    return RobustResult(
+        entry,
+        found.tables if fan is None else found.tables | {"fan": fan[0]},
+        {} if fan is None else {"fan": fan[1]},
+        (*found.findings, *fresh_findings(plants, entry.fresh)),
     )
 
 
+def plants_kept(
+    units: Units,
+    plants: Plants,
+    kept: Sequence[int],
+    at_each: Sequence[Kept],
+    binding: Sequence[int],
+    floors: Sequence[Floor],
+) -> RobustResult:
+    """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
+
+    Args:
+        units: of the spec.
+        plants: all beside the plant of the spec.
+        kept: the numbers of those that count.
+        at_each: what these keep, the plant of the spec first.
+        binding: places among them.
+        floors: of those that count.
+    """
+    numbers = [0, *(number + 1 for number in kept)]
+    worst = int(np.argmax([one.share for one in at_each]))
+    floor = floor_use(floors, numbers[1:], plants.names, plants.batch.thetas[list(kept)])
+    batch = plants.batch
+    entry = Robust(
+        source=plants.source,
+        scenarios=len(batch.plants),
+        rejected=batch.rejected,
+        discarded=len(batch.plants) - len(kept),
+        r_adm=plants.r_adm,
+        cost=plants.paid,
+        worst_share=at_each[worst].share,
+        worst_scenario=numbers[worst],
+        active=tuple(_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]),
+        floor=floor,
+        searched=_searched(units, plants),
+    )
+    findings = unstable_draws(batch.rejected, len(batch.plants) + batch.rejected)
+    findings += floor_findings(floor, len(kept))
+    table = _scenario_table(units, plants, numbers, at_each)
+    return RobustResult(entry, {"scenarios": table}, findings=tuple(findings))
+
+
 def _binding(done: Designed, shares: Array) -> list[int]:
-    """The plants that bind, those of the largest multipliers first."""
+    """Return the plants that bind, the largest multipliers first."""
     weight = done.design.result.certificate.shares
     order = np.lexsort((-shares, -weight))
     taking_part = (weight > _BINDS) | (shares >= 1.0 - _BINDS)
     return [place for place in order.tolist() if taking_part[place]]
 
 
-def _active(units: Units, plants: Plants, number: int, kept: Kept) -> dict[str, Json]:
-    item: dict[str, Json] = {"scenario": number, "share": kept.share}
-    if kept.frequency is not None:
-        item["frequency"] = kept.frequency / units.frequency
-    if number > 0:
-        item["parameters"] = dict(zip(plants.names, plants.batch.thetas[number - 1].tolist(), strict=True))
-    return item
+def _named(plants: Plants, theta: Array) -> dict[str, float]:
+    return dict(zip(plants.names, theta.tolist(), strict=True))
 
 
-def _searched(units: Units, plants: Plants, found: Searched) -> dict[str, Json]:
-    """The worst plant that was found, which is no proof that there is no worse one."""
-    entry: dict[str, Json] = {"proved": False, "region": found.region, "share": found.kept.share}
-    if found.kept.frequency is not None:
-        entry["frequency"] = found.kept.frequency / units.frequency
-    entry["parameters"] = dict(zip(plants.names, found.theta.tolist(), strict=True))
+def _at(units: Units, kept: Kept) -> float | None:
+    return None if kept.frequency is None else kept.frequency / units.frequency
+
+
+def _active(units: Units, plants: Plants, number: int, kept: Kept) -> ActivePlant:
+    named = _named(plants, plants.batch.thetas[number - 1]) if number > 0 else None
+    return ActivePlant(number, kept.share, _at(units, kept), named)
+
+
+def _searched(units: Units, plants: Plants) -> SearchedPlant | None:
+    """Return the worst plant that was found, which is no proof that there is no worse one."""
+    found = plants.searched
+    if found is None:
+        return None
     plant = None if plants.at is None else plants.at(found.theta)
-    if plant is not None and (floor := floor_of(plant)).lost:
-        entry |= {"lost": True} | ({} if floor.peak is None else {"peak": floor.peak})
-    return entry | {"added": found.added, "tried": found.tried}
+    floor = None if plant is None else floor_of(plant)
+    lost = floor is not None and floor.lost
+    return SearchedPlant(
+        proved=False,
+        region=found.region,
+        share=found.kept.share,
+        parameters=_named(plants, found.theta),
+        added=found.added,
+        tried=found.tried,
+        frequency=_at(units, found.kept),
+        lost=lost or None,
+        peak=floor.peak if lost and floor is not None else None,
+    )
 
 
-def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
-    """Shares of plants that may be missed.
+def _risk(plants: Plants, support: int, kept: int) -> Risk | None:
+    """Return shares of plants that may be missed.
 
-    Where some were left out, or sought, the theory is silent, and fresh draws count.
+    If some were left out, or searched, the theory is silent, and fresh draws count.
     """
     drawn = len(plants.batch.plants)
     if kept < drawn or (plants.searched is not None and plants.searched.added):
-        return {}
+        return None
     beta = 1.0 - CONFIDENCE
-    risk: dict[str, Json] = {"confidence": CONFIDENCE, "after": risk_after(drawn, beta, support)}
-    if plants.unknowns is not None:
-        risk["before"] = risk_before(drawn, beta, plants.unknowns)
-    return {"risk": risk}
+    before = None if plants.unknowns is None else risk_before(drawn, beta, plants.unknowns)
+    return Risk(CONFIDENCE, risk_after(drawn, beta, support), before)
 
 
-def fresh_entry(
+def fresh_plants(
     plants: Plants,
     afresh: Iterator[Batch],
     try_on: Callable[[Batch, float], Sequence[Tried]],
     peak: Peak | None = None,
     promised: float | None = None,
-) -> tuple[dict[str, Json], tuple[str, ...]]:
-    """Return how many of other plants from the same distribution are missed, as many as there is time for.
+) -> FreshPlants | None:
+    """Return how many of other plants from the same distribution are missed; None if there is no time.
 
     Args:
-        plants: those that count.
-        afresh: the others.
+        plants: that count.
+        afresh: the others; as many are tried as there is time for.
         try_on: what they keep; a share up to the number may be returned as 0.
         peak: see `robust_result`.
         promised: the cost that a design promises at every plant.
@@ -222,75 +230,103 @@ def fresh_entry(
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
-    fewer = () if len(tried) >= plants.fresh else (_FEWER.format(what_ended(), len(tried), plants.fresh),)
     if not tried:
-        return {}, fewer
-    shares = np.array([one.share for one in tried])
+        return None
+    less = np.array([one.share for one in tried]) > MET
     dearer = np.array([promised is not None and one.cost > MET * promised for one in tried])
-    less = shares > MET
     missed = int(np.sum(less | dearer))
-    entry: dict[str, Json] = {
-        "draws": len(tried),
-        "rejected": rejected,
-        "missed": missed,
-        "share": missed / len(tried),
-        "limits": list(binomial_limits(missed, len(tried))),
-        "largest": largest,
-    }
-    for name, count in (
-        ("raised", sum(floor.raised for floor in floors)),
-        ("lost", sum(floor.lost for floor in floors)),
-    ):
-        if count:
-            entry[name] = count
-    if peaks:
-        entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
-    if promised is not None:
-        entry |= {"less": int(np.sum(less)), "dearer": int(np.sum(dearer))}
-    return {"fresh": entry}, fewer
+    return FreshPlants(
+        draws=len(tried),
+        rejected=rejected,
+        missed=missed,
+        share=missed / len(tried),
+        limits=binomial_limits(missed, len(tried)),
+        largest=largest,
+        raised=sum(floor.raised for floor in floors) or None,
+        lost=sum(floor.lost for floor in floors) or None,
+        beyond_limits=BeyondLimits(sum(one > MET for one in peaks), max(peaks)) if peaks else None,
+        less=None if promised is None else int(np.sum(less)),
+        dearer=None if promised is None else int(np.sum(dearer)),
+    )
 
 
-def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> dict[str, Json]:
-    """How near the best accuracy comes to being missed where the data will tell the plant to be.
+def fresh_findings(plants: Plants, fresh: FreshPlants | None) -> list[Finding]:
+    """Return a finding if fewer fresh plants were tried than were asked for."""
+    return [] if plants.afresh is None else fewer_plants(0 if fresh is None else fresh.draws, plants.fresh)
 
-    Data are judged at their estimate: some are drawn of the plants that bind.
+
+def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnEstimates | None:
+    """Return how near the best accuracy comes to being missed at estimates of the plants that bind.
+
+    Data are judged at their estimate, so that some are drawn.
 
     Args:
-        binding: places among those that are kept, the nominal plant being 0.
+        done: the design.
+        plants: that it is for.
+        binding: places among those that are kept, the plant of the spec being 0.
     """
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
-        return {}
+        return None
     rng, samples, shares = np.random.default_rng(0), done.experiment.samples, list[float]()
     try:
         for plant in islice(cycle(worst), _ESTIMATES):
             theta = estimate_from(done.design, samples, plant, rng)
-            told = None if theta is None else plants.at(theta)
-            if theta is None or told is None:
+            estimated = None if theta is None else plants.at(theta)
+            if theta is None or estimated is None:
                 shares.append(np.inf)
-            else:
-                shares += [
-                    one.kept.share for one in tried_on(done.design, samples, Batch(theta[None], (told,), 1))
-                ]
-    except IdesignError:  # no time is left, or what is asked cannot be asked of such a plant
-        return {}
+                continue
+            tried = tried_on(done.design, samples, Batch(theta[None], (estimated,), 1))
+            shares += [one.kept.share for one in tried]
+    except IdesignError:  # no time is left, or what is asked cannot be asked of this plant
+        return None
     highest = float(np.quantile(shares, _MOST_OF_THEM, method="higher"))
-    if not np.isfinite(highest):
-        return {}
-    return {"estimates": {"draws": len(shares), "confidence": _MOST_OF_THEM, "largest": highest}}
+    return DrawnEstimates(len(shares), _MOST_OF_THEM, highest) if np.isfinite(highest) else None
 
 
-def scenario_table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
+def _scenario_table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
     """Return scenarios.csv: the plants that count, with their parameters."""
-    thetas = plants.batch.thetas
-    where = [np.nan if one.frequency is None else one.frequency / units.frequency for one in at_each]
     listed = [place for place, number in enumerate(numbers) if number > 0]
     columns: dict[str, Array] = {
         "scenario": np.array([numbers[place] for place in listed], dtype=float),
         "share": np.array([at_each[place].share for place in listed]),
     }
-    if not np.any(np.isnan([where[place] for place in listed])):
-        columns[units.frequency_header] = np.array([where[place] for place in listed])
-    chosen = thetas[[numbers[place] - 1 for place in listed]]
-    columns |= dict(zip(plants.names, chosen.T, strict=True))
-    return Table(columns)
+    where = np.array([_at(units, at_each[place]) for place in listed], dtype=float)
+    if not np.any(np.isnan(where)):
+        columns[units.frequency_header] = where
+    chosen = plants.batch.thetas[[numbers[place] - 1 for place in listed]]
+    return Table(columns | dict(zip(plants.names, chosen.T, strict=True)))
+
+
+def fan_curves(
+    done: Designed, numbers: Sequence[int], active: Sequence[int]
+) -> tuple[Table, FanCurves] | None:
+    """Return fan.csv and its figure: r_u / r_adm at the plant of the spec, the largest, and at active ones.
+
+    None if no model error is bounded.
+
+    Args:
+        done: the design.
+        numbers: what the scenarios are called, in their order; the plant of the spec is 0.
+        active: the places of those that bind, in that order.
+    """
+    problem, units = done.problem, done.units
+    bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]
+    if not bounded[0]:
+        return None
+    peaks = done.design.result.active_frequencies
+    grid = np.unique(np.concatenate([error.grid for error in bounded[0]]))
+    lo, hi = bounded[0][0].band
+    w = axis(lo, hi, np.concatenate([np.clip(peaks, lo, hi), grid[:: max(grid.size // _GRID_POINTS, 1)]]))
+    informations = delivered(problem, done.design, done.experiment.samples)
+    ratios = np.array([_largest(errors, M, w) for errors, M in zip(bounded, informations, strict=True)])
+    named = {f"plant {numbers[place]}": ratios[place] for place in active if place > 0}
+    frequency = w / units.frequency
+    columns = {units.frequency_header: frequency, "nominal": ratios[0], "largest": ratios.max(axis=0)}
+    columns |= {name.replace(" ", "_"): values for name, values in named.items()}
+    return Table(columns), FanCurves(frequency, ratios[1:], ratios[0], named)
+
+
+def _largest(errors: Sequence[OnModelError], information: Array, w: Array) -> Array:
+    """Return (n,): the largest ratio of several entries of G."""
+    return np.max([error.ratios(information, w) for error in errors], axis=0)

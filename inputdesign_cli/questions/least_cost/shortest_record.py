@@ -11,7 +11,7 @@ import scipy
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.questions.common.record import Made
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal import LONG, Record
 
 # Lengths that are looked into: times the one that was asked for, or that many samples.
 _LONGEST, _AT_LEAST = 64, 20_000
@@ -26,9 +26,8 @@ _FALLS = 0.9  # of what seemed to be needed before
 _BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
 # A way that missed nearby, and by so much, is not tried: other phases change a ratio by less as a rule.
 _NEARBY, _HOPELESS, _HOPELESS_LONG = 1.2, 1.15, 1.01
-# A record of more samples takes seconds to make. Its ratio follows from that of a pilot, a record of a share
-# of its samples with at least the fewest: information grows with the length, and luck averages out.
-LONG = 2000
+# A long record takes seconds to make. Its ratio follows from that of a pilot, a record of a share of its
+# samples with at least the fewest: information grows with the length, and luck averages out.
 _PILOT, _FEWEST = 16, 1000
 _MARGIN = 1.005
 # Whether a record meets is a matter of luck near the shortest: so far below one that does all are tried.

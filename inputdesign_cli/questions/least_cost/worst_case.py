@@ -17,17 +17,17 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.question import Alternative, Question
-from inputdesign_cli.outcome.results import Json
-from inputdesign_cli.questions.common.region import Region
 from inputdesign_cli.questions.common.robust import (
     Batch,
     Kept,
     Plants,
+    Region,
     Searched,
     delivered_samples,
     kept_by,
     tried_on,
 )
+from inputdesign_cli.questions.least_cost.outcome import Answer
 
 # Steps towards the farthest point, of a difference, and of an ascent at most.
 _LENGTHS, _DIFFERENCE, _STEPS = (1.0, 0.5, 0.25, 0.1, 0.03), 0.01, 15
@@ -117,32 +117,32 @@ def _kept_at(design: Design, samples: int, theta: Array, plant: Alternative) -> 
     return tried.kept
 
 
-Solve = Callable[[Question], tuple[Design, dict[str, Json]]]
-
-
 def with_worst_plants(
-    plants: Plants, region: Region, question: Question, first: tuple[Design, dict[str, Json]], solve: Solve
-) -> tuple[Plants, Question, tuple[Design, dict[str, Json]]]:
-    """The design for the worst plants of the region as well, added until none is found to be missed.
+    plants: Plants, region: Region, question: Question, first: Answer, solve: Callable[[Question], Answer]
+) -> tuple[Plants, Question, Answer]:
+    """Return the design for the worst plants of the region as well, added until none is found to be missed.
 
     Args:
+        plants: that the design is for.
+        region: where worse ones are searched.
+        question: that the design answers.
         first: the design so far.
         solve: makes another.
     """
-    solved, added = first, 0
+    answer, added = first, 0
     while True:
-        design = solved[0]
+        design = answer.design
         samples = delivered_samples(design)
         kept = kept_by(design.problem.on(design.result.basis), design, samples)
         nominal = question.experiment.model.theta
         shares = np.array([one.share for one in kept[1:]])
         thetas = [nominal, *plants.batch.thetas[np.argsort(-shares, kind="stable")]]
         found = worst_plant(region, partial(_kept_at, design, samples), thetas)
-        told = Searched(region.name, found.theta, found.kept, found.tried, added)
         if found.kept.share <= _NEARLY or added == _MOST_ADDED:
-            return replace(plants, searched=told), question, solved
+            searched = Searched(region.name, found.theta, found.kept, found.tried, added)
+            return replace(plants, searched=searched), question, answer
         batch, added = plants.batch, added + 1
         thetas_now = np.concatenate([batch.thetas, found.theta[None]])
         plants = replace(plants, batch=Batch(thetas_now, (*batch.plants, found.plant), batch.drawn + 1))
         question = replace(question, others=[*question.others, found.plant])
-        solved = solve(question)
+        answer = solve(question)

@@ -22,7 +22,7 @@ spectrum: {type: fir, order: 2}
 def asked(gain, deviation):
     """The input in a unit of its own; what is known of c1 and f1 hangs together."""
     text = COLOURED % (gain, 50.0 / gain**2, 50.0, deviation)
-    return build_convex(parse_spec(text)).question
+    return build_convex(parse_spec(text)).asked.question
 
 
 @pytest.mark.parametrize("gain", [1e-6, 1.0, 1e6])

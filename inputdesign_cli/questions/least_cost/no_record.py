@@ -1,4 +1,4 @@
-"""That no record was found within the limits on single samples: how near one came, and what would do."""
+"""No record was found that meets the accuracy: how near one came, and what would do."""
 
 from __future__ import annotations
 
@@ -7,8 +7,40 @@ from collections.abc import Mapping
 import numpy as np
 
 from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.signal import Record
+
+# The cost beyond that of the design, relative to it, from which on a record has nothing to do with it.
+_HOPELESS = 1e3
+# The share of the record from which on the dead time is the reason.
+_SHARE = 0.8
+
+
+def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:
+    """Raise `InfeasibleError` (`record-too-short`) if dead times take nearly all of a record.
+
+    Args:
+        request: what was asked of the record.
+        experiment: the one that was designed.
+        record: the best that was found.
+    """
+    size = len(record.samples)
+    late = experiment.memory > _SHARE * size * request.step
+    undetermined = not np.isfinite(record.worst_ratio)
+    if not (request.meets and late and (undetermined or record.extra_power > _HOPELESS)):
+        return
+    message = (
+        f"no record of {size} samples determines all parameters: the dead time takes too many of them"
+        if undetermined
+        else f"a record of {size} samples that meets the accuracy would cost {1.0 + record.extra_power:.2g} "
+        "times what the designed spectrum does: the dead time takes too much of it, and most of what it "
+        "causes comes after its last sample"
+    )
+    key = "experiment.samples" if request.samples is None else "signal.samples"
+    section = key.partition(".")[0]
+    hint = f"take more samples, {request.units.length(2 * size, section)} or more; or look at time_unit"
+    raise InfeasibleError.because("record-too-short", message, hint, key)
 
 
 def too_tight(
@@ -24,18 +56,19 @@ def too_tight(
     longest_tried: int,
     ended: bool = False,
 ) -> InfeasibleError:
-    """The error `limits-too-tight`.
+    """Return the error `limits-too-tight`.
 
     Args:
+        request: what was asked of the record.
         missed: the best record of the length that was asked for.
-        longer: one that would do, where one was found.
-        most_samples: the longest experiment, where one is looked for.
-        tried: spectra by kind of signal, besides.
+        longer: one that would do, if one was found.
+        most_samples: the longest experiment, if the shortest is looked for.
+        tried: the number of other spectra by kind of signal.
         remedy: what else would do.
         needed: samples that would do were information in proportion to them.
         searched: the longest that was looked for.
         longest_tried: the longest that was tried.
-        ended: whether the search for longer ones ended for its time.
+        ended: whether the time was over before longer ones were tried.
     """
     names = " and ".join(request.limit_keys)
     size = len(missed.samples)

@@ -1,0 +1,211 @@
+"""What a user should know before applying the record of a design or of a given spectrum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.outcome.shares import per_cent
+from inputdesign_cli.signal import Record
+
+_FALLS_SHORT = 5e-3
+_DEAR = 1.0  # beyond the cost of the design, relative to it
+
+RECORD_TOO_LONG = FindingKind(
+    "record-not-computed",
+    Severity.NOTE,
+    "no record this long is computed",
+    "The experiment has more samples than the longest record that is computed for this model.",
+    "Set a shorter record by `signal.samples`.",
+)
+RECORD_UNDETERMINED = FindingKind(
+    "record-undetermined",
+    Severity.DOUBT,
+    "the record does not determine all parameters",
+    "To working precision the samples do not tell all parameters apart. Their accuracy cannot be computed.",
+    "Take more samples (`signal.samples`), or a model of lower order.",
+)
+RECORD_MISSES = FindingKind(
+    "record-misses-accuracy",
+    Severity.DOUBT,
+    "the record misses the accuracy",
+    "The largest ratio of r_u to r_adm by the samples of the record exceeds one.",
+    "Take more samples, or allow more power.",
+)
+RECORD_DEAR = FindingKind(
+    "record-dear",
+    Severity.DOUBT,
+    "the record costs far more than the spectrum",
+    "A record that is short beside dead times and time constants loses what it causes after its last sample.",
+    "Take more samples.",
+)
+RECORD_LONGER = FindingKind(
+    "record-longer",
+    Severity.NOTE,
+    "limits on single samples take a longer record",
+    "The spectrum alone would take fewer samples. The length was found by trying; it is not proved.",
+    "Nothing, or widen the limit on single samples that the record takes most of.",
+)
+RECORD_LESS_ACCURATE = FindingKind(
+    "record-less-accurate",
+    Severity.NOTE,
+    "the record reaches less than the design",
+    "The accuracy of the design is that of its spectrum. The samples reach less by their length or by limits "
+    "on single samples.",
+    "Take more samples, or more candidates (`signal.candidates`).",
+)
+RECORD_MISSES_SIDE = FindingKind(
+    "record-misses-requirement",
+    Severity.DOUBT,
+    "the record misses a requirement that the design meets",
+    "The samples of the record miss a requirement beside the accuracy that is sought.",
+    "Take more samples, or loosen the requirement.",
+)
+START_MATTERS = FindingKind(
+    "start-from-rest",
+    Severity.DOUBT,
+    "the record relies on its start from rest",
+    "The errors of the record would be larger if its start were unknown. Spectra have no start.",
+    "Keep the plant at rest before the record, and take inputs and outputs from their levels there.",
+)
+OTHER_SIGNAL = FindingKind(
+    "other-signal",
+    Severity.NOTE,
+    "the record is of another kind or spectrum than was asked for",
+    "No record of the first choice was found that meets the accuracy within the limits on single samples.",
+    "Nothing, or state `signal.type`.",
+)
+
+
+def too_long(samples: int, longest: int) -> list[Finding]:
+    """Return a finding if a record has more samples than any that is computed."""
+    if samples <= longest:
+        return []
+    message = (
+        f"there is no record: it would have {samples} samples, and at most {longest} are computed for this "
+        "model; signal.samples sets a shorter one"
+    )
+    return [RECORD_TOO_LONG.found(message, where="signal.samples", samples=samples, longest=longest)]
+
+
+def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
+    """Return a finding if a record misses the accuracy.
+
+    Args:
+        held: whether limits, a level or the length hold its power down.
+    """
+    if record.met:
+        return []
+    if not np.isfinite(record.worst_ratio):
+        message = (
+            "the record does not tell all parameters apart to working precision: its accuracy cannot be "
+            "computed; take more samples (signal.samples), or a model of lower order"
+        )
+        return [RECORD_UNDETERMINED.found(message, where="signal.samples")]
+    why = (
+        "the limits on the powers, the level asked for or its length leave no room: a little more power or a "
+        "few more samples would do"
+        if held
+        else "no level of it would do, since too little of what it causes comes before its last sample: take "
+        "more samples"
+    )
+    message = f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; {why}"
+    return [RECORD_MISSES.found(message, where="signal", worst_ratio=record.worst_ratio)]
+
+
+def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str, float]) -> list[Finding]:
+    """Return a finding if a record is longer than was asked for, or dear for want of samples.
+
+    Args:
+        record: as it was made.
+        asked: its samples by the spec, or by the spectrum.
+        block: lengths are multiples of this.
+        shares: of each limit on single samples that it takes.
+    """
+    size = len(record.samples)
+    if record.method == "given":
+        return []
+    if size > asked + block:
+        nearest = max(shares, key=lambda name: shares[name], default=None)
+        share = f"; the record takes {100 * shares[nearest]:.3g} % of limits.{nearest}" if nearest else ""
+        message = (
+            f"within the limits on single samples {size} samples are the shortest record that was found, by "
+            f"trying, to one per cent; the spectrum alone would take {asked}{share}"
+        )
+        return [RECORD_LONGER.found(message, where="signal", samples=size, of_spectrum=asked)]
+    if record.extra_power <= _DEAR:
+        return []
+    message = (
+        f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its {size} "
+        "samples are few beside the dead times and time constants of the plant; much of what they cause "
+        "comes after the last one; take more samples"
+    )
+    return [RECORD_DEAR.found(message, where="signal.samples", times=1.0 + record.extra_power)]
+
+
+def less_accurate(reached: float, designed: float) -> list[Finding]:
+    """Return a finding if a record reaches a larger multiple of the admissible error than its design."""
+    more = reached / designed - 1.0
+    if more <= _FALLS_SHORT:
+        return []
+    message = (
+        f"the record reaches {reached:.4g} times the admissible error, the design {designed:.4g}: "
+        f"{per_cent(more)} more, by its length or by the limits on single samples"
+    )
+    return [RECORD_LESS_ACCURATE.found(message, where="signal", reached=reached, designed=designed)]
+
+
+def requirement_missed(names: Sequence[str], ratio: float) -> list[Finding]:
+    """Return a finding if a record misses requirements that its design meets; `ratio` is the worst."""
+    if ratio <= 1.0 + _FALLS_SHORT:
+        return []
+    message = (
+        f"the record misses {' and '.join(names)}, which the design meets: its worst ratio is {ratio:.4g}"
+    )
+    return [RECORD_MISSES_SIDE.found(message, where="signal", worst_ratio=ratio)]
+
+
+def start_matters(growth: float) -> Finding:
+    """Return the finding that errors grow by this factor where the start of a record is unknown."""
+    errors = (
+        f"its errors would be {growth:.3g} times as large"
+        if np.isfinite(growth)
+        else "it would not determine all parameters"
+    )
+    return START_MATTERS.found(
+        "the record relies on its start from rest, which spectra and the bounds on them do not know: begun "
+        f"in an unknown state about unknown levels {errors}; keep the plant at rest before the record "
+        "begins, and take inputs and outputs from their levels there",
+        where="signal",
+        growth=growth if np.isfinite(growth) else None,
+    )
+
+
+def other_signal(kind: str) -> Finding:
+    """Return the finding that a record is of another kind than the first choice."""
+    return OTHER_SIGNAL.found(f"the record is {kind}", where="signal.type", kind=kind)
+
+
+def other_spectrum(asked: str, kind: str, limits: Sequence[str], power: float | None, goal: str) -> Finding:
+    """Return the finding that another record stands in for one that was not found.
+
+    Args:
+        asked: the kind of signal that was asked for; `kind`: that of the record.
+        kind: see there.
+        limits: the keys that the record keeps.
+        power: the limit on the input power that gives its spectrum; None if that is the designed one.
+        goal: of the design.
+    """
+    spectrum = (
+        "that spectrum" if power is None else f"another spectrum, that of limits.input_power: {power:.4g}"
+    )
+    designed = "cheapest" if goal == "cost" else "designed"
+    return OTHER_SIGNAL.found(
+        f"no record of {asked} with the {designed} spectrum was found that meets the accuracy within "
+        f"{' and '.join(limits)}; the record is {kind} with {spectrum}",
+        where="signal.type",
+        kind=kind,
+        input_power=power,
+    )

@@ -1,0 +1,146 @@
+"""What a user should know of a design before a number of it is trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from inputdesign_cli.accuracy import Requirement, model_errors
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.outcome.units import Units
+
+_ROUNDING = 1e-9
+# An input with less than this share of the power has none.
+_NOTHING = 1e-9
+# Time constants that an experiment has at least, for its spectrum to say what it reaches.
+_SETTLED = 2.0
+# Below this share of its largest price, power at a frequency is called free of charge.
+_FREE = 1e-3
+_SUPPORT = 1e-3
+
+NOTHING_NEEDED = FindingKind(
+    "no-excitation-needed",
+    Severity.NOTE,
+    "no excitation is needed",
+    "The noise in normal operation, or what is known before, meets the accuracy that is asked for.",
+    "Estimate the model from a record of normal operation, or ask for more accuracy.",
+)
+INPUT_WITHOUT_POWER = FindingKind(
+    "input-without-power",
+    Severity.DOUBT,
+    "the design does not excite an input",
+    "Criterion T adds up the information of all parameters. It can be largest where an input has no power.",
+    "Take criterion D, A or E, which ask for every parameter.",
+)
+EXPERIMENT_SHORT = FindingKind(
+    "experiment-short",
+    Severity.DOUBT,
+    "the experiment ends before the slowest mode settles",
+    "The accuracy of a spectrum is that of long records. A short record may reach less or more.",
+    "Compare with what the record reaches by its own samples, and run `idesign simulate`.",
+)
+SIGN_OPEN = FindingKind(
+    "error-as-large-as-plant",
+    Severity.DOUBT,
+    "the admissible error is as large as the plant",
+    "The admissible error is not below the gain of the plant at any frequency of its band.",
+    "Ask for less error. A `relative` error of 0.1 means 10 %.",
+)
+EXCITATION_FREE = FindingKind(
+    "excitation-almost-free",
+    Severity.NOTE,
+    "power at low frequencies costs next to nothing",
+    "A loop with integral action suppresses slow excitation, so that it hardly costs anything. The power of "
+    "the optimal excitation is then ill defined.",
+    "Give `cost.excitation_power` a small weight, or limit it.",
+)
+
+
+def nothing_needed(experiment: Experiment, *, at_every_plant: bool) -> Finding:
+    """Return the finding for a design without excitation."""
+    sources = ["the noise in normal operation"] if experiment.loop is not None else []
+    sources += ["experiment.prior"] if experiment.prior is not None else []
+    known = " and ".join(sources) or "the noise"
+    kept = " at every plant that is not left out" if at_every_plant else ""
+    return NOTHING_NEEDED.found(
+        f"no excitation is needed: the information of {known} meets the accuracy{kept}", sources=sources
+    )
+
+
+def inputs_without_power(excited: Sequence[float]) -> list[Finding]:
+    """Return a finding for each input without power; `excited` has the power of each."""
+    return [
+        INPUT_WITHOUT_POWER.found(
+            f"input {number} gets no power, so that its own effects stay unknown: criterion T adds up "
+            "information; D, A or E asks for every parameter",
+            where=f"input {number}",
+        )
+        for number, power in enumerate(excited, start=1)
+        if power <= _NOTHING * sum(excited)
+    ]
+
+
+def short_experiment(experiment: Experiment) -> list[Finding]:
+    """Return a finding if the experiment ends before its slowest mode settles; not without a length."""
+    if experiment.model.continuous or experiment.samples == 1:
+        return []
+    damping = np.abs(experiment.singularities.imag)
+    slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
+    if slowest * experiment.samples >= _SETTLED:
+        return []
+    return [
+        EXPERIMENT_SHORT.found(
+            f"the slowest mode has a time constant of {1.0 / slowest:.2g} samples, the experiment "
+            f"{experiment.samples}: a spectrum says what long records reach; trust what the record reaches "
+            "by its own samples, and idesign simulate",
+            time_constant=1.0 / slowest,
+            samples=experiment.samples,
+        )
+    ]
+
+
+def sign_open(requirements: Iterable[Requirement]) -> list[Finding]:
+    """Return a finding for each admissible error that leaves the sign of G open."""
+    found = []
+    for error in model_errors(requirements):
+        size, admitted = error.nominal_size(error.grid), error.admissible.at(error.grid)
+        acts = size > 0.0
+        least = float(np.min(admitted[acts] / size[acts], initial=np.inf))
+        if 1.0 - _ROUNDING <= least < np.inf:
+            found.append(
+                SIGN_OPEN.found(
+                    f"the admissible error is {least:.4g} times |G| or more at every frequency of its band: "
+                    "a model that meets it may have the wrong sign (relative: 0.1 means 10 %)",
+                    ratio=least,
+                )
+            )
+    return list({one.message: one for one in found}.values())
+
+
+def almost_free(units: Units, lines: Array, power: Array, costs: Array, dearest: float) -> list[Finding]:
+    """Return a finding if sinusoids of the design lie where power costs next to nothing.
+
+    Args:
+        units: of the spec.
+        lines: (n,) frequencies of the sinusoids, with their power (n,) and the price of power there (n,).
+        power: see there.
+        costs: see there.
+        dearest: the largest price over frequency.
+    """
+    cheap = (costs < _FREE * dearest) & (power > _SUPPORT * power.sum())
+    if not np.any(cheap):
+        return []
+    at = float(lines[cheap].max()) / units.frequency
+    near_zero = at < 1e-6 * np.pi / units.frequency
+    where = "near frequency zero" if near_zero else f"below {at:.3g} {units.per_time}"
+    return [
+        EXCITATION_FREE.found(
+            f"power {where} is almost free of charge in this loop (integral action). The excitation power of "
+            "the optimum is ill defined: give cost.excitation_power a small weight, or limit it",
+            where="cost.excitation_power",
+            frequency=at,
+        )
+    ]

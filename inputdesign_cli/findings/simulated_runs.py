@@ -1,0 +1,135 @@
+"""Simulated experiments keep less, or are about something else, than the design counts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.outcome.design import Coverage
+from inputdesign_cli.outcome.simulation import Searched, TriedInput
+from inputdesign_cli.outcome.units import Units
+
+# A fraction on the true system this far below that on the design model is worth a note.
+_GAP = 0.03
+
+CONFIDENCE_MISSED = FindingKind(
+    "confidence-missed",
+    Severity.DOUBT,
+    "fewer experiments than asked keep the admissible error",
+    "The share of simulated experiments within r_adm is below the exact confidence by more than chance.",
+    "Ask for more `runs` in `confidence`, or for more samples.",
+)
+OTHER_LENGTH = FindingKind(
+    "other-length",
+    Severity.NOTE,
+    "the simulated records have another length than the design",
+    "The design counts the samples of a spectrum. Records are whole periods, or longer by limits.",
+    "Nothing. The predictions that the runs are compared with are for the simulated length.",
+)
+INITIAL_ESTIMATE = FindingKind(
+    "initial-estimate-off",
+    Severity.DOUBT,
+    "the true system is not the design model",
+    "Fewer runs stay within r_adm on the true system than where the true system is the design model.",
+    "Design again at a better estimate, or for several plants (`uncertainty`).",
+)
+ONE_MINIMUM = FindingKind(
+    "runs-see-one-minimum",
+    Severity.NOTE,
+    "the runs look at one minimum only",
+    "Runs of `simulate` begin their estimates at the nominal parameters. Records leave other minima, which "
+    "the search of `identify` may end in.",
+    "Excite more frequencies, or hold what is known (`plant.known`).",
+)
+
+
+def confidence_missed(designed: Coverage | None, recorded: Coverage | None) -> list[Finding]:
+    """Return findings where a design, or its record, keeps less than was asked, by more than chance."""
+    found: list[Finding] = []
+    if designed is None or designed.asked is None:
+        return found
+    for of, coverage in (("of this design", designed), ("with this record", recorded)):
+        if coverage is None or coverage.kept_limits is None or coverage.kept is None:
+            continue
+        if coverage.kept_limits[1] < designed.asked:
+            message = (
+                f"{100 * coverage.kept:.1f} % of {coverage.runs} simulated experiments {of} keep r_adm: by "
+                f"more than chance that is fewer than the {100 * designed.asked:g} % that are asked for; ask "
+                "for more runs (confidence: {exact: .., runs: ..}), which settle alpha more sharply"
+            )
+            found.append(CONFIDENCE_MISSED.found(message, where=of, kept=coverage.kept, asked=designed.asked))
+    return found
+
+
+def runs_miss_confidence(designed: Coverage | None, tried: TriedInput) -> list[Finding]:
+    """Return a finding if runs of the design keep less than the exact confidence that was asked for."""
+    limits = tried.within_r_adm_limits
+    asked = None if designed is None else designed.asked
+    if designed is None or asked is None or limits is None or tried.within_r_adm is None:
+        return []
+    if tried.on_design_model is not None or limits[1] >= asked:
+        return []
+    why = (
+        "alpha was calibrated by simulated experiments, and chance had a part in it: ask for more of them "
+        "(runs)"
+        if designed.runs is not None
+        else "estimates of records this short scatter more than the asymptotic theory that sizes r_u: leave "
+        "out runs: 0, ask for a little more, or take more samples"
+    )
+    kept = f"{100 * tried.within_r_adm:.1f} % of the runs stay within r_adm"
+    message = f"{kept}, where exact: {asked:g} was asked for: {why}"
+    return [CONFIDENCE_MISSED.found(message, where="simulation", kept=tried.within_r_adm, asked=asked)]
+
+
+def other_length(counted: int, simulated: int) -> list[Finding]:
+    """Return a finding if records have another number of samples than the design counts."""
+    if counted == simulated:
+        return []
+    message = (
+        f"simulation: the design counts {counted} sample{'s' * (counted != 1)}, the simulated records have "
+        f"{simulated}. What the runs are compared with, and ellipses.png, are for {simulated} samples; "
+        f"bound.csv is for {counted}"
+    )
+    return [OTHER_LENGTH.found(message, where="simulation", counted=counted, simulated=simulated)]
+
+
+def initial_estimate_off(units: Units, inputs: Mapping[str, TriedInput]) -> list[Finding]:
+    """Return a finding for the first input whose runs keep less on the true than on the design model."""
+    for name, entry in inputs.items():
+        modelled = None if entry.on_design_model is None else entry.on_design_model.within_r_adm
+        found, theory, violations = entry.within_r_adm, entry.theory_on_truth, entry.violations
+        if modelled is None or found is None or modelled - found < _GAP:
+            continue
+        text = (
+            f"{name.replace('_', ' ')}: {100 * found:.0f} % of the runs stay within r_adm on the true "
+            f"system, but {100 * modelled:.0f} % where the true system is the design model: the experiment "
+            "was designed on an initial estimate that is not the truth"
+        )
+        if theory is not None:
+            text += (
+                f". On the true system r_u reaches {theory.worst_ratio:.2f} r_adm "
+                f"(at {theory.frequency:.3g} {units.per_time})"
+            )
+        if violations is not None:
+            low, middle, high = violations.frequency_quantiles
+            text += (
+                f"; 9 in 10 violations lie at {low:.3g} to {high:.3g} {units.per_time}, median {middle:.3g}"
+            )
+        return [INITIAL_ESTIMATE.found(text, where=name, within=found, on_design_model=modelled)]
+    return []
+
+
+def one_minimum(searched: Searched | None) -> list[Finding]:
+    """Return the finding that the runs see one minimum, where records leave others."""
+    if searched is None:
+        return []
+    runs = searched.runs
+    message = (
+        "the runs of simulate begin their estimates at the nominal parameters, and see the minimum there "
+        f"alone: with the search of identify {searched.elsewhere} of {runs} records end at other parameters, "
+        f"and {searched.rivals} of {runs} would be undecided"
+    )
+    found = ONE_MINIMUM.found(
+        message, where="simulation", runs=runs, elsewhere=searched.elsewhere, rivals=searched.rivals
+    )
+    return [found]

@@ -1,0 +1,128 @@
+"""A bound, a proof or a record of a design was left out, for want of time or because none exists."""
+
+from __future__ import annotations
+
+from inputdesign_cli.compute.time_limit import more_time, what_ended
+from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.outcome import Objective
+from inputdesign_cli.outcome.shares import per_cent
+
+DESIGN_UNFINISHED = FindingKind(
+    "design-unfinished",
+    Severity.DOUBT,
+    "the time limit ended the design before its proof closed",
+    "The design meets everything that is required. How much better another could be is proved only as far as "
+    "the gap says.",
+    "Allow more time.",
+)
+BOUND_NOT_IN_TIME = FindingKind(
+    "no-bound-in-time",
+    Severity.NOTE,
+    "there was no time for the bound over every spectrum",
+    "The design is proved the best of its type of spectrum. Other types were not compared.",
+    "Allow more time, or loosen `solver.any_spectrum_tolerance`.",
+)
+OTHER_SPECTRA_LEFT_OUT = FindingKind(
+    "other-spectra-left-out",
+    Severity.NOTE,
+    "the bound over every spectrum was not asked for",
+    "The design is proved the best of its type of spectrum. Other types were not compared.",
+    "Leave out `--fast`, or write `solver.any_spectrum: true`.",
+)
+NO_BOUND_EXISTS = FindingKind(
+    "no-bound-over-spectra",
+    Severity.NOTE,
+    "there is no bound over every spectrum",
+    "Some excitation is not counted by the cost or the limits and still gives information. Other spectra "
+    "come ever nearer to it, without end.",
+    "Give what is not counted a cost or a limit, or leave its frequency out of `limits.band`.",
+)
+ONLY_APPROACHED = FindingKind(
+    "optimum-only-approached",
+    Severity.DOUBT,
+    "the optimum is only approached",
+    "The best spectrum has power ever nearer to a frequency, and none has it there. No record has that.",
+    "Give what is not counted a cost or a limit, or leave its frequency out of `limits.band`.",
+)
+NO_RECORD_IN_TIME = FindingKind(
+    "no-record-in-time",
+    Severity.DOUBT,
+    "there was no time for a record",
+    "The spectrum is that of the design. No record of it was found before the time was over.",
+    "Allow more time, or try fewer records (`signal.candidates`) or shorter ones (`signal.samples`).",
+)
+ON_GRID = FindingKind(
+    "accuracy-on-grid",
+    Severity.DOUBT,
+    "the accuracy holds on a grid of frequencies",
+    "`solver.method: lmi` is the program of the papers. It requires the accuracy on a grid of frequencies "
+    "only, and between them it may be missed.",
+    "Use `solver.method: exchange`, which keeps the accuracy at every frequency.",
+)
+
+
+def ended_early(status: str, objective: Objective) -> list[Finding]:
+    """Return what the end of the time left open: the proof, or the bound over every spectrum."""
+    if status == "gap_open":
+        message = (
+            f"{what_ended()} ended the design: it meets all that is required, and {_how_far(objective)}; "
+            f"{more_time()} to close the gap"
+        )
+        return [DESIGN_UNFINISHED.found(message, where="solver", relative_gap=objective.relative_gap)]
+    if objective.any_spectrum_bound is not None:
+        return []
+    message = (
+        f"{what_ended()} came before the bound over every spectrum; solver.any_spectrum_tolerance: 0.01 "
+        "would take less time"
+    )
+    return [BOUND_NOT_IN_TIME.found(message, where="solver")]
+
+
+def _how_far(objective: Objective) -> str:
+    if objective.upper_bound:
+        return f"no other gets above {objective.upper_bound:.6g}"
+    if not objective.lower_bound:
+        return "nothing is proved yet of what others reach"
+    gap = per_cent(1.0 if objective.relative_gap is None else objective.relative_gap, 2)
+    return f"no other gets below {objective.lower_bound:.6g} ({gap} lower)"
+
+
+def other_spectra_left_out() -> Finding:
+    """Return the finding that the bound over every spectrum was not asked for."""
+    return OTHER_SPECTRA_LEFT_OUT.found(
+        "the design is the best of its spectrum type; what other spectra reach was not computed "
+        "(solver.any_spectrum: false, or --fast)",
+        where="solver.any_spectrum",
+    )
+
+
+def uncounted_excitation(message: str, *, bounded: bool) -> Finding:
+    """Return the finding that spectra come ever nearer to excitation that nothing counts.
+
+    Args:
+        message: what is not counted, and what to do.
+        bounded: whether what they reach has a bound.
+    """
+    return (ONLY_APPROACHED if bounded else NO_BOUND_EXISTS).found(message)
+
+
+def no_record_in_time(candidates: int) -> Finding:
+    """Return the finding that the time was over before a record was found, of a number of candidates."""
+    fewer = "fewer records (signal.candidates: 1) or shorter ones" if candidates > 1 else "a shorter one"
+    return NO_RECORD_IN_TIME.found(
+        f"there is no record: {what_ended()} came before one was found; the spectrum is that of the design. "
+        f"To have one, {more_time()}, or try {fewer} (signal.samples)",
+        where="signal",
+        candidates=candidates,
+    )
+
+
+def on_grid(lines: int, ratio: float) -> Finding:
+    """Return the finding that the accuracy holds at a number of frequencies, with the largest ratio."""
+    return ON_GRID.found(
+        f"the accuracy holds on the grid of {lines} frequencies; over the whole band r_u / r_adm is "
+        f"at most {ratio:.6g} (solver.method: exchange keeps it at every frequency)",
+        where="solver.method",
+        grid=lines,
+        worst_ratio=ratio,
+    )
