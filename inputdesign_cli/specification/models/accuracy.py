@@ -239,8 +239,8 @@ class FrequencyResponse(Section):
     )
     detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = Field(
         default=None,
-        description="Only odd harmonics are excited, and in a band one of each group of this size, at random, "
-        "is left out: power at the others shows nonlinearity.",
+        description="Only odd harmonics are excited, and in a band one of each group of this size is "
+        "left out at random: power at the others shows nonlinearity.",
     )
     noise: FileName | None = Field(
         default=None,

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from inputdesign_cli.expressions import Expression
+from inputdesign_cli.specification.models.continuous import Continuous
 from inputdesign_cli.specification.models.fields import (
     Count,
     GainMatrix,
@@ -36,7 +37,6 @@ from inputdesign_cli.specification.models.named import (
     values_of,
     worth,
 )
-from inputdesign_cli.specification.models.process import ProcessModel
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, carry, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
@@ -46,7 +46,6 @@ from inputdesign_cli.specification.models.shapes import (
     size_of,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import DelayedMatrix
 from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.models.values import Matrix, PolynomialMatrix, depth, same_columns
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -159,18 +158,6 @@ class StateSpace(Section):
             if entries is not None and (len(entries), len(entries[0])) != (rows, columns):
                 message = f"{{key}} is {len(entries)} x {len(entries[0])}, and must be {rows} x {columns}"
                 yield PathDiagnostic("wrong-shape", message, f"it has {words}", (key,))
-
-
-Continuous = Annotated[
-    DelayedMatrix | ProcessModel,
-    pick(
-        lambda v: (DelayedMatrix if v.keys().isdisjoint(ProcessModel.model_fields) else ProcessModel).phrase
-    ),
-    Wording(
-        "a mapping of keys", "write {numerator: [..], denominator: [..]}, or {gain: .., time_constant: ..}"
-    ),
-]
-"""The transfer matrix in s, in one of two forms."""
 
 
 class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials A, B, F"):

@@ -131,8 +131,8 @@ class Document:
         parser = _PARSER(text)
         try:
             self.events = self._expanded(parser)
-            event, mark = next(self.events, (None, None))
-            data = None if event is None else self._value(event, mark, at, None)
+            first = next(self.events, None)
+            data = None if first is None else self._value(*first, at, None)
             next(self.events, None)  # errors behind the value are errors, too
         finally:
             parser.dispose()
@@ -177,7 +177,7 @@ class Document:
                 continue
             found = [(event, mark)]
             if isinstance(event, yaml.AliasEvent):
-                (first, _), *inner = self._anchored(anchors, recording, event.anchor, mark)
+                (first, _), *inner = self._anchored(anchors, recording, str(event.anchor), mark)
                 found = [(first, mark), *inner]
             elif isinstance(event, yaml.NodeEvent) and event.anchor:
                 recording[event.anchor] = depth, []
