@@ -26,7 +26,7 @@ from inputdesign_cli.specification.models.named import (
     expressed,
     matrix,
 )
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, pick
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.shapes import check_each, check_gain, check_shapes
 from inputdesign_cli.specification.models.transfer import TransferMatrix, check_each_proper
 from inputdesign_cli.specification.models.units import FREQUENCY, TIME
@@ -46,17 +46,17 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     kind: ClassVar[Literal["process"]] = "process"
 
     gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = Field(
-        default=None, description="Time constant, in time_unit, of a plant of first order."
+    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = optional(
+        "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
-        default=None, description="Damping ratio of a plant of second order."
+    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = optional(
+        "Damping ratio of a plant of second order."
     )
-    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = Field(
-        default=None, description="Undamped natural frequency of a plant of second order, rad per time_unit."
+    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = optional(
+        "Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
-        default=None, description="Dead time, in time_unit; 0 where there is none."
+    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = optional(
+        "Dead time, in time_unit; 0 where there is none."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -192,10 +192,8 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
     denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
-        default=None,
-        description="Dead time in time_unit: a number, common to all entries, or rows of columns.",
-        examples=[25],
+    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = optional(
+        "Dead time in time_unit: a number, common to all entries, or rows of columns.", examples=[25]
     )
 
     def check(self) -> Iterator[PathDiagnostic]:

@@ -37,7 +37,14 @@ from inputdesign_cli.specification.models.named import (
     values_of,
     worth,
 )
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, carry, pick
+from inputdesign_cli.specification.models.section import (
+    PathDiagnostic,
+    Section,
+    Wording,
+    carry,
+    optional,
+    pick,
+)
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_gain,
@@ -63,9 +70,7 @@ class NamedPlant(Section):
         "these alone are estimated.",
         examples=[{"K": 2.1, "T": 180}],
     )
-    known: Names | None = Field(
-        default=None, description="Names of parameters that are known and not estimated.", examples=[["b1"]]
-    )
+    known: Names | None = optional("Names of parameters that are known and not estimated.", examples=[["b1"]])
 
     _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
 
@@ -130,11 +135,10 @@ class StateSpace(Section):
     A: Rows = Field(description="States by states.", examples=[[[0, 1], [0, "-1/T"]]])
     B: Rows = Field(description="States by inputs.", examples=[[[0], ["k/T"]]])
     C: Rows = Field(description="Outputs by states.", examples=[[[1, 0]]])
-    D: Rows | None = Field(default=None, description="Outputs by inputs (default 0).")
-    K: Rows | None = Field(
-        default=None,
-        description="Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
-        "noise is added to the outputs).",
+    D: Rows | None = optional("Outputs by inputs (default 0).")
+    K: Rows | None = optional(
+        "Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
+        "noise is added to the outputs)."
     )
     delay: Annotated[NonNegative, EXPRESSIONS, TIME] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
@@ -178,8 +182,8 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         description="Leading zeros are the delay. MIMO: rows (outputs) of columns (inputs) of polynomials.",
         examples=[[0, 3.6]],
     )
-    F: Annotated[StableMatrix, EXPRESSIONS] | None = Field(
-        default=None, description="Monic and stable, in the shape of B (default 1)."
+    F: Annotated[StableMatrix, EXPRESSIONS] | None = optional(
+        "Monic and stable, in the shape of B (default 1)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -242,9 +246,8 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     continuous: Continuous = Field(
         description="Transfer matrix in s, rows are outputs; or gain, time constant and dead time."
     )
-    sample: Literal["zoh"] | None = Field(
-        default=None,
-        description="zoh: sampled at sample_time with a zero-order hold. Absent: continuous time.",
+    sample: Literal["zoh"] | None = optional(
+        "zoh: sampled at sample_time with a zero-order hold. Absent: continuous time."
     )
 
     @property
@@ -294,8 +297,8 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("state_space",)
 
     state_space: StateSpace = Field(description="A, B, C, D, and K of the noise.")
-    sample: Literal["zoh"] | None = Field(
-        default=None, description="zoh: matrices in continuous time are sampled with a zero-order hold."
+    sample: Literal["zoh"] | None = optional(
+        "zoh: matrices in continuous time are sampled with a zero-order hold."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:

@@ -15,7 +15,7 @@ from inputdesign_cli.specification.models.fields import (
     RowsMatrix,
 )
 from inputdesign_cli.specification.models.named import TermMatrix, expressed
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, pick
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_each,
@@ -75,9 +75,7 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
     kind: ClassVar[Literal["continuous"]] = "continuous"
 
     continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
-    sample: Literal["zoh"] | None = Field(
-        default=None, description="How it is sampled at sample_time: zoh, a zero-order hold."
-    )
+    sample: Literal["zoh"] | None = optional("How it is sampled at sample_time: zoh, a zero-order hold.")
 
 
 class TransferMatrix(Section):
@@ -149,7 +147,7 @@ class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-
     kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
 
     continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
-    sample: Literal["zoh"] | None = Field(default=None, description="How it is sampled: zoh.")
+    sample: Literal["zoh"] | None = optional("How it is sampled: zoh.")
 
 
 def transfer_kind(value: dict[str, Plain]) -> str:
