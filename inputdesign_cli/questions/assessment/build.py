@@ -101,7 +101,7 @@ def _reaching(spec: Spec, values: Mapping[str, float]) -> dict[str, object]:
 
 
 def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
-    """Return the question of a spec for data with a number of samples and a factor (k, k) of their information.
+    """Return the question of a spec for data of some length, and a factor (k, k) of their information.
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
