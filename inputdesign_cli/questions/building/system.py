@@ -32,6 +32,7 @@ from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
+from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
@@ -41,7 +42,6 @@ from inputdesign_cli.specification.models.spectrum import (
     MultisineSpectrum,
     PolynomialSpectrum,
 )
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.tables import read_frequency_table, read_samples
 

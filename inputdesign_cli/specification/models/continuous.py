@@ -15,7 +15,10 @@ from inputdesign_cli.specification.models.fields import (
     GainMatrix,
     NonNegativeGrid,
     NumberGrid,
+    PolynomialMatrix,
     PositiveGrid,
+    check_no_growth_in_s,
+    depth,
 )
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
@@ -30,7 +33,6 @@ from inputdesign_cli.specification.models.section import PathDiagnostic, Section
 from inputdesign_cli.specification.models.shapes import check_each, check_gain, check_shapes
 from inputdesign_cli.specification.models.transfer import TransferMatrix, check_each_proper
 from inputdesign_cli.specification.models.units import FREQUENCY, TIME
-from inputdesign_cli.specification.models.values import PolynomialMatrix, check_no_growth_in_s, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
 QUANTITIES = ("gain", "time_constant", "damping", "natural_frequency", "dead_time")

@@ -7,12 +7,19 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import Count, Index, NonNegative, Number, Several, Time
+from inputdesign_cli.specification.models.fields import (
+    Count,
+    Index,
+    NonNegative,
+    Number,
+    Several,
+    Time,
+    depth,
+)
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import ContinuousRatio, DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.units import TIME
-from inputdesign_cli.specification.models.values import depth
 
 Rule = Literal["tustin", "backward", "zoh"]
 _RULE = "How s becomes q^-1: tustin (trapezoids), backward (backward differences) or zoh (a hold on y)."

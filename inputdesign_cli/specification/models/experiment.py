@@ -26,6 +26,8 @@ from inputdesign_cli.specification.models.fields import (
     StablePerOutput,
     Time,
     Variance,
+    check_delay_stable,
+    depth,
 )
 from inputdesign_cli.specification.models.section import (
     TAG,
@@ -40,7 +42,6 @@ from inputdesign_cli.specification.models.section import (
 from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import FRACTION
-from inputdesign_cli.specification.models.values import check_delay_stable, depth
 from inputdesign_cli.specification.models.wording import count
 
 # This factor moves roots on the unit circle inside, whatever the rounding of decimals.

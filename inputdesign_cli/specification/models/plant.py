@@ -14,14 +14,18 @@ from inputdesign_cli.specification.models.fields import (
     Count,
     GainMatrix,
     Index,
+    Matrix,
     MonicPerOutput,
     Names,
     NonNegative,
     Number,
     Numbers,
+    PolynomialMatrix,
     Several,
     StableMatrix,
+    depth,
     nested,
+    same_columns,
 )
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
@@ -54,7 +58,6 @@ from inputdesign_cli.specification.models.shapes import (
 )
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import TIME
-from inputdesign_cli.specification.models.values import Matrix, PolynomialMatrix, depth, same_columns
 from inputdesign_cli.specification.yaml.plain import Plain
 
 

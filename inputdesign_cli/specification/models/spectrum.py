@@ -17,6 +17,7 @@ from inputdesign_cli.specification.models.fields import (
     PerChannel,
     Positive,
     Several,
+    depth,
 )
 from inputdesign_cli.specification.models.section import (
     TAG,
@@ -28,7 +29,6 @@ from inputdesign_cli.specification.models.section import (
     tag,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 

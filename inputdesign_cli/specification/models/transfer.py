@@ -12,7 +12,14 @@ from inputdesign_cli.specification.models.fields import (
     Denominator,
     GainMatrix,
     Numerator,
+    Polynomial,
+    PolynomialList,
+    PolynomialMatrix,
     RowsMatrix,
+    check_delay_stable,
+    check_left_half_plane,
+    depth,
+    product,
 )
 from inputdesign_cli.specification.models.named import TermMatrix, expressed
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
@@ -23,15 +30,6 @@ from inputdesign_cli.specification.models.shapes import (
     check_proper,
     check_shapes,
     denominators_of,
-)
-from inputdesign_cli.specification.models.values import (
-    Polynomial,
-    PolynomialList,
-    PolynomialMatrix,
-    check_delay_stable,
-    check_left_half_plane,
-    depth,
-    product,
 )
 from inputdesign_cli.specification.yaml.plain import Plain
 
