@@ -1,7 +1,6 @@
 """The types of the values of a spec: constraints of pydantic, conditions on bands, matrices and polynomials.
 
-`pydantic_errors` words their errors. A union names its alternatives by tags, so that pydantic tries only the one
-that is meant.
+`pydantic_errors` words their errors. A union names its alternatives by tags, so that pydantic tries only one.
 """
 
 from __future__ import annotations
