@@ -46,6 +46,9 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     """
 
     kind: ClassVar[Literal["process"]] = "process"
+    # Every entry has a denominator and a dead time of its own.
+    common: ClassVar[bool] = False
+    common_delay: ClassVar[bool] = False
 
     gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
     time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = optional(
@@ -99,21 +102,11 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         return self._numbers(1)
 
     @property
-    def common(self) -> bool:
-        """Every entry has a denominator of its own."""
-        return False
-
-    @property
     def delays(self) -> Grid:
         """Dead times as rows of columns; 0 where there is none."""
         if self.dead_time is None:
             return tuple(tuple(0.0 for _ in row) for row in self.grid("gain"))
         return self.grid("dead_time")
-
-    @property
-    def common_delay(self) -> bool:
-        """Every entry has a dead time of its own."""
-        return False
 
     def own_parameters(self) -> tuple[NamedParameter, ...]:
         """Return the quantities, entry by entry, without entries of gain zero and dead times of zero."""
