@@ -13,7 +13,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
-from inputdesign_cli.specification.models.values import check_delay_stable
+from inputdesign_cli.specification.models.fields import check_delay_stable
 from inputdesign_cli.spectrum import MatrixFirBasis
 from tests.support.plants import arrays, arx, box_jenkins
 from tests.support.records import shifted, simulated

@@ -76,5 +76,5 @@ def test_no_other_object_of_a_question_has_a_field_for_the_spec():
     assert len(fields) > 100
     assert {name for name, annotation in fields if ast.unparse(annotation) == "Spec"} == {
         "Rebuild",
-        "Unsure",  # it exists while a question is built, when plants are drawn
+        "UncertainPlant",  # it exists while a question is built, when plants are drawn
     }

@@ -1,4 +1,4 @@
-"""Spec -> what is to be estimated from data, and the same question at the model that is found."""
+"""Spec -> the model to be estimated from data, and the question of the design at the estimate."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from inputdesign_cli.specification import Spec
 
 
 def build_identification(spec: Spec) -> Identification:
-    """What `identify` and `assess` run on.
+    """Return the task of `identify` and `assess`.
 
     Raises:
         SpecError: the plant has no such model.
@@ -50,12 +50,12 @@ def build_identification(spec: Spec) -> Identification:
         )
     nominal = build_model(spec)
     stated = stated_prior(spec)
-    # What is wrong with a prior is said before any data are read, whether it counts for them or not.
+    # Errors of a prior are raised before any data are read, even if it does not count for these data.
     if stated is not None:
         stated.over(spec, nominal.names)
     prior_record(spec)
     controller = spec.experiment.controller
-    record_step(spec)  # says where samples are too far apart for the plant
+    record_step(spec)  # raises if samples are too far apart for the plant
     return Identification(
         header=build_header(spec),
         nominal=nominal,
@@ -74,14 +74,14 @@ def build_identification(spec: Spec) -> Identification:
 
 
 def operating_point(spec: Spec) -> dict[str, float]:
-    """What u varies about, `signal.offset`; in closed loop r does, and nothing is known of u."""
+    """Return the levels of u, `signal.offset`; empty in closed loop, where they are levels of r."""
     if spec.closed_loop or spec.signal.offset is None:
         return {}
     return {f"u{j + 1}": float(level) for j, level in enumerate(operating_points(spec))}
 
 
 def _offset(spec: Spec, levels: Mapping[str, float]) -> dict[str, object]:
-    """The change that lets a record vary about the levels of the data, where the spec does not say it."""
+    """The change that gives a record the levels of the data as its offset, unless the spec states one."""
     inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
     if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
         return {}
@@ -90,7 +90,7 @@ def _offset(spec: Spec, levels: Mapping[str, float]) -> dict[str, object]:
 
 
 def _reaching(spec: Spec, values: Mapping[str, float]) -> dict[str, object]:
-    """The change that lets intervals reach the estimate, which may be outside of them."""
+    """The change that widens intervals as far as the estimate."""
     if spec.uncertainty is None or spec.uncertainty.intervals is None:
         return {}
     reaching = {
@@ -101,7 +101,7 @@ def _reaching(spec: Spec, values: Mapping[str, float]) -> dict[str, object]:
 
 
 def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
-    """What a spec asks of an experiment of so many samples, of which the information has this factor (k, k).
+    """Return the question of a spec for data of some length, and a factor (k, k) of their information.
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
@@ -110,7 +110,7 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
     experiment = replace(raw, factor=factor)
 
     def topped_up(levels: Mapping[str, float]) -> Results:
-        # With its values it counts for the estimate, too, when the spec is assessed with further records.
+        # With values it enters the estimate as well, when the spec is assessed with further records.
         values = dict(zip(raw.model.names, raw.model.theta.tolist(), strict=True))
         prior = {"parameters": values, "information": factor @ factor.T}
         changes = {"experiment.prior": prior, **_offset(spec, levels), **_reaching(spec, values)}

@@ -28,7 +28,7 @@ Draw = Callable[[np.random.Generator], Array]
 
 
 @dataclass(frozen=True)
-class Unsure:
+class UncertainPlant:
     """The parameters of an uncertain plant.
 
     Attributes:
@@ -198,7 +198,7 @@ def build_knowledge(spec: Spec) -> Knowledge | None:
     """Return the region of the plants that are possible; None if it is not stated, or plants are listed.
 
     Raises:
-        SpecError, DataError: see `Unsure.drawing`.
+        SpecError, DataError: see `UncertainPlant.drawing`.
     """
     return _region(spec, _POSSIBLE)
 
@@ -213,9 +213,9 @@ def _region(spec: Spec, confidence: float) -> Knowledge | None:
     stated = spec.uncertainty
     if stated is None or isinstance(stated.scenarios, tuple):
         return None
-    unsure = Unsure(spec, stated, build_experiment(spec))
-    unsure.drawing()  # raises what does not fit
-    _, centre, columns, box = unsure.region(confidence)
+    uncertain = UncertainPlant(spec, stated, build_experiment(spec))
+    uncertain.drawing()  # raises what does not fit
+    _, centre, columns, box = uncertain.region(confidence)
     return Knowledge(centre, columns, box)
 
 
@@ -226,7 +226,7 @@ def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
     """
     covariance = np.zeros((nominal.theta.size, nominal.theta.size))
     if spec.uncertainty is not None:
-        moments = Unsure(spec, spec.uncertainty, build_experiment(spec)).second_moments()
+        moments = UncertainPlant(spec, spec.uncertainty, build_experiment(spec)).second_moments()
         covariance[: len(moments), : len(moments)] = moments
     elif spec.estimate is not None:
         names = list(nominal.names)

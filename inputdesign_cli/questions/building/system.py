@@ -34,6 +34,7 @@ from inputdesign_cli.questions.building.tables import read_frequency_table, read
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
+from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
@@ -43,7 +44,6 @@ from inputdesign_cli.specification.models.spectrum import (
     MultisineSpectrum,
     PolynomialSpectrum,
 )
-from inputdesign_cli.specification.models.values import depth
 
 # A pole this near to the unit circle is on it, but for rounding.
 _ROUNDING = 1e-9

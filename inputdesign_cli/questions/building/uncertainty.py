@@ -18,7 +18,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.questions.building.demand import check_effects
 from inputdesign_cli.questions.building.integrators import on_finite_information
-from inputdesign_cli.questions.building.knowledge import KEY, Draw, Unsure
+from inputdesign_cli.questions.building.knowledge import KEY, Draw, UncertainPlant
 from inputdesign_cli.questions.building.requirements import build_asked
 from inputdesign_cli.questions.building.system import build_loop
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
@@ -155,7 +155,7 @@ class _NoPlantError(Exception):
         self.code, self.what = code, what
 
 
-class _Scenarios(Unsure):
+class _Scenarios(UncertainPlant):
     """Makes plants of parameters."""
 
     @property

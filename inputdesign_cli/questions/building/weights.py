@@ -31,21 +31,13 @@ def build_weight(
     """Return a weight of the spec; 1 if none is stated.
 
     Raises:
-        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled;
-            `unsuitable-key` for one in q^-1 of a plant in continuous time.
+        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled.
     """
     match transfer:
         case None:
             return Rational.build([1.0])
-        case DiscreteTransfer() if spec.plant.sampled:
-            return rational(transfer)
         case DiscreteTransfer():
-            raise spec.complain(
-                "unsuitable-key",
-                f"{key} is in q^-1, but the plant is in continuous time",
-                hint="write continuous: {numerator: [..], denominator: [..]} in s",
-                key=key,
-            )
+            return rational(transfer)
         case ContinuousTransfer() if not spec.plant.sampled:
             ratio = transfer.continuous
             return ContinuousRational(np.array(ratio.numerator), np.array(ratio.denominator_polynomial))

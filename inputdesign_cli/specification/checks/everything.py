@@ -22,7 +22,7 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (plant.true_noise_fits, ("plant", "simulation.noise")),
     (plant.spectrum_fits, ("plant", "spectrum.type")),
     (plant.regression_fits, ("plant", "accuracy.mean_squared_error")),
-    (plant.weights_fit, ("plant.sample", "plant.continuous")),
+    (plant.weights_fit, ("plant.sample", "plant.continuous", "limits.spectrum")),
     (loop.control_fits, ("plant", "accuracy.closed_loop_error")),
     (size.channels, ("plant",)),
     (size.named_channels, ("plant", "channels")),

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from inputdesign_cli.specification.models.experiment import NoiseShape
+from inputdesign_cli.specification.models.fields import check_no_growth
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.shapes import check_each, check_per_output
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.values import check_no_growth
 from inputdesign_cli.specification.models.wording import count
 
 
@@ -29,6 +29,12 @@ def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnosti
         yield replace(found, hint=needs + found.hint)
 
 
+_WEIGHTS = (
+    ("accuracy", "model_error", "weight"),
+    ("accuracy", "weighted_variance", "weight"),
+    ("limits", "spectrum", "max"),
+    ("limits", "spectrum", "min"),
+)
 SAMPLED = "add sample: zoh to the plant"
 """The hint for keys that a plant in s cannot have unless it is sampled."""
 
@@ -94,8 +100,7 @@ def weights_fit(spec: Spec) -> Iterator[PathDiagnostic]:
     """A filter in q^-1 has no meaning for a plant that is not sampled."""
     if spec.plant.sampled:
         return
-    for name in ("model_error", "weighted_variance"):
-        path = ("accuracy", name, "weight")
+    for path in _WEIGHTS:
         if spec.at(*path, "kind") == "discrete":
             message = "{key} is in q^-1, but the plant is not sampled"
             hint = f"{SAMPLED}, or write {{continuous: {{numerator: [..], denominator: [..]}}}} in s"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.models.wording import show
 from inputdesign_cli.specification.yaml.places import Path, parse_key
 

@@ -29,7 +29,7 @@ from inputdesign_cli.specification.models.fields import (
     SymmetricMatrix,
 )
 from inputdesign_cli.specification.models.loop import ClosedLoopError, LoopMargin
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, Wording
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, Wording, optional
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
 from inputdesign_cli.specification.models.units import FRACTION
@@ -53,13 +53,11 @@ _NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_err
 class Sensitivity(Section):
     """An admissible error that keeps |W S| <= 1, or |S| below a peak, for the sensitivity S of a loop."""
 
-    numerator: Numerator | None = Field(default=None, description="Numerator of W in q^-1.")
-    denominator: Denominator | None = Field(
-        default=None, description="Denominator of W (default 1), or its factors."
-    )
-    max_db: Positive | None = Field(default=None, description="Largest |S| in dB; stands for a constant W.")
-    controller: Controller | None = Field(
-        default=None, description="C of the loop to be kept (default: the controller of the experiment)."
+    numerator: Numerator | None = optional("Numerator of W in q^-1.")
+    denominator: Denominator | None = optional("Denominator of W (default 1), or its factors.")
+    max_db: Positive | None = optional("Largest |S| in dB; stands for a constant W.")
+    controller: Controller | None = optional(
+        "C of the loop to be kept (default: the controller of the experiment)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -80,12 +78,8 @@ class Sensitivity(Section):
 class Confidence(Section):
     """The probability that fixes r_u: of an ellipsoid of parameters, or of the error itself."""
 
-    ellipsoid: Fraction | None = Field(
-        default=None, description="Probability that fixes alpha by the chi-squared distribution."
-    )
-    exact: Fraction | None = Field(
-        default=None, description="Probability that |G(theta) - G| <= r_adm at all frequencies."
-    )
+    ellipsoid: Fraction | None = optional("Probability that fixes alpha by the chi-squared distribution.")
+    exact: Fraction | None = optional("Probability that |G(theta) - G| <= r_adm at all frequencies.")
     draws: Annotated[Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
         default=4000,
         description="Estimates drawn by asymptotic theory that fix alpha for exact, and as many that check.",
@@ -110,26 +104,20 @@ class Confidence(Section):
 class ModelError(Section):
     """r_u(w) <= r_adm(w) at every frequency of the band."""
 
-    relative: Annotated[Positive, FRACTION] | None = Field(
-        default=None, description="r_adm = this fraction of |G|."
+    relative: Annotated[Positive, FRACTION] | None = optional("r_adm = this fraction of |G|.")
+    absolute: Positive | None = optional("r_adm = this value at every frequency.")
+    table: FileName | None = optional("CSV file with columns frequency and r_adm.")
+    sensitivity: Sensitivity | None = optional("r_adm from a bound on a sensitivity.")
+    confidence: Annotated[Confidence, Shorthand("ellipsoid", _PROBABILITY)] | None = optional(
+        "Probability that fixes alpha by the chi-squared distribution (default 0.95), or "
+        "{exact: 0.95}: alpha calibrated by simulated estimates."
     )
-    absolute: Positive | None = Field(default=None, description="r_adm = this value at every frequency.")
-    table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
-    sensitivity: Sensitivity | None = Field(default=None, description="r_adm from a bound on a sensitivity.")
-    confidence: Annotated[Confidence, Shorthand("ellipsoid", _PROBABILITY)] | None = Field(
-        default=None,
-        description="Probability that fixes alpha by the chi-squared distribution (default 0.95), or "
-        "{exact: 0.95}: alpha calibrated by simulated estimates.",
-    )
-    alpha: Positive | None = Field(
-        default=None, description="Size of the confidence region, in place of confidence."
-    )
-    band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
-    weight: Transfer | None = Field(default=None, description="Weight on the model error (default 1).")
-    norm: Literal["entry", "frobenius"] | None = Field(
-        default=None,
-        description="Of several channels: entry, each entry of G for itself (default), or frobenius, the "
-        "root of the sum of their squares (the only choice for sensitivity).",
+    alpha: Positive | None = optional("Size of the confidence region, in place of confidence.")
+    band: Band | None = optional("Frequencies [low, high] (default: all).")
+    weight: Transfer | None = optional("Weight on the model error (default 1).")
+    norm: Literal["entry", "frobenius"] | None = optional(
+        "Of several channels: entry, each entry of G for itself (default), or frobenius, the "
+        "root of the sum of their squares (the only choice for sensitivity)."
     )
     region: Literal["first_order", "ellipsoid"] = Field(
         default="first_order", description="first_order: linearised; ellipsoid: every model of the ellipsoid."
@@ -167,9 +155,7 @@ class InformationTarget(Section):
     """The information matrix must exceed this one."""
 
     matrix: SymmetricMatrix = Field(description="Symmetric matrix, a row per parameter.")
-    parameters: Names | None = Field(
-        default=None, description="Names that order its rows (default: of the model)."
-    )
+    parameters: Names | None = optional("Names that order its rows (default: of the model).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row has a name."""
@@ -192,9 +178,9 @@ class Application(Section):
 class WeightedVariance(Section):
     """|W|^2 Lambda^* P Lambda <= max at every frequency of the band."""
 
-    weight: Transfer | None = Field(default=None, description="The weight W (default 1).")
+    weight: Transfer | None = optional("The weight W (default 1).")
     max: Positive = Field(description="Largest admissible weighted variance.")
-    band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
+    band: Band | None = optional("Frequencies [low, high] (default: all).")
     relative: Flag = Field(
         default=False, description="Whether the variance is of G relative to its nominal value."
     )
@@ -204,47 +190,40 @@ class MeanSquaredError(Section):
     """Mean-squared error of an estimated quantity when some regressors are neglected."""
 
     estimated: Numbers = Field(description="Weights of the estimated parameters in the quantity of interest.")
-    neglected: Numbers | None = Field(default=None, description="Weights of the neglected ones (default 0).")
+    neglected: Numbers | None = optional("Weights of the neglected ones (default 0).")
     neglected_norm: Annotated[
         NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
     ] = Field(description="Bound on the norm of the neglected parameters.")
-    target: Annotated[Positive, Wording("a number", _NO_TARGET)] | None = Field(
-        default=None, description="Largest admissible error; absent: the least that limits.energy allows."
+    target: Annotated[Positive, Wording("a number", _NO_TARGET)] | None = optional(
+        "Largest admissible error; absent: the least that limits.energy allows."
     )
 
 
 class FrequencyResponse(Section):
     """The standard deviation of a nonparametric frequency response, line by line, for periodic excitation."""
 
-    relative: Annotated[Positive, FRACTION] | None = Field(
-        default=None, description="r_adm = this fraction of |G|."
+    relative: Annotated[Positive, FRACTION] | None = optional("r_adm = this fraction of |G|.")
+    absolute: Positive | None = optional("r_adm = this value at every line.")
+    table: FileName | None = optional("CSV file with columns frequency and r_adm.")
+    frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+        "The lines, increasing; each moves to the nearest harmonic of the period."
     )
-    absolute: Positive | None = Field(default=None, description="r_adm = this value at every line.")
-    table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
-    frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = Field(
-        default=None, description="The lines, increasing; each moves to the nearest harmonic of the period."
+    band: Band | None = optional("In place of frequencies: lines in [low, high], even in the logarithm.")
+    lines: Annotated[Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+        "Number of lines in the band (default: every harmonic of the period)."
     )
-    band: Band | None = Field(
-        default=None, description="In place of frequencies: lines in [low, high], even in the logarithm."
-    )
-    lines: Annotated[Count, SIZES["accuracy.frequency_response.lines"]] | None = Field(
-        default=None, description="Number of lines in the band (default: every harmonic of the period)."
-    )
-    period: Annotated[Count, SIZES["signal.samples"]] | None = Field(
-        default=None,
-        description="Samples of a period (default: the record in signal.periods equal ones, or in five).",
+    period: Annotated[Count, SIZES["signal.samples"]] | None = optional(
+        "Samples of a period (default: the record in signal.periods equal ones, or in five)."
     )
     transient: Annotated[Index, SIZES["signal.samples"]] = Field(
         default=1, description="Periods that are left to the transient and not counted (default 1)."
     )
-    detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = Field(
-        default=None,
-        description="Only odd harmonics are excited, and in a band one of each group of this size, at random, "
-        "is left out: power at the others shows nonlinearity.",
+    detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+        "Only odd harmonics are excited, and in a band one of each group of this size is "
+        "left out at random: power at the others shows nonlinearity."
     )
-    noise: FileName | None = Field(
-        default=None,
-        description="CSV file with columns frequency and noise_spectrum (of explore) in place of the model.",
+    noise: FileName | None = optional(
+        "CSV file with columns frequency and noise_spectrum (of explore) in place of the model."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -261,39 +240,30 @@ class FrequencyResponse(Section):
 class Accuracy(Section):
     """Requirements on the model; several may stand together. A criterion asks for the best instead."""
 
-    model_error: ModelError | None = Field(
-        default=None, description="Bound on the model error over frequency."
+    model_error: ModelError | None = optional("Bound on the model error over frequency.")
+    loop: LoopMargin | None = optional(
+        "Margin of a control loop, kept with every plant within the model error."
     )
-    loop: LoopMargin | None = Field(
-        default=None, description="Margin of a control loop, kept with every plant within the model error."
+    information: Annotated[InformationTarget, Shorthand("matrix", {"type": "array"})] | None = optional(
+        "Lower bound on the information matrix."
     )
-    information: Annotated[InformationTarget, Shorthand("matrix", {"type": "array"})] | None = Field(
-        default=None, description="Lower bound on the information matrix."
+    application: Application | None = optional("Application-oriented ellipsoid.")
+    weighted_variance: WeightedVariance | None = optional("Bound on a weighted variance.")
+    standard_deviation: Deviations | None = optional("Largest standard deviation of each named parameter.")
+    frequency_response: FrequencyResponse | None = optional(
+        "Bound on the standard deviation of a nonparametric frequency response."
     )
-    application: Application | None = Field(default=None, description="Application-oriented ellipsoid.")
-    weighted_variance: WeightedVariance | None = Field(
-        default=None, description="Bound on a weighted variance."
-    )
-    standard_deviation: Deviations | None = Field(
-        default=None, description="Largest standard deviation of each named parameter."
-    )
-    frequency_response: FrequencyResponse | None = Field(
-        default=None, description="Bound on the standard deviation of a nonparametric frequency response."
-    )
-    criterion: Literal["D", "A", "E", "T"] | None = Field(
-        default=None,
-        description="The best det, trace of inverse, smallest eigenvalue or trace of M within limits.",
+    criterion: Literal["D", "A", "E", "T"] | None = optional(
+        "The best det, trace of inverse, smallest eigenvalue or trace of M within limits."
     )
     scale: Literal["absolute", "relative"] = Field(
         default="absolute",
         description="Whether the criterion is of the parameters or of their relative errors.",
     )
-    closed_loop_error: ClosedLoopError | None = Field(
-        default=None, description="Error of the loop with the controller designed on the model."
+    closed_loop_error: ClosedLoopError | None = optional(
+        "Error of the loop with the controller designed on the model."
     )
-    mean_squared_error: MeanSquaredError | None = Field(
-        default=None, description="Mean-squared error with neglected regressors."
-    )
+    mean_squared_error: MeanSquaredError | None = optional("Mean-squared error with neglected regressors.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """A loop is kept by a bound on the model error, so that only one of them is stated."""

@@ -7,12 +7,19 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import Count, Index, NonNegative, Number, Several, Time
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, pick
+from inputdesign_cli.specification.models.fields import (
+    Count,
+    Index,
+    NonNegative,
+    Number,
+    Several,
+    Time,
+    depth,
+)
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import ContinuousRatio, DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.units import TIME
-from inputdesign_cli.specification.models.values import depth
 
 Rule = Literal["tustin", "backward", "zoh"]
 _RULE = "How s becomes q^-1: tustin (trapezoids), backward (backward differences) or zoh (a hold on y)."
@@ -27,10 +34,10 @@ class Pid(Section):
     ELSEWHERE: ClassVar[Mapping[str, str]] = {"Ki": "write Ti: Kp / Ki", "Kd": "write Td: Kd / Kp"}
 
     Kp: Number = Field(description="Gain; negative where more input means less output.", examples=[2.0])
-    Ti: Time | None = Field(default=None, description="Integral time; absent: no integral action.")
+    Ti: Time | None = optional("Integral time; absent: no integral action.")
     Td: Annotated[NonNegative, TIME] = Field(default=0.0, description="Derivative time (default 0).")
-    Tf: Annotated[NonNegative, TIME] | None = Field(
-        default=None, description="Time constant of the filter of the derivative (default Td / 10)."
+    Tf: Annotated[NonNegative, TIME] | None = optional(
+        "Time constant of the filter of the derivative (default Td / 10)."
     )
     sample: Rule = Field(default="tustin", description=_RULE)
 

@@ -26,6 +26,8 @@ from inputdesign_cli.specification.models.fields import (
     StablePerOutput,
     Time,
     Variance,
+    check_delay_stable,
+    depth,
 )
 from inputdesign_cli.specification.models.section import (
     TAG,
@@ -34,12 +36,12 @@ from inputdesign_cli.specification.models.section import (
     Shorthand,
     Wording,
     fail,
+    optional,
     tag,
 )
 from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import FRACTION
-from inputdesign_cli.specification.models.values import check_delay_stable, depth
 from inputdesign_cli.specification.models.wording import count
 
 # This factor moves roots on the unit circle inside, whatever the rounding of decimals.
@@ -72,10 +74,8 @@ class NoiseShape(Section):
     drift: PerChannel[Flag] = Field(
         default=False, description="Whether the noise integrates as well; one for all outputs, or a list."
     )
-    variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
-    known: Names | None = Field(
-        default=None, description="Names of coefficients of C and D that are known and not estimated."
-    )
+    variance: Variance | None = optional("Variance of e, or its covariance matrix.")
+    known: Names | None = optional("Names of coefficients of C and D that are known and not estimated.")
 
     def covariance(self, outputs: int) -> np.ndarray:
         """Return the covariance (outputs, outputs) of e; a number is a multiple of I, no variance is I."""
@@ -128,8 +128,8 @@ class Noise(NoiseShape):
 class SimulationNoise(NoiseShape):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
-    relative_std: Annotated[Positive, FRACTION] | None = Field(
-        default=None, description="Standard deviation as a fraction of the smallest output rms."
+    relative_std: Annotated[Positive, FRACTION] | None = optional(
+        "Standard deviation as a fraction of the smallest output rms."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -145,10 +145,9 @@ class Prior(Section):
         description="Information matrix (inverse covariance) of the parameters, or the name of a file: data "
         "(.csv), or a model that identify wrote (.yaml)."
     )
-    parameters: PriorParameters | None = Field(
-        default=None,
-        description="Names that order the rows of the matrix (default: the order of the model), or names and "
-        "values: {b1: 3.6, f1: -0.7}.",
+    parameters: PriorParameters | None = optional(
+        "Names that order the rows of the matrix (default: the order of the model), or names and "
+        "values: {b1: 3.6, f1: -0.7}."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -192,15 +191,12 @@ class Experiment(Section):
     """How the data will be collected."""
 
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
-    duration: Time | None = Field(
-        default=None, description="In place of samples: how long it lasts, in time_unit.", examples=[3600]
+    duration: Time | None = optional("In place of samples: how long it lasts, in time_unit.", examples=[3600])
+    controller: Controller | None = optional(
+        "C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
+        "closed loop. With several channels: loops, or numerator and denominator as rows of columns."
     )
-    controller: Controller | None = Field(
-        default=None,
-        description="C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
-        "closed loop. With several channels: loops, or numerator and denominator as rows of columns.",
-    )
-    prior: Prior | None = Field(default=None, description="Information already at hand.")
+    prior: Prior | None = optional("Information already at hand.")
 
 
 class Cost(Section):
@@ -259,8 +255,8 @@ Label = Annotated[
 class Channel(Section):
     """One input or output."""
 
-    name: Label | None = Field(default=None, description="What it is called.", examples=["valve"])
-    unit: Label | None = Field(default=None, description="The unit of its samples.", examples=["%"])
+    name: Label | None = optional("What it is called.", examples=["valve"])
+    unit: Label | None = optional("The unit of its samples.", examples=["%"])
 
 
 Channels = Mapping[str, Channel]
@@ -273,37 +269,30 @@ class Pilot(Section):
     """The first part, while little is known of the plant."""
 
     samples: Samples = Field(description="Its length.")
-    power: Positive | None = Field(
-        default=None,
-        description="Power of white noise in place of the first plan, for a plant of which next to nothing "
-        "is known.",
+    power: Positive | None = optional(
+        "Power of white noise in place of the first plan, for a plant of which next to nothing is known."
     )
 
 
 class Campaign(Section):
     """An experiment in parts, planned anew after each of them until the data say stop."""
 
-    block: Samples | None = Field(
-        default=None, description="Samples of each part (default: a tenth of the experiment)."
-    )
-    stages: Annotated[Several[Samples], SIZES["campaign.stages"]] | None = Field(
-        default=None, description="In place of block: the samples of the parts, one by one."
+    block: Samples | None = optional("Samples of each part (default: a tenth of the experiment).")
+    stages: Annotated[Several[Samples], SIZES["campaign.stages"]] | None = optional(
+        "In place of block: the samples of the parts, one by one."
     )
     pilot: (
         Annotated[Pilot, Shorthand("samples", {"type": "integer", "minimum": 1, "maximum": 1_000_000})] | None
-    ) = Field(
-        default=None,
-        description="The first part: its samples, or {samples, power} for white noise (default: a block, at "
-        "most a tenth of the experiment).",
+    ) = optional(
+        "The first part: its samples, or {samples, power} for white noise (default: a block, at "
+        "most a tenth of the experiment)."
     )
-    max_samples: Samples | None = Field(
-        default=None,
-        description="Where the experiment ends at the latest (default: three times its samples).",
+    max_samples: Samples | None = optional(
+        "Where the experiment ends at the latest (default: three times its samples)."
     )
-    power_cap: Positive | None = Field(
-        default=None,
-        description="Largest cost of a sample, relative to the first plan; a plan beyond it is made longer, "
-        "a part weaker (default: 10).",
+    power_cap: Positive | None = optional(
+        "Largest cost of a sample, relative to the first plan; a plan beyond it is made longer, "
+        "a part weaker (default: 10)."
     )
     last: Literal["robust", "nominal"] = Field(
         default="robust",

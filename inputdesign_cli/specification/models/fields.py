@@ -1,13 +1,17 @@
-"""The types of the values of a spec, with pydantic's constraints; `pydantic_errors` words what they refuse.
+"""The types of the values of a spec: constraints of pydantic, conditions on bands, matrices and polynomials.
 
-A union names its alternatives by tags, so that pydantic tries only the one that is meant.
+`pydantic_errors` words their errors. A union names its alternatives by tags, so that pydantic tries only one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from typing import Annotated, Literal, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     AllowInfNan,
@@ -21,25 +25,258 @@ from pydantic import (
 from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Wording, carry, fail, tag
 from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
 from inputdesign_cli.specification.models.units import FRACTION, FREQUENCY, SIGNAL, TIME
-from inputdesign_cli.specification.models.values import (
-    Polynomial,
-    as_text,
-    as_whole,
-    ascending,
-    check_delay_stable,
-    check_leading,
-    check_monic,
-    check_no_growth,
-    check_not_zero,
-    depth,
-    positive_definite,
-    product_exists,
-    rising,
-    same_columns,
-    semidefinite,
-    symmetric,
-    two_frequencies,
-)
+from inputdesign_cli.specification.models.wording import show
+
+Polynomial = tuple[float, ...]
+
+# Coefficients with a relative sum below this have a root at z = 1; a radius this near to 1 is 1.
+_ROUNDING = 1e-12
+
+
+def product(factors: Iterable[Polynomial]) -> Polynomial:
+    """Return the product of polynomials, all in ascending or all in descending powers."""
+    with np.errstate(all="ignore"):
+        full: np.ndarray = functools.reduce(np.convolve, (np.asarray(f) for f in factors), np.ones(1))
+    return tuple(float(c) for c in full)
+
+
+def check_not_zero(polynomial: Polynomial) -> PathDiagnostic | None:
+    """Some coefficient differs from zero."""
+    if any(polynomial):
+        return None
+    return PathDiagnostic(
+        "zero-polynomial", "all coefficients of {key} are zero", "write at least one that is not"
+    )
+
+
+def check_leading(polynomial: Polynomial) -> PathDiagnostic | None:
+    """The first coefficient differs from zero."""
+    if polynomial[0] != 0.0:
+        return None
+    return check_not_zero(polynomial) or PathDiagnostic(
+        "zero-leading-coefficient", "{key} must not start with 0", "remove the leading zeros"
+    )
+
+
+def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In q^-1, ascending: the first coefficient is exactly 1."""
+    lead = polynomial[0]
+    if lead == 1.0:
+        return None
+    if lead == 0.0:
+        return PathDiagnostic(
+            "not-monic",
+            "{key} must start with 1, not 0",
+            "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0",
+        )
+    hint = f"divide all its coefficients by {show(lead)}: {_listed([c / lead for c in polynomial])}"
+    if polynomial[-1] == 1.0:
+        hint = f"its coefficients ascend in q^-1: did you mean {_listed(polynomial[::-1])}?"
+    return PathDiagnostic("not-monic", f"{{key}} must start with 1, not {show(lead)}", hint)
+
+
+def _listed(coefficients: Sequence[float]) -> str:
+    more = ", ..." if len(coefficients) > 6 else ""
+    return f"[{', '.join(show(c) for c in coefficients[:6])}{more}]"
+
+
+def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In q^-1, ascending: all roots in z lie strictly inside the unit circle."""
+    roots, found = _roots(polynomial)
+    if found or not roots.size:
+        return found
+    worst = roots[np.argmax(np.abs(roots))]
+    radius = float(abs(worst))
+    if radius < 1.0 - _ROUNDING:
+        return None
+    angle = abs(float(np.angle(worst)))
+    where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
+    return PathDiagnostic(
+        "unstable-polynomial",
+        f"{{key}} has a root of radius {where} at {angle:.4g} rad/sample; "
+        "all roots (in z) must lie inside the unit circle",
+        "check the signs, and that the coefficients ascend in q^-1 and begin with 1"
+        + _decimal_comma(polynomial),
+    )
+
+
+def _decimal_comma(polynomial: Polynomial) -> str:
+    """Return the hint on 0,7 in place of 0.7, for whole numbers with a zero before another."""
+    whole = all(float(c).is_integer() for c in polynomial)
+    if whole and 0.0 in polynomial[1:-1]:
+        return "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
+    return ""
+
+
+def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In q^-1, ascending: all roots lie inside the unit circle, but for integrators at z = 1."""
+    rest = np.asarray(polynomial, dtype=float)
+    while rest.size > 1 and abs(np.sum(rest)) <= _ROUNDING * np.sum(np.abs(rest)):
+        rest = np.cumsum(rest)[:-1]  # divided by 1 - q^-1
+    return check_delay_stable(tuple(rest.tolist()))
+
+
+def check_no_growth_in_s(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In s, descending: all roots lie in the open left half plane, but for integrators at s = 0."""
+    last = max((i for i, c in enumerate(polynomial) if c), default=0)
+    return check_left_half_plane(polynomial[: last + 1])
+
+
+def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In s, descending: all roots lie in the open left half plane."""
+    roots, found = _roots(polynomial)
+    if found or not roots.size:
+        return found
+    worst = roots[np.argmax(roots.real)]
+    if worst.real < 0:
+        return None
+    place = f"{worst.real + 0.0:.4g}" + (f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else "")
+    return PathDiagnostic(
+        "unstable-polynomial",
+        f"{{key}} has a root at s = {place}; all poles must lie in the left half plane",
+        "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3",
+    )
+
+
+def _roots(polynomial: Polynomial) -> tuple[np.ndarray, PathDiagnostic | None]:
+    try:
+        with np.errstate(all="ignore"):
+            roots = np.roots(np.asarray(polynomial, dtype=float))
+    except np.linalg.LinAlgError:
+        roots = np.full(1, np.nan)
+    if not np.all(np.isfinite(roots)):
+        return np.zeros(0), PathDiagnostic(
+            "bad-polynomial",
+            "the roots of {key} cannot be computed: its coefficients differ by too many orders of magnitude",
+            "rescale it, or choose another time unit",
+        )
+    return roots, None
+
+
+PolynomialList = tuple[Polynomial, ...]
+PolynomialMatrix = tuple[tuple[Polynomial, ...], ...]
+Matrix = tuple[tuple[float, ...], ...]
+Nested = TypeVar("Nested", bound=tuple)
+
+
+def depth(value: object) -> int:
+    """Return how deeply lists are nested: 0 for a number, 1 for a list of numbers."""
+    if not isinstance(value, list | tuple):
+        return 0
+    return 1 + max((depth(v) for v in value), default=0)
+
+
+def as_whole(value: object) -> object:
+    """Return 500.0 as 500, and everything else unchanged."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def as_text(value: object) -> object:
+    """Return an unquoted number, true or false as its text, and everything else unchanged."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value) if isinstance(value, int | float) else value
+
+
+def rising(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Frequencies or harmonics increase."""
+    for before, after in pairwise(values):
+        if not before < after:
+            message = f"{{key}} must increase: {show(after)} follows {show(before)}"
+            raise fail("not-increasing", message, "sort the entries and remove repetitions")
+    return values
+
+
+def two_frequencies(value: object) -> object:
+    """A band has two ends."""
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        message = "{key} must be two frequencies, [low, high]"
+        raise fail("bad-band", message, "write [0.01, 3.0]")
+    return value
+
+
+def ascending(band: tuple[float, float]) -> tuple[float, float]:
+    """A band is not empty."""
+    low, high = band
+    if not low < high:
+        message = f"{{key}} must ascend: {show(low)} is not below {show(high)}"
+        raise fail("bad-band", message, "write [low, high]")
+    return band
+
+
+def same_columns(rows: Nested) -> Nested:
+    """The rows of a matrix of polynomials are equally long."""
+    if len({len(row) for row in rows}) > 1:
+        lengths = ", ".join(str(len(row)) for row in rows)
+        raise fail(
+            "wrong-shape",
+            f"the rows of {{key}} must have the same number of columns (they have {lengths})",
+            "one row per output, one column per input; write [0] where an input has no effect",
+        )
+    return rows
+
+
+def product_exists(denominator: Nested) -> Nested:
+    """The factors of a denominator can be multiplied out; one polynomial or a matrix of them passes."""
+    if depth(denominator) != 2:
+        return denominator
+    multiplied = product(denominator)
+    SIZES["coefficients of a denominator"].check(multiplied)
+    if not np.all(np.isfinite(multiplied)):
+        message = "the product of the factors of {key} is too large"
+        raise fail("bad-polynomial", message, "rescale the factors")
+    return denominator
+
+
+def symmetric(rows: Matrix) -> Matrix:
+    """A matrix is square and symmetric."""
+    for row in rows:
+        if len(row) != len(rows):
+            message = f"it has {len(rows)} rows, and one of them has {len(row)} entries"
+            raise fail("wrong-shape", f"{{key}} must be square: {message}")
+    values = np.array(rows)
+    for i, j in np.argwhere(np.tril(np.abs(values - values.T)) > 1e-9 * np.max(np.abs(values))):
+        entry, mirrored = (
+            f"({i + 1}, {j + 1}) is {show(rows[i][j])}",
+            f"({j + 1}, {i + 1}) is {show(rows[j][i])}",
+        )
+        raise fail("not-symmetric", f"{{key}} is not symmetric: entry {entry} but {mirrored}")
+    return rows
+
+
+def semidefinite(rows: Matrix) -> Matrix:
+    """A symmetric matrix has no negative eigenvalue beyond rounding."""
+    if _smallest_eigenvalue(rows) < -1e-9:
+        message = "{key} must be positive semidefinite"
+        raise fail("not-positive-definite", message, "check the signs of its entries")
+    return rows
+
+
+def positive_definite(rows: Matrix) -> Matrix:
+    """A covariance matrix is positive definite; tested on correlations, so that units do not matter."""
+    values = np.array(rows)
+    variances = np.diag(values)
+    if np.any(variances <= 0.0) or not _has_positive_correlations(values, np.sqrt(variances)):
+        raise fail(
+            "not-positive-definite",
+            "{key} is not a covariance matrix: it must be positive definite",
+            "each variance must be positive, and each covariance below the geometric mean of its variances",
+        )
+    return rows
+
+
+def _has_positive_correlations(values: NDArray[np.float64], deviations: NDArray[np.float64]) -> bool:
+    with np.errstate(over="ignore"):
+        correlations = values / deviations / deviations[:, None]
+    return bool(np.all(np.isfinite(correlations)) and np.linalg.eigvalsh(correlations)[0] > 0.0)
+
+
+def _smallest_eigenvalue(rows: Matrix) -> float:
+    """The smallest eigenvalue of a symmetric matrix, relative to its largest entry (0 for a zero matrix)."""
+    values = np.array(rows)
+    scale = float(np.max(np.abs(values)))
+    return float(np.linalg.eigvalsh(values / scale)[0]) if scale > 0 else 0.0
+
 
 T = TypeVar("T")
 

@@ -18,7 +18,14 @@ from inputdesign_cli.specification.models.fields import (
     PerChannel,
     Time,
 )
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, pick, tag
+from inputdesign_cli.specification.models.section import (
+    PathDiagnostic,
+    Section,
+    Shorthand,
+    optional,
+    pick,
+    tag,
+)
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
 from inputdesign_cli.specification.models.units import MOVE
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -29,12 +36,8 @@ _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 class PowerLimit(Section):
     """Bounds on a power: of the sum over the channels, or with a list of each channel."""
 
-    max: PerChannel[Cap] | None = Field(
-        default=None, description="Largest power; a number or one per channel."
-    )
-    min: PerChannel[NonNegative] | None = Field(
-        default=None, description="Smallest power; a number or one per channel."
-    )
+    max: PerChannel[Cap] | None = optional("Largest power; a number or one per channel.")
+    min: PerChannel[NonNegative] | None = optional("Smallest power; a number or one per channel.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """A bound is given, and the lower one is below the upper one."""
@@ -65,10 +68,8 @@ Curve = Annotated[
 class SpectrumLimit(Section):
     """Bounds on the spectrum of the excitation at every frequency."""
 
-    max: Curve | None = Field(
-        default=None, description="Largest density: a number, {table: file}, or a filter W for |W|^2."
-    )
-    min: Curve | None = Field(default=None, description="Smallest density, in the same forms.")
+    max: Curve | None = optional("Largest density: a number, {table: file}, or a filter W for |W|^2.")
+    min: Curve | None = optional("Smallest density, in the same forms.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """A bound is given, the lower one is below the upper one, and the upper one is positive."""
@@ -86,11 +87,9 @@ Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 class AmplitudeLimit(Section):
     """Bounds on single samples, about the operating point and without noise."""
 
-    input: PerChannel[Level] | None = Field(
-        default=None, description="Largest |u|; a number or one per input."
-    )
-    output: PerChannel[Level] | None = Field(
-        default=None, description="Largest |y| of the simulated output; a number or one per output."
+    input: PerChannel[Level] | None = optional("Largest |u|; a number or one per input.")
+    output: PerChannel[Level] | None = optional(
+        "Largest |y| of the simulated output; a number or one per output."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -101,28 +100,21 @@ class AmplitudeLimit(Section):
 class Limits(Section):
     """Bounds on the experiment; all are optional."""
 
-    input_power: Power | None = Field(
-        default=None, description="Power of u that r causes: number, list, {min, max}."
+    input_power: Power | None = optional("Power of u that r causes: number, list, {min, max}.")
+    output_power: Power | None = optional("Power of y that r causes: number, list, {min, max}.")
+    excitation_power: Power | None = optional("Power of r: number, list, {min, max}.")
+    samples: Count | None = optional("Largest number of samples.")
+    duration: Time | None = optional("In place of samples: the longest experiment, in time_unit.")
+    amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = optional(
+        "Largest |u|: a number or one per input; or {input, output}."
     )
-    output_power: Power | None = Field(
-        default=None, description="Power of y that r causes: number, list, {min, max}."
+    rate: PerChannel[Annotated[Level, MOVE]] | None = optional(
+        "Largest change of u from one sample to the next; a number or one per input."
     )
-    excitation_power: Power | None = Field(default=None, description="Power of r: number, list, {min, max}.")
-    samples: Count | None = Field(default=None, description="Largest number of samples.")
-    duration: Time | None = Field(
-        default=None, description="In place of samples: the longest experiment, in time_unit."
-    )
-    amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = Field(
-        default=None, description="Largest |u|: a number or one per input; or {input, output}."
-    )
-    rate: PerChannel[Annotated[Level, MOVE]] | None = Field(
-        default=None,
-        description="Largest change of u from one sample to the next; a number or one per input.",
-    )
-    energy: Cap | None = Field(default=None, description="Power summed over the samples (trace R).")
-    band: Band | None = Field(default=None, description="The excitation vanishes outside these frequencies.")
+    energy: Cap | None = optional("Power summed over the samples (trace R).")
+    band: Band | None = optional("The excitation vanishes outside these frequencies.")
     spectrum: Annotated[SpectrumLimit, Shorthand("max", {"type": "number", "exclusiveMinimum": 0})] | None = (
-        Field(default=None, description="Bounds on the density at every frequency: a number, or {max, min}.")
+        optional("Bounds on the density at every frequency: a number, or {max, min}.")
     )
 
     @property

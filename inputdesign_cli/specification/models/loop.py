@@ -10,23 +10,20 @@ from pydantic import Field
 
 from inputdesign_cli.specification.models.controller import Controller, Rule
 from inputdesign_cli.specification.models.fields import Band, Fraction, PerChannel, Positive, Time
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional
 from inputdesign_cli.specification.models.transfer import Target, Transfer, check_stable
 
 
 class Control(Section):
     """The control law that will be computed from the model: exactly one."""
 
-    model_reference: Target | None = Field(
-        default=None,
-        description="Desired loop from reference to output: t I, or a matrix; from s by a zero-order hold.",
+    model_reference: Target | None = optional(
+        "Desired loop from reference to output: t I, or a matrix; from s by a zero-order hold."
     )
-    internal_model: Transfer | None = Field(
-        default=None, description="Filter of an internal-model controller."
-    )
+    internal_model: Transfer | None = optional("Filter of an internal-model controller.")
     minimum_variance: (
         Annotated[Literal[True], Wording("true", "remove the key to choose another law")] | None
-    ) = Field(default=None, description="true: minimum-variance control.")
+    ) = optional("true: minimum-variance control.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """There is one law, and its transfer functions are stable."""
@@ -41,7 +38,7 @@ class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
     variance: PerChannel[Positive] = Field(default=1.0, description="Variance; a number or one per output.")
-    filter: Transfer | None = Field(default=None, description="Filter that colours it (default 1).")
+    filter: Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The filter is stable."""
@@ -71,9 +68,7 @@ MOST_DECIBELS = 100.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: Time | None = Field(
-        default=None, description="Time constant of the closed loop, in time_unit (default: the dead time)."
-    )
+    tau_c: Time | None = optional("Time constant of the closed loop, in time_unit (default: the dead time).")
 
 
 class Amigo(Section):
@@ -85,8 +80,8 @@ class Amigo(Section):
 class Tuning(Section):
     """How the controller follows from gain, time constant and dead time of the nominal plant."""
 
-    simc: Simc | None = Field(default=None, description="{tau_c: 25}, or {} for the dead time.")
-    amigo: Amigo | None = Field(default=None, description="{type: pi} or {type: pid}.")
+    simc: Simc | None = optional("{tau_c: 25}, or {} for the dead time.")
+    amigo: Amigo | None = optional("{type: pi} or {type: pid}.")
     sample: Rule = Field(default="tustin", description="How s becomes q^-1 (default tustin).")
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -97,26 +92,18 @@ class Tuning(Section):
 class LoopMargin(Section):
     """For every plant within r_u the loop is stable, with |S| below a peak at every frequency."""
 
-    controller: Controller | None = Field(
-        default=None, description="C of the loop (default: the controller of the experiment)."
-    )
-    tuning: Tuning | None = Field(default=None, description="Or the rule by which it is tuned.")
-    max_sensitivity_db: Positive | None = Field(default=None, description="Largest |S|, in dB.")
+    controller: Controller | None = optional("C of the loop (default: the controller of the experiment).")
+    tuning: Tuning | None = optional("Or the rule by which it is tuned.")
+    max_sensitivity_db: Positive | None = optional("Largest |S|, in dB.")
     phase_margin: (
         Annotated[Positive, Wording("a number", "write degrees between 0 and 60: 45, for example")] | None
-    ) = Field(
-        default=None, description="Least phase margin in degrees, below 60, kept by the peak of |S| for it."
-    )
+    ) = optional("Least phase margin in degrees, below 60, kept by the peak of |S| for it.")
     gain_margin: Annotated[Positive, Wording("a number", "write a factor above 1: 2, for example")] | None = (
-        Field(
-            default=None, description="Least gain margin, a factor above 1, kept by the peak of |S| for it."
-        )
+        optional("Least gain margin, a factor above 1, kept by the peak of |S| for it.")
     )
 
-    confidence: Fraction | None = Field(
-        default=None, description="Probability that fixes alpha by chi-squared (default 0.95)."
-    )
-    band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
+    confidence: Fraction | None = optional("Probability that fixes alpha by chi-squared (default 0.95).")
+    band: Band | None = optional("Frequencies [low, high] (default: all).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """There are one margin, which a loop can have, and one controller."""

@@ -11,9 +11,9 @@ from pydantic import GetJsonSchemaHandler
 from pydantic_core import core_schema
 
 from inputdesign_cli.expressions import Expression, ExpressionError, is_name
+from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.units import without_unit
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.models.wording import nearest
 from inputdesign_cli.specification.yaml.places import Path
 from inputdesign_cli.specification.yaml.plain import Plain

@@ -9,18 +9,23 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from inputdesign_cli.expressions import Expression
+from inputdesign_cli.specification.models.continuous import Continuous
 from inputdesign_cli.specification.models.fields import (
     Count,
     GainMatrix,
     Index,
+    Matrix,
     MonicPerOutput,
     Names,
     NonNegative,
     Number,
     Numbers,
+    PolynomialMatrix,
     Several,
     StableMatrix,
+    depth,
     nested,
+    same_columns,
 )
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
@@ -36,8 +41,14 @@ from inputdesign_cli.specification.models.named import (
     values_of,
     worth,
 )
-from inputdesign_cli.specification.models.process import ProcessModel
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, carry, pick
+from inputdesign_cli.specification.models.section import (
+    PathDiagnostic,
+    Section,
+    Wording,
+    carry,
+    optional,
+    pick,
+)
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_gain,
@@ -46,9 +57,7 @@ from inputdesign_cli.specification.models.shapes import (
     size_of,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import DelayedMatrix
 from inputdesign_cli.specification.models.units import TIME
-from inputdesign_cli.specification.models.values import Matrix, PolynomialMatrix, depth, same_columns
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
@@ -64,9 +73,7 @@ class NamedPlant(Section):
         "these alone are estimated.",
         examples=[{"K": 2.1, "T": 180}],
     )
-    known: Names | None = Field(
-        default=None, description="Names of parameters that are known and not estimated.", examples=[["b1"]]
-    )
+    known: Names | None = optional("Names of parameters that are known and not estimated.", examples=[["b1"]])
 
     _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
 
@@ -131,11 +138,10 @@ class StateSpace(Section):
     A: Rows = Field(description="States by states.", examples=[[[0, 1], [0, "-1/T"]]])
     B: Rows = Field(description="States by inputs.", examples=[[[0], ["k/T"]]])
     C: Rows = Field(description="Outputs by states.", examples=[[[1, 0]]])
-    D: Rows | None = Field(default=None, description="Outputs by inputs (default 0).")
-    K: Rows | None = Field(
-        default=None,
-        description="Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
-        "noise is added to the outputs).",
+    D: Rows | None = optional("Outputs by inputs (default 0).")
+    K: Rows | None = optional(
+        "Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
+        "noise is added to the outputs)."
     )
     delay: Annotated[NonNegative, EXPRESSIONS, TIME] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
@@ -161,18 +167,6 @@ class StateSpace(Section):
                 yield PathDiagnostic("wrong-shape", message, f"it has {words}", (key,))
 
 
-Continuous = Annotated[
-    DelayedMatrix | ProcessModel,
-    pick(
-        lambda v: (DelayedMatrix if v.keys().isdisjoint(ProcessModel.model_fields) else ProcessModel).phrase
-    ),
-    Wording(
-        "a mapping of keys", "write {numerator: [..], denominator: [..]}, or {gain: .., time_constant: ..}"
-    ),
-]
-"""The transfer matrix in s, in one of two forms."""
-
-
 class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials A, B, F"):
     """A(q) y = B(q)/F(q) u + noise, coefficients in ascending powers of q^-1."""
 
@@ -191,8 +185,8 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         description="Leading zeros are the delay. MIMO: rows (outputs) of columns (inputs) of polynomials.",
         examples=[[0, 3.6]],
     )
-    F: Annotated[StableMatrix, EXPRESSIONS] | None = Field(
-        default=None, description="Monic and stable, in the shape of B (default 1)."
+    F: Annotated[StableMatrix, EXPRESSIONS] | None = optional(
+        "Monic and stable, in the shape of B (default 1)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -255,9 +249,8 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     continuous: Continuous = Field(
         description="Transfer matrix in s, rows are outputs; or gain, time constant and dead time."
     )
-    sample: Literal["zoh"] | None = Field(
-        default=None,
-        description="zoh: sampled at sample_time with a zero-order hold. Absent: continuous time.",
+    sample: Literal["zoh"] | None = optional(
+        "zoh: sampled at sample_time with a zero-order hold. Absent: continuous time."
     )
 
     @property
@@ -307,8 +300,8 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("state_space",)
 
     state_space: StateSpace = Field(description="A, B, C, D, and K of the noise.")
-    sample: Literal["zoh"] | None = Field(
-        default=None, description="zoh: matrices in continuous time are sampled with a zero-order hold."
+    sample: Literal["zoh"] | None = optional(
+        "zoh: matrices in continuous time are sampled with a zero-order hold."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:

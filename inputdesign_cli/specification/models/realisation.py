@@ -22,7 +22,7 @@ from inputdesign_cli.specification.models.fields import (
     Tolerance,
 )
 from inputdesign_cli.specification.models.plant import TruePlant
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail, optional
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
 
@@ -53,52 +53,43 @@ class Quantisation(Section):
 class Signal(Section):
     """The time series that realises the spectrum."""
 
-    type: SignalType | None = Field(
-        default=None, description="Kind of signal (default: what suits the spectrum)."
+    type: SignalType | None = optional("Kind of signal (default: what suits the spectrum).")
+    samples: Samples | None = optional("Length (default: experiment.samples).")
+    seed: Index | None = optional("Seed of the random numbers.")
+    phases: Literal["random", "schroeder", "optimised"] | None = optional(
+        "Phases of a multisine; optimised: for a low crest factor."
     )
-    samples: Samples | None = Field(default=None, description="Length (default: experiment.samples).")
-    seed: Index | None = Field(default=None, description="Seed of the random numbers.")
-    phases: Literal["random", "schroeder", "optimised"] | None = Field(
-        default=None, description="Phases of a multisine; optimised: for a low crest factor."
+    periods: Samples | None = optional("Number of equal periods.")
+    hold: Samples | None = optional("Samples for which each value is held.")
+    lines: Annotated[Harmonics, SIZES["signal.lines"]] | None = optional(
+        "Harmonics of a period that are used: their number, odd, or a list."
     )
-    periods: Samples | None = Field(default=None, description="Number of equal periods.")
-    hold: Samples | None = Field(default=None, description="Samples for which each value is held.")
-    lines: Annotated[Harmonics, SIZES["signal.lines"]] | None = Field(
-        default=None, description="Harmonics of a period that are used: their number, odd, or a list."
+    amplitudes: PerChannel[Annotated[Positive, SIGNAL]] | None = optional(
+        "Amplitude (level) to scale to, whatever it buys; a number or one per input."
     )
-    amplitudes: PerChannel[Annotated[Positive, SIGNAL]] | None = Field(
-        default=None,
-        description="Amplitude (level) to scale to, whatever it buys; a number or one per input.",
+    offset: PerChannel[Annotated[Number, SIGNAL]] | None = optional(
+        "Operating point added; a number or one per input."
     )
-    offset: PerChannel[Annotated[Number, SIGNAL]] | None = Field(
-        default=None, description="Operating point added; a number or one per input."
+    ramp: Annotated[Index, SIZES["signal.samples"]] | None = optional(
+        "Samples over which the signal fades in and out."
     )
-    ramp: Annotated[Index, SIZES["signal.samples"]] | None = Field(
-        default=None, description="Samples over which the signal fades in and out."
+    order: Annotated[Count, SIZES["signal.order"]] | None = optional(
+        "States for each input of a rational filter for filtered_noise (default: a long filter)."
     )
-    order: Annotated[Count, SIZES["signal.order"]] | None = Field(
-        default=None,
-        description="States for each input of a rational filter for filtered_noise (default: a long filter).",
+    start: Literal["steady", "zero"] | None = optional(
+        "Past of a regression's input: its periodic continuation (default), or zero."
     )
-    start: Literal["steady", "zero"] | None = Field(
-        default=None,
-        description="Past of a regression's input: its periodic continuation (default), or zero.",
+    bits: RegisterLength | None = optional("Length of the shift register of a prbs (default: no repetition).")
+    quantisation: Quantisation | None = optional("The converter: {bits, range}.")
+    scale: Literal["target", "design"] | None = optional(
+        "target: the least power with which the record itself meets the accuracy (default); "
+        "design: the power of the design."
     )
-    bits: RegisterLength | None = Field(
-        default=None, description="Length of the shift register of a prbs (default: no repetition)."
+    also: tuple[Literal["mat", "npz", "h", "wav"], ...] | None = optional(
+        "Other files of the signal beside signal.csv: mat (MATLAB), npz (numpy), h (C), wav."
     )
-    quantisation: Quantisation | None = Field(default=None, description="The converter: {bits, range}.")
-    scale: Literal["target", "design"] | None = Field(
-        default=None,
-        description="target: the least power with which the record itself meets the accuracy (default); "
-        "design: the power of the design.",
-    )
-    also: tuple[Literal["mat", "npz", "h", "wav"], ...] | None = Field(
-        default=None,
-        description="Other files of the signal beside signal.csv: mat (MATLAB), npz (numpy), h (C), wav.",
-    )
-    candidates: Annotated[Count, SIZES["signal.candidates"]] | None = Field(
-        default=None, description="Number of random realisations to choose the best of."
+    candidates: Annotated[Count, SIZES["signal.candidates"]] | None = optional(
+        "Number of random realisations to choose the best of."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -147,10 +138,8 @@ class Simulation(Section):
         default=100, description="Number of runs (default 100)."
     )
     seed: Index = Field(default=0, description="Seed of the random numbers (default 0).")
-    plant: TruePlant | None = Field(default=None, description="The true system (default: the nominal plant).")
-    noise: SimulationNoise | None = Field(
-        default=None, description="The true noise (default: the nominal noise)."
-    )
+    plant: TruePlant | None = optional("The true system (default: the nominal plant).")
+    noise: SimulationNoise | None = optional("The true noise (default: the nominal noise).")
     excitation: Literal["new", "record"] = Field(
         default="new",
         description="new: each run realises the spectrum anew (default); record: all runs apply the one "
@@ -177,8 +166,7 @@ Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of t
 class Report(Section):
     """The contents of the figures."""
 
-    ellipses: Annotated[Several[Pair], SIZES["report.ellipses"]] | None = Field(
-        default=None,
-        description="Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
-        "the most correlated ones; with one: none).",
+    ellipses: Annotated[Several[Pair], SIZES["report.ellipses"]] | None = optional(
+        "Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
+        "the most correlated ones; with one: none)."
     )

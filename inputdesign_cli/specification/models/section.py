@@ -10,6 +10,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Discriminator,
+    Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     Tag,
@@ -188,3 +189,8 @@ class Shorthand:
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Plain]:
         return {"anyOf": [*self.schemas, handler(schema)]}
+
+
+def optional(description: str, **more: Plain) -> Plain:
+    """Return the field of a key that may be absent; it is None then."""
+    return Field(default=None, description=description, **more)

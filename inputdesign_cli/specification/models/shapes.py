@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from inputdesign_cli.specification.models.fields import Polynomial, PolynomialMatrix, depth, product
 from inputdesign_cli.specification.models.named import TermMatrix, Terms, leading
 from inputdesign_cli.specification.models.section import PathDiagnostic
-from inputdesign_cli.specification.models.values import Polynomial, PolynomialMatrix, depth, product
 from inputdesign_cli.specification.models.wording import count
 
 

@@ -25,7 +25,7 @@ from inputdesign_cli.specification.models.fields import Text, Time
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.realisation import Report, Signal, Simulation, Solver
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.section import Section, optional
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
@@ -81,33 +81,28 @@ class Spec(Section):
     experiment: Experiment = Field(
         default=Experiment(), description="Samples, controller, prior information."
     )
-    estimate: Estimated | None = Field(
-        default=None,
-        description="The estimate of plant and noise by identify, with its covariance: for experiment.prior.",
+    estimate: Estimated | None = optional(
+        "The estimate of plant and noise by identify, with its covariance: for experiment.prior."
     )
     cost: Cost = Field(
         default=Cost(input_power=1.0),
         description="Weights of the powers. Default: input_power 1; in closed loop also output_power 1.",
     )
     accuracy: Accuracy = Field(default=Accuracy(), description="What the model must reach.")
-    objective: Objective | None = Field(
-        default=None, description="least_cost, best_accuracy or shortest_experiment; default: from the rest."
+    objective: Objective | None = optional(
+        "least_cost, best_accuracy or shortest_experiment; default: from the rest."
     )
     limits: Limits = Field(default=Limits(), description="What the experiment may not exceed.")
-    spectrum: Spectrum | None = Field(
-        default=None, description="Family of the input spectrum, or a given excitation."
+    spectrum: Spectrum | None = optional("Family of the input spectrum, or a given excitation.")
+    uncertainty: Uncertainty | None = optional(
+        "How well the plant is known: the design is then made for all such plants."
     )
-    uncertainty: Uncertainty | None = Field(
-        default=None, description="How well the plant is known: the design is then made for all such plants."
-    )
-    campaign: Campaign | None = Field(
-        default=None, description="The experiment goes in parts, each planned with the data so far."
-    )
+    campaign: Campaign | None = optional("The experiment goes in parts, each planned with the data so far.")
     signal: Signal = Field(default=Signal(), description="The time series that realises the spectrum.")
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")
-    simulation: Simulation | None = Field(default=None, description="Monte Carlo study on the true system.")
+    simulation: Simulation | None = optional("Monte Carlo study on the true system.")
     report: Report = Field(default=Report(), description="What the figures show.")
-    sweep: Sweep | None = Field(default=None, description="What `idesign sweep` varies.")
+    sweep: Sweep | None = optional("What `idesign sweep` varies.")
 
     phrase: ClassVar[str] = "a spec"
 

@@ -17,10 +17,18 @@ from inputdesign_cli.specification.models.fields import (
     PerChannel,
     Positive,
     Several,
+    depth,
 )
-from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Section, Wording, pick, tag
+from inputdesign_cli.specification.models.section import (
+    TAG,
+    PathDiagnostic,
+    Section,
+    Wording,
+    optional,
+    pick,
+    tag,
+)
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -48,11 +56,11 @@ class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
     """Lines, either evenly spaced or at given frequencies."""
 
     type: Literal["multisine"] = Field(description="Sinusoids.")
-    lines: Annotated[Count, SIZES["spectrum.lines"]] | None = Field(
-        default=None, description="Number of evenly spaced candidate frequencies."
+    lines: Annotated[Count, SIZES["spectrum.lines"]] | None = optional(
+        "Number of evenly spaced candidate frequencies."
     )
-    frequencies: Annotated[Frequencies, SIZES["spectrum.frequencies"]] | None = Field(
-        default=None, description="The candidate frequencies, increasing."
+    frequencies: Annotated[Frequencies, SIZES["spectrum.frequencies"]] | None = optional(
+        "The candidate frequencies, increasing."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -80,8 +88,8 @@ class PolynomialSpectrum(Section, family="spectrum", phrase="type: polynomial"):
     coefficients: Literal["real", "complex"] = Field(
         default="real", description="Kind of coefficients (default real)."
     )
-    factor_columns: Annotated[Count, SIZES["spectrum.factor_columns"]] | None = Field(
-        default=None, description="Columns of the spectral factor: the rank of the spectrum (default: full)."
+    factor_columns: Annotated[Count, SIZES["spectrum.factor_columns"]] | None = optional(
+        "Columns of the spectral factor: the rank of the spectrum (default: full)."
     )
 
 

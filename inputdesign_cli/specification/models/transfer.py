@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
 
-from inputdesign_cli.expressions import product_of
 from inputdesign_cli.specification.models.fields import (
     ContinuousDenominator,
     Denominator,
     GainMatrix,
-    NonNegativeGrid,
     Numerator,
+    Polynomial,
+    PolynomialList,
+    PolynomialMatrix,
     RowsMatrix,
+    check_delay_stable,
+    check_left_half_plane,
+    depth,
+    product,
 )
-from inputdesign_cli.specification.models.named import (
-    EXPRESSIONS,
-    CoefficientTerms,
-    TermMatrix,
-    expressed,
-    matrix,
-)
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, pick
+from inputdesign_cli.specification.models.named import TermMatrix, expressed
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_each,
@@ -32,17 +30,6 @@ from inputdesign_cli.specification.models.shapes import (
     check_proper,
     check_shapes,
     denominators_of,
-)
-from inputdesign_cli.specification.models.units import TIME
-from inputdesign_cli.specification.models.values import (
-    Polynomial,
-    PolynomialList,
-    PolynomialMatrix,
-    check_delay_stable,
-    check_left_half_plane,
-    check_no_growth_in_s,
-    depth,
-    product,
 )
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -86,12 +73,10 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
     kind: ClassVar[Literal["continuous"]] = "continuous"
 
     continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
-    sample: Literal["zoh"] | None = Field(
-        default=None, description="How it is sampled at sample_time: zoh, a zero-order hold."
-    )
+    sample: Literal["zoh"] | None = optional("How it is sampled at sample_time: zoh, a zero-order hold.")
 
 
-class _Matrix(Section):
+class TransferMatrix(Section):
     """numerator / denominator entry by entry, in s or in q^-1."""
 
     numerator: GainMatrix = Field(description="Coefficients; a matrix is rows (outputs) of columns (inputs).")
@@ -115,7 +100,7 @@ class _Matrix(Section):
         return denominators_of(self.numerator, self.denominator)
 
 
-class DiscreteMatrix(_Matrix, family="transfer", phrase="a transfer matrix in q^-1"):
+class DiscreteMatrix(TransferMatrix, family="transfer", phrase="a transfer matrix in q^-1"):
     """A transfer matrix in the delay operator: coefficients in ascending powers of q^-1."""
 
     kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
@@ -134,7 +119,7 @@ def check_each_proper(above: TermMatrix, below: PolynomialMatrix, levels: int) -
             yield from check_proper(entry, len(below[i][j]) - 1, "numerator", *where)
 
 
-class ContinuousMatrix(_Matrix):
+class ContinuousMatrix(TransferMatrix):
     """A stable transfer matrix in s, coefficients in descending powers."""
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -146,73 +131,6 @@ class ContinuousMatrix(_Matrix):
         yield from check_each_proper(
             expressed(self.numerator_matrix), self.denominator_matrix, depth(self.numerator)
         )
-
-
-class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s"):
-    """A transfer matrix in s of a plant, with dead times and integrators."""
-
-    kind: ClassVar[Literal["rational"]] = "rational"
-
-    numerator: Annotated[GainMatrix, EXPRESSIONS] = Field(
-        description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
-    )
-    denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
-        description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
-    )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
-        default=None,
-        description="Dead time in time_unit: a number, common to all entries, or rows of columns.",
-        examples=[25],
-    )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
-        yield from check_shapes(self.numerator, self.denominator)
-        yield from check_each(self.denominator, check_no_growth_in_s, "denominator")
-        sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
-        if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
-            message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
-            yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
-
-    def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
-        """Some coefficient of the numerators is present, and every entry is proper."""
-        for found in (
-            *check_gain(terms.numerator, "numerator"),
-            *check_each_proper(terms.numerator, self.denominator_matrix, depth(self.numerator)),
-        ):
-            yield replace(found, path=("continuous", *found.path))
-
-    @property
-    def common(self) -> bool:
-        """Whether all entries share one denominator."""
-        return depth(self.denominator) != 3
-
-    @property
-    def common_delay(self) -> bool:
-        """Whether all entries share one dead time."""
-        return not isinstance(self.delay, tuple)
-
-    @property
-    def delays(self) -> tuple[tuple[float, ...], ...]:
-        """Dead times as rows of columns; 0 where there is none."""
-        if isinstance(self.delay, tuple):
-            return self.delay
-        return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)
-
-    def terms(self, written: Mapping[str, Plain]) -> CoefficientTerms:
-        """Return the coefficients as expressions, from the section as it was written."""
-        above, below, delay = (
-            expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
-        )
-        rows = matrix(above)
-        denominators: TermMatrix
-        if depth(below) == 3:
-            denominators = matrix(below)
-        else:
-            common = product_of(below if depth(below) == 2 else [below])
-            denominators = tuple(tuple(common for _ in row) for row in rows)
-        delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
-        return CoefficientTerms(rows, denominators, delays)
 
 
 class ContinuousTarget(ContinuousMatrix):
@@ -227,7 +145,7 @@ class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-
     kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
 
     continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
-    sample: Literal["zoh"] | None = Field(default=None, description="How it is sampled: zoh.")
+    sample: Literal["zoh"] | None = optional("How it is sampled: zoh.")
 
 
 def transfer_kind(value: dict[str, Plain]) -> str:

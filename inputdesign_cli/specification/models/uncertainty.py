@@ -19,7 +19,15 @@ from inputdesign_cli.specification.models.fields import (
     Number,
     Several,
 )
-from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Section, Wording, fail, tag
+from inputdesign_cli.specification.models.section import (
+    TAG,
+    PathDiagnostic,
+    Section,
+    Wording,
+    fail,
+    optional,
+    tag,
+)
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.wording import show
 
@@ -53,45 +61,38 @@ Scenarios = Annotated[
 class Uncertainty(Section):
     """How well the plant is known, and how the design takes this into account."""
 
-    covariance: CovarianceSource | None = Field(
-        default=None,
-        description="Covariance of the parameters around the nominal ones: a matrix, or a model that "
-        "identify wrote (.yaml).",
+    covariance: CovarianceSource | None = optional(
+        "Covariance of the parameters around the nominal ones: a matrix, or a model that "
+        "identify wrote (.yaml)."
     )
-    information: InformationSource | None = Field(
-        default=None,
-        description="Its inverse: an information matrix, or the name of a file: data (.csv) of the "
-        "excitation of an earlier experiment, or a model (.yaml).",
+    information: InformationSource | None = optional(
+        "Its inverse: an information matrix, or the name of a file: data (.csv) of the "
+        "excitation of an earlier experiment, or a model (.yaml)."
     )
-    intervals: Intervals | None = Field(
-        default=None, description="Parameters drawn evenly from intervals: {K: [1.5, 2.7]}; others are known."
+    intervals: Intervals | None = optional(
+        "Parameters drawn evenly from intervals: {K: [1.5, 2.7]}; others are known."
     )
-    parameters: Names | None = Field(
-        default=None, description="Names that order the rows of the matrix (default: the order of the model)."
+    parameters: Names | None = optional(
+        "Names that order the rows of the matrix (default: the order of the model)."
     )
-    scenarios: Scenarios | None = Field(
-        default=None,
-        description="How many plants are drawn (default: 100, or what risk needs), or the plants one by one: "
-        "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are nominal.",
+    scenarios: Scenarios | None = optional(
+        "How many plants are drawn (default: 100, or what risk needs), or the plants one by one: "
+        "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are nominal."
     )
-    risk: Fraction | None = Field(
-        default=None,
-        description="Share of plants that may be left out, with confidence 0.999: as many are drawn as it "
-        "takes.",
+    risk: Fraction | None = optional(
+        "Share of plants that may be left out, with confidence 0.999: as many are drawn as it takes."
     )
     discard: Annotated[NonNegative, Field(lt=0.5)] = Field(
         default=0.0, description="Share of the drawn plants that the design may leave out, the dearest."
     )
-    worst_case: Fraction | None = Field(
-        default=None,
-        description="Confidence of the ellipsoid (of intervals: all of them) in which the worst plant is "
-        "searched and added to the scenarios, until none is found that misses the accuracy. Never proved.",
+    worst_case: Fraction | None = optional(
+        "Confidence of the ellipsoid (of intervals: all of them) in which the worst plant is "
+        "searched and added to the scenarios, until none is found that misses the accuracy. Never proved."
     )
     seed: Index = Field(default=1, description="Seed of the draws.")
-    stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = Field(
-        default=None,
-        description="Plants with a pole (in closed loop: of the loop), or a zero of their noise model, "
-        "beyond this radius are not drawn (default: 0.998, or halfway from the nominal ones to one).",
+    stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = optional(
+        "Plants with a pole (in closed loop: of the loop), or a zero of their noise model, "
+        "beyond this radius are not drawn (default: 0.998, or halfway from the nominal ones to one)."
     )
     r_adm: Literal["own", "fixed"] = Field(
         default="own",
@@ -100,10 +101,9 @@ class Uncertainty(Section):
     floor: Annotated[NonNegative, Field(lt=1)] = Field(
         default=0.1, description="Least admissible error of a plant, as a share of that of the nominal plant."
     )
-    cost: Literal["nominal", "mean", "worst"] | None = Field(
-        default=None,
-        description="The powers that are paid for: of the nominal plant, their mean over all (default in "
-        "closed loop), or of the plant where they cost most.",
+    cost: Literal["nominal", "mean", "worst"] | None = optional(
+        "The powers that are paid for: of the nominal plant, their mean over all (default in "
+        "closed loop), or of the plant where they cost most."
     )
     fresh: Annotated[Index, SIZES["uncertainty.fresh"]] = Field(
         default=3000, description="Plants drawn afresh that the finished design is tried on."

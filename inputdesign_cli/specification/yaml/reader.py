@@ -131,8 +131,8 @@ class Document:
         parser = _PARSER(text)
         try:
             self.events = self._expanded(parser)
-            event, mark = next(self.events, (None, None))
-            data = None if event is None else self._value(event, mark, at, None)
+            first = next(self.events, None)
+            data = None if first is None else self._value(*first, at, None)
             next(self.events, None)  # errors behind the value are errors, too
         finally:
             parser.dispose()
@@ -157,6 +157,12 @@ class Document:
             hint = "move large tables into a CSV file; do not let aliases repeat aliases"
             raise self.error("yaml-limit", f"the spec holds more than {MAX_NODES} values", mark, hint)
 
+    def _check_depth(self, depth: int, mark: Mark) -> None:
+        if depth > MAX_DEPTH:
+            message = f"lists and mappings are nested more than {MAX_DEPTH} deep"
+            hint = "no key of a spec needs more than six levels; is a bracket left open?"
+            raise self.error("yaml-limit", message, mark, hint)
+
     def _location(self, mark: Mark) -> Location:
         text = self.lines[mark.line - 1] if 0 < mark.line <= len(self.lines) else ""
         return Location(self.file, mark.line, mark.column, text)
@@ -177,12 +183,13 @@ class Document:
                 continue
             found = [(event, mark)]
             if isinstance(event, yaml.AliasEvent):
-                (first, _), *inner = self._anchored(anchors, recording, event.anchor, mark)
+                (first, _), *inner = self._anchored(anchors, recording, str(event.anchor), mark)
                 found = [(first, mark), *inner]
             elif isinstance(event, yaml.NodeEvent) and event.anchor:
                 recording[event.anchor] = depth, []
             depth += isinstance(event, yaml.CollectionStartEvent)
             depth -= isinstance(event, yaml.CollectionEndEvent)
+            self._check_depth(depth - 1, mark)
             for _, events in recording.values():
                 events.extend(found)
             for name in [name for name, (begun, _) in recording.items() if begun == depth]:
@@ -205,10 +212,7 @@ class Document:
 
     def _value(self, event: Plain, mark: Mark, path: Path, key: Mark | None) -> Plain:
         """Return the plain data that begin with an event; `key` marks the key in front, if there is one."""
-        if len(path) > MAX_DEPTH:
-            message = f"lists and mappings are nested more than {MAX_DEPTH} deep"
-            hint = "no key of a spec needs more than six levels; is a bracket left open?"
-            raise self.error("yaml-limit", message, mark, hint)
+        self._check_depth(len(path), mark)
         mapping = isinstance(event, yaml.MappingStartEvent)
         self.tree.places.values[path] = key if mapping and key else mark
         if event.tag not in _PLAIN_TAGS:

@@ -73,6 +73,8 @@ ROWS: list[Row] = [
     ("unsuitable-key", "spectrum.type", "not sampled", {"plant": CONTINUOUS, "spectrum": "{type: §fir}"}),
     ("unsuitable-key", "accuracy.model_error.weight", "continuous: ", {
         "plant": CONTINUOUS, "accuracy": "{model_error: {absolute: 1, §weight: {numerator: [1]}}}"}),
+    ("unsuitable-key", "limits.spectrum.max", "continuous: ", {
+        "plant": CONTINUOUS, "limits": "{spectrum: {§max: {numerator: [1]}}}"}),
     # noise
     ("out-of-range", "noise.variance", "greater than 0", {"noise": "{variance: §0}"}),
     ("not-positive-definite", "noise.variance", "covariance", {"plant": MIMO, "noise": "{variance: §[[1, 2], [2, 1]]}"}),

@@ -103,8 +103,9 @@ def test_syntax_errors_have_a_place_and_plain_words(text, line, column, words):
         ("- " * 100_000, "yaml-limit"),
         ("a: [" + "1, " * 200_001 + "]", "yaml-limit"),
         ("a: &a [*a]", "yaml-limit"),
+        ("? " + "".join(f"&a{i} [" for i in range(20_000)) + "1" + "]" * 20_000 + "\n: 1", "yaml-limit"),
     ],
-    ids=range(16),
+    ids=range(17),
 )
 def test_what_is_no_spec_at_all(text, code):
     with pytest.raises(SpecError) as caught:

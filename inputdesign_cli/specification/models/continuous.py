@@ -1,25 +1,38 @@
-"""Plants in s by gain, time constant or damping and natural frequency, and dead time."""
+"""`plant.continuous:` by gain, time constant and dead time, or as a transfer matrix in s with dead times."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from inputdesign_cli.expressions import Expression
-from inputdesign_cli.specification.models.fields import NonNegativeGrid, NumberGrid, PositiveGrid
+from inputdesign_cli.expressions import Expression, product_of
+from inputdesign_cli.specification.models.fields import (
+    ContinuousDenominator,
+    GainMatrix,
+    NonNegativeGrid,
+    NumberGrid,
+    PolynomialMatrix,
+    PositiveGrid,
+    check_no_growth_in_s,
+    depth,
+)
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTerms,
     NamedParameter,
+    TermMatrix,
     Terms,
     expressed,
+    matrix,
 )
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
+from inputdesign_cli.specification.models.shapes import check_each, check_gain, check_shapes
+from inputdesign_cli.specification.models.transfer import TransferMatrix, check_each_proper
 from inputdesign_cli.specification.models.units import FREQUENCY, TIME
-from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
 QUANTITIES = ("gain", "time_constant", "damping", "natural_frequency", "dead_time")
@@ -33,19 +46,22 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     """
 
     kind: ClassVar[Literal["process"]] = "process"
+    # Every entry has a denominator and a dead time of its own.
+    common: ClassVar[bool] = False
+    common_delay: ClassVar[bool] = False
 
     gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = Field(
-        default=None, description="Time constant, in time_unit, of a plant of first order."
+    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = optional(
+        "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
-        default=None, description="Damping ratio of a plant of second order."
+    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = optional(
+        "Damping ratio of a plant of second order."
     )
-    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = Field(
-        default=None, description="Undamped natural frequency of a plant of second order, rad per time_unit."
+    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = optional(
+        "Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
-        default=None, description="Dead time, in time_unit; 0 where there is none."
+    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = optional(
+        "Dead time, in time_unit; 0 where there is none."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -86,21 +102,11 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         return self._numbers(1)
 
     @property
-    def common(self) -> bool:
-        """Every entry has a denominator of its own."""
-        return False
-
-    @property
     def delays(self) -> Grid:
         """Dead times as rows of columns; 0 where there is none."""
         if self.dead_time is None:
             return tuple(tuple(0.0 for _ in row) for row in self.grid("gain"))
         return self.grid("dead_time")
-
-    @property
-    def common_delay(self) -> bool:
-        """Every entry has a dead time of its own."""
-        return False
 
     def own_parameters(self) -> tuple[NamedParameter, ...]:
         """Return the quantities, entry by entry, without entries of gain zero and dead times of zero."""
@@ -168,3 +174,80 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     @staticmethod
     def _symbol(name: str, i: int, j: int) -> str:
         return f"{name}_{i + 1}_{j + 1}"
+
+
+class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matrix in s"):
+    """A transfer matrix in s of a plant, with dead times and integrators."""
+
+    kind: ClassVar[Literal["rational"]] = "rational"
+
+    numerator: Annotated[GainMatrix, EXPRESSIONS] = Field(
+        description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
+    )
+    denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
+        description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
+    )
+    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = optional(
+        "Dead time in time_unit: a number, common to all entries, or rows of columns.", examples=[25]
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
+        yield from check_shapes(self.numerator, self.denominator)
+        yield from check_each(self.denominator, check_no_growth_in_s, "denominator")
+        sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
+        if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
+            message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
+            yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
+
+    def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
+        """Some coefficient of the numerators is present, and every entry is proper."""
+        for found in (
+            *check_gain(terms.numerator, "numerator"),
+            *check_each_proper(terms.numerator, self.denominator_matrix, depth(self.numerator)),
+        ):
+            yield replace(found, path=("continuous", *found.path))
+
+    @property
+    def common(self) -> bool:
+        """Whether all entries share one denominator."""
+        return depth(self.denominator) != 3
+
+    @property
+    def common_delay(self) -> bool:
+        """Whether all entries share one dead time."""
+        return not isinstance(self.delay, tuple)
+
+    @property
+    def delays(self) -> tuple[tuple[float, ...], ...]:
+        """Dead times as rows of columns; 0 where there is none."""
+        if isinstance(self.delay, tuple):
+            return self.delay
+        return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)
+
+    def terms(self, written: Mapping[str, Plain]) -> CoefficientTerms:
+        """Return the coefficients as expressions, from the section as it was written."""
+        above, below, delay = (
+            expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
+        )
+        rows = matrix(above)
+        denominators: TermMatrix
+        if depth(below) == 3:
+            denominators = matrix(below)
+        else:
+            common = product_of(below if depth(below) == 2 else [below])
+            denominators = tuple(tuple(common for _ in row) for row in rows)
+        delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
+        return CoefficientTerms(rows, denominators, delays)
+
+
+Continuous = Annotated[
+    DelayedMatrix | ProcessModel,
+    pick(
+        lambda v: (DelayedMatrix if v.keys().isdisjoint(ProcessModel.model_fields) else ProcessModel).phrase
+    ),
+    Wording(
+        "a mapping of keys", "write {numerator: [..], denominator: [..]}, or {gain: .., time_constant: ..}"
+    ),
+]
+"""The transfer matrix in s, in one of two forms."""
