@@ -1,4 +1,4 @@
-"""Which samples of data are the periods that a design counts, gaps or not."""
+"""Pick the samples of data that are whole periods of a design, with gaps or without."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Counted:
 def whole_periods(stated: Periods, data: Data, name: str, step: float) -> Counted:
     """Return the data that count.
 
-    Records of equal length stay as they are. Of pieces between gaps, and of records of several lengths, the
-    periods that lie in one piece are taken: those that begin at the sample of a period of which there are
-    most, counted from the begin of each file, so that all have the same phase.
+    Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
+    periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
+    the one with the most periods.
 
     Args:
         name: of the file that messages name.
@@ -93,11 +93,9 @@ def _from_pieces(stated: Periods, data: Data, name: str, step: float) -> Counted
 
 
 def _places(data: Data, step: float) -> NDArray[np.int64]:
-    """(N,): the number of samples between the begin of a file and each of its samples."""
-    ends = np.cumsum([count for _, count in data.files])[:-1]
-    return np.concatenate([np.round((part - part[0]) / step) for part in np.split(data.time, ends)]).astype(
-        np.int64
-    )
+    """Return the number (N,) of samples between the begin of a file and each of its samples."""
+    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
+    return np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
 
 
 def _check(each: int, together: int, stated: Periods, name: str) -> None:
