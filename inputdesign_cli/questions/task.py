@@ -30,27 +30,12 @@ class Task(Protocol):
         """
 
 
-def _check_uncertainty(spec: Spec) -> None:
-    """Raise `SpecError` (`not-supported`) for questions that are not answered for several plants at once."""
-    accuracy = spec.accuracy
-    elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
-    if spec.uncertainty is None or not (elsewhere or spec.plant.kind == "regression"):
-        return
-    raise spec.complain(
-        "not-supported",
-        "this kind of design is not looked at for several plants at once",
-        hint="remove uncertainty, or ask for a design with model_error, information or a criterion",
-        key="uncertainty",
-    )
-
-
 def build_analysis(spec: Spec) -> Task:
     """Return the task of a given excitation, whatever is asked of it.
 
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    _check_uncertainty(spec)
     if spec.accuracy.frequency_response is not None and not spec.designs:
         return _response(spec)
     from inputdesign_cli.questions.given.build import build_given
@@ -64,7 +49,6 @@ def build_task(spec: Spec) -> Task:
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    _check_uncertainty(spec)
     if spec.campaign is not None:
         from inputdesign_cli.questions.campaign.build import build_campaign
 

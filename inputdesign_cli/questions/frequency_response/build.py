@@ -17,7 +17,7 @@ from inputdesign_cli.questions.building.model_error import positive_table
 from inputdesign_cli.questions.building.signal_settings import build_record_request
 from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.system import build_cost, build_model
-from inputdesign_cli.questions.building.unhandled import refuse_unhandled
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, refuse_unhandled
 from inputdesign_cli.questions.frequency_response.build_lines import (
     build_grid,
     build_periods,
@@ -208,6 +208,7 @@ def _check_supported(spec: Spec) -> None:
         "signal.type": "use multisine",
         **dict.fromkeys((f"signal.{name}" for name in _SIGNAL), "remove it"),
         "report.ellipses": "remove report",
+        "uncertainty": ONE_PLANT,
     }
     handled = {"solver.method": ("exchange",), "signal.type": ("multisine",)}
     refuse_unhandled(spec, "frequency_response", remedies, handled)

@@ -23,12 +23,7 @@ from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.period_drift import period_drift
-from inputdesign_cli.identification.periodic_response import (
-    PeriodicResponse,
-    differing,
-    excited_lines,
-    periodic_response,
-)
+from inputdesign_cli.identification.periodic_response import PeriodicResponse, differing, excited_lines
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.identification.spikes import period_spikes
 from inputdesign_cli.outcome.results import Results
@@ -104,10 +99,10 @@ def _at_lines(
     question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
 ) -> Measured:
     """Return the response at the lines of the spec that the data excite."""
-    data, periods, repeats = counted.data, counted.periods, counted.repeats
-    excited = excited_lines(data.u, periods, terms.grid.excited, repeats=repeats)
+    data, periods = counted.data, counted.periods
+    excited = excited_lines(data.u, periods, terms.grid.excited, repeats=counted.repeats)
     missing = unexcited_lines(question.header.units, terms.grid.frequencies, excited)
-    found = periodic_response(data.u, data.y, periods, terms.grid.excited[excited], repeats=repeats)
+    found = counted.response(terms.grid.excited[excited])
     if found is None or (assess and missing):
         why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
         raise DataError.because("not-exciting", f"{name}: {why}", hint=REMEDY)
@@ -136,7 +131,7 @@ def _doubted(
     drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)
     if drift is not None:
         counted = replace(counted, data=replace(data, y=data.y - drift.curve))
-        without = periodic_response(data.u, counted.data.y, periods, found.harmonics, repeats=repeats)
+        without = counted.response(found.harmonics)
         if without is not None:
             scatter = np.abs(found.deviation**2 - without.deviation**2)
             moved = judged.lines.ratios(np.sqrt(np.abs(found.G - without.G) ** 2 + scatter))

@@ -168,8 +168,7 @@ class ResponseTask:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
-        shift = self._shifted(samples, exact)
-        return Planned(design, problem, powers, counted, len(samples), record, exact, shift)
+        return Planned(design, problem, powers, counted, record, exact, self._shifted(samples, exact))
 
     def _length(self, counted: int) -> int:
         """Return the length of a record, transient included.

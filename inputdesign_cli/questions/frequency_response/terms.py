@@ -78,7 +78,7 @@ class ResponseTerms:
 
 @dataclass(frozen=True)
 class Planned:
-    """The experiment to be applied: powers (L, r), `counted` of `length` samples, the record, its deviations.
+    """The experiment to be applied: powers (L, r), the samples that count, the record, its deviations.
 
     Attributes:
         problem: for the samples that count.
@@ -90,10 +90,14 @@ class Planned:
     problem: ResponseProblem
     powers: NDArray[np.float64]
     counted: int
-    length: int
     record: Record
     deviations: NDArray[np.float64]
     shift: float
+
+    @property
+    def length(self) -> int:
+        """The number of samples of the record, transient included."""
+        return len(self.record.samples)
 
     @property
     def applied(self) -> NDArray[np.float64]:
@@ -118,7 +122,7 @@ def deviation_curves(
     Args:
         w: (L,), the lines in the user's unit.
         listed: columns (L, p, r), of which `deviation` is the designed one.
-        found: the column to draw beside it, and its label.
+        found: another column to draw, and its label.
     """
     columns: dict[str, Array] = {units.frequency_header: w}
     panels = []

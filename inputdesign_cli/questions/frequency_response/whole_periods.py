@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.counted_periods import periods_between_gaps, samples_before_periods
-from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
 from inputdesign_cli.tasks.build.data import Data
 
 
@@ -27,6 +27,11 @@ class Counted:
     def kept(self) -> int:
         """Periods of one phase that count, in all records."""
         return self.repeats * self.periods.kept(self.data.lengths[0])
+
+    def response(self, harmonics: NDArray[np.int_]) -> PeriodicResponse | None:
+        """Return the response at harmonics (L,); None if the inputs are alike there."""
+        data = self.data
+        return periodic_response(data.u, data.y, self.periods, harmonics, repeats=self.repeats)
 
 
 def whole_periods(stated: Periods, data: Data, name: str, step: float) -> Counted:

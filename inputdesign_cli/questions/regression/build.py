@@ -11,7 +11,7 @@ from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
-from inputdesign_cli.questions.building.unhandled import check_compared, refuse_unhandled
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.regression.outcome import RegressionTerms
 from inputdesign_cli.questions.regression.regressors import RegressorSettings
 from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
@@ -126,6 +126,7 @@ def _check_supported(spec: Spec) -> None:
         "experiment.prior": "remove it",
         **dict.fromkeys(limits, "remove it, or use limits.energy"),
         "report.ellipses": "remove report",
+        "uncertainty": ONE_PLANT,
         "solver.method": "use exchange (the default) or alternating",
         **dict.fromkeys(_SIGNAL_KEYS, "remove it; samples, periods, seed and start count"),
     }
