@@ -86,7 +86,7 @@ def _trial(spec: Spec) -> RegressionTrial | None:
     if simulation is None or true is None or true.kind != "parameters":
         return None
     check_compared(simulation.compare, *get_args(Contender))
-    contenders: list[Contender] = [name for name in get_args(Contender) if name in simulation.compare]
+    known: dict[str, Contender] = {name: name for name in get_args(Contender)}
     variance = relative = None
     if simulation.noise is not None:
         _refuse_coloured(simulation.noise, "simulation.noise")
@@ -94,7 +94,14 @@ def _trial(spec: Spec) -> RegressionTrial | None:
         if simulation.noise.variance is not None:
             variance = float(np.ravel(np.asarray(simulation.noise.variance, dtype=float))[0])
     theta = np.array(true.parameters, dtype=float)
-    return RegressionTrial(theta, simulation.runs, simulation.seed, tuple(contenders), variance, relative)
+    return RegressionTrial(
+        theta,
+        simulation.runs,
+        simulation.seed,
+        tuple(known[name] for name in simulation.compare),
+        variance,
+        relative,
+    )
 
 
 def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
