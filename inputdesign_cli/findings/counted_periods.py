@@ -56,9 +56,8 @@ def unexcited_lines(units: Units, frequencies: Array, excited: NDArray[np.bool_]
     return [
         UNEXCITED.found(
             f"{lacking.size} of {excited.size} lines of the spec, the first at {lacking[0]:.4g} "
-            f"{units.per_time}, have no more of the inputs than rounding or noise. The response is "
-            f"not measured "
-            f"there: {REMEDY}",
+            f"{units.per_time}, have no more of the inputs than rounding or noise. The response is not "
+            f"measured there: {REMEDY}",
             lines=int(lacking.size),
             asked=int(excited.size),
             first=float(lacking[0]),
@@ -85,10 +84,8 @@ def samples_before_periods(samples: int, periods: Periods) -> list[Finding]:
     left = samples - periods.each(samples) * periods.blocks * periods.period
     if not left:
         return []
-    message = (
-        f"the first {left} of {samples} samples are left out: the others are whole "
-        f"periods of {periods.period}"
-    )
+    rest = f"the others are whole periods of {periods.period}"
+    message = f"the first {left} of {samples} samples are left out: {rest}"
     return [LEFT_OUT.found(message, samples=left, period=periods.period)]
 
 

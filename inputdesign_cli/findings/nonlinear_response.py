@@ -112,9 +112,8 @@ def silent_lines_answer(silent: Mapping[str, SilentLines]) -> list[Finding]:
     return [
         SILENT_LINES.found(
             f"the outputs answer at {kind} lines that are not excited (rms "
-            f"{', '.join(f'{value:.3g}' for value in found.rms)}, probability of chance "
-            f"{chance:.2g}). Either "
-            f"a nonlinearity of {kind} degree acts, or an input was not applied as recorded",
+            f"{', '.join(f'{value:.3g}' for value in found.rms)}, probability of chance {chance:.2g}). "
+            f"Either a nonlinearity of {kind} degree acts, or an input was not applied as recorded",
             where=kind,
             probability=chance,
             rms=found.rms.tolist(),
@@ -142,11 +141,10 @@ def nonlinear_response(
         severity = Severity.DOUBT if decided else Severity.UNDECIDED
         cause = f"the cube of {found.cubed}" if found.cubed else "a nonlinearity"
         message = (
-            f"{cause} changes the response by about {found.share:.2g} of what is admitted, {at}. "
-            f"Odd lines that "
-            f"are not excited show it (probability of chance {found.probability:.2g}). More periods "
-            f"do not help: "
-            "measure at a smaller amplitude, or with other phases, and see whether the response stays"
+            f"{cause} changes the response by about {found.share:.2g} of what is admitted, {at}. Odd lines "
+            f"that are not excited show it (probability of chance {found.probability:.2g}). More periods do "
+            "not help: measure at a smaller amplitude, or with other phases, and see whether the response "
+            "stays"
         )
     return [
         NONLINEAR.found(

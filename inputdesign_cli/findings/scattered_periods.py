@@ -61,11 +61,9 @@ def spiked_periods(
     return [
         SPIKES.found(
             f"spikes decide how the periods of {(name := output_name(units, one.output))} differ: "
-            f"{len(one.samples)} of {samples} samples (at {place}{either}) hold "
-            f"{100 * one.share:.3g} % of the "
-            "squares. Noise, nonlinearity and needed periods cannot be judged. Empty the cells that "
-            "are faults "
-            "of measurement, and assess again: the other whole periods count",
+            f"{len(one.samples)} of {samples} samples (at {place}{either}) hold {100 * one.share:.3g} % of "
+            "the squares. Noise, nonlinearity and needed periods cannot be judged. Empty the cells that are "
+            "faults of measurement, and assess again: the other whole periods count",
             where=name,
             samples=list(one.samples),
             share=one.share,
@@ -93,10 +91,9 @@ def drifting_periods(
     remedy = "add --detrend linear" if straight else "subtract its course, which is no line, from the column"
     return [
         DRIFT.found(
-            f"{listed} over the record, by the means of the periods. This changes the response, or "
-            f"its scatter, "
-            f"by up to {moved[at]:.2g} of what is admitted, at {w[at]:.3g} {units.per_time}. Neither more "
-            f"periods nor another amplitude helps: {remedy}, and assess again",
+            f"{listed} over the record, by the means of the periods. This changes the response, or its "
+            f"scatter, by up to {moved[at]:.2g} of what is admitted, at {w[at]:.3g} {units.per_time}. "
+            f"Neither more periods nor another amplitude helps: {remedy}, and assess again",
             where=", ".join(sizes),
             drift=sizes,
             share=float(moved[at]),

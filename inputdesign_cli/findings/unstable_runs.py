@@ -20,9 +20,8 @@ def unstable_runs(unstable: Mapping[str, int], runs: int) -> list[Finding]:
     """Return a finding for each input with unstable runs."""
     return [
         UNSTABLE.found(
-            f"with the input {name}, {count} of {runs} simulated controllers make the true loop "
-            f"unstable. Their "
-            "losses are infinite, and the means are taken over the other runs",
+            f"with the input {name}, {count} of {runs} simulated controllers make the true loop unstable. "
+            "Their losses are infinite, and the means are taken over the other runs",
             where=name,
             unstable=count,
             runs=runs,

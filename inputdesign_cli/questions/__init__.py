@@ -1,6 +1,6 @@
-"""The verbs: spec in, results out. A spec becomes a task once; nothing after that knows the spec.
+"""The verbs take a spec and return results. A spec becomes a task once; the task does not know the spec.
 
-What a verb needs is imported when it is called, so that a command waits for nothing else.
+A verb imports its question when it is called, so that a command waits for no other.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
 
     Raises:
         SpecError: the model cannot be judged.
-        DataError: the log cannot be used, or tells no model at all.
+        DataError: the log cannot be used, or determines no model at all.
         InaccurateError: the numbers of the log leave the range of double precision.
     """
     from inputdesign_cli.questions.building.header import build_header
@@ -212,7 +212,7 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
 
 @singledispatch
 def to_control(model: Spec | Results) -> control.lti.LTI:
-    """G of a spec, or of what `identify` found, as a system of python-control; if sampled, in discrete time.
+    """Return G of a spec or of an identified model for python-control; if sampled, in discrete time.
 
     Raises:
         SpecError: `not-supported` for dead times of a plant that is not sampled.
@@ -254,7 +254,7 @@ def _prepared(
 
 @contextmanager
 def _placed(spec: Spec) -> Iterator[None]:
-    """Errors with the lines of the spec that they concern, those of arithmetic too."""
+    """Add to errors, of arithmetic too, the lines of the spec that they concern."""
     try:
         with sound_arithmetic(most_extreme(spec.content)):
             yield

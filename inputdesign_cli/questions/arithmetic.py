@@ -1,4 +1,4 @@
-"""At the border of every task: what leaves the range of double precision is an error, never a result."""
+"""Turn numbers beyond double precision into errors at the border of every task."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _USUAL = 6.0
 
 @contextmanager
 def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
-    """Overflow, division by zero and singular matrices inside, in the words of the spec.
+    """Raise overflow, division by zero and singular matrices inside as errors of the spec.
 
     Args:
         extreme: the key of the spec whose number is farthest from one, and how many powers of ten that is.
@@ -32,18 +32,18 @@ def sound_arithmetic(extreme: tuple[str, float]) -> Iterator[None]:
         try:
             yield
         except np.linalg.LinAlgError as error:
-            message = (
-                "the information matrix is singular to working precision: the parameters are nearly "
-                "indistinguishable"
-            )
-            hint = "lower the orders, or look for poles and zeros that nearly cancel"
-            raise InaccurateError.because("numerically-singular", message, hint, "plant") from error
+            raise InaccurateError.because(
+                "numerically-singular",
+                "the information matrix is singular to working precision: parameters are nearly alike",
+                "lower the orders, or look for poles and zeros that nearly cancel",
+                "plant",
+            ) from error
         except (ArithmeticError, RuntimeWarning) as error:
             raise _beyond(extreme, str(error)) from error
 
 
 def finite(results: Results, extreme: tuple[str, float]) -> Results:
-    """The results themselves, of which every number is finite.
+    """Return the results if every number of them is finite.
 
     Raises:
         InaccurateError: `beyond-precision`.
@@ -60,7 +60,7 @@ def finite(results: Results, extreme: tuple[str, float]) -> Results:
 
 
 def most_extreme(data: Json) -> tuple[str, float]:
-    """The key of the number in plain data that is farthest from one, and how many powers of ten that is."""
+    """Return the key of the number in plain data that is farthest from one, and its powers of ten."""
 
     def walk(node: Json, key: str) -> Iterator[tuple[str, float]]:
         if isinstance(node, dict):

@@ -1,4 +1,4 @@
-"""Models as systems of python-control; a new kind of model registers its own."""
+"""Turn models into systems of python-control; a new kind of model registers its own."""
 
 from __future__ import annotations
 
@@ -22,12 +22,10 @@ from inputdesign_cli.plant import (
 if TYPE_CHECKING:
     import control
 
-Entries = list[list[list[float]]]
-
 
 @singledispatch
 def system_of(model: Model, sample_time: float) -> control.lti.LTI:
-    """G of a model; a sampled one in discrete time.
+    """Return G of a model as a system; that of a sampled model is in discrete time.
 
     Raises:
         SpecError: `not-supported` for dead times in s, which python-control does not have.
@@ -77,27 +75,21 @@ def _(model: StateSpaceModel, sample_time: float) -> control.lti.LTI:
 
 
 @system_of.register(Coloured)
-def _(model: Coloured, sample_time: float) -> control.lti.LTI:
-    return system_of(model.plant, sample_time)
-
-
 @system_of.register(Reparametrised)
-def _(model: Reparametrised, sample_time: float) -> control.lti.LTI:
-    return system_of(model.coefficients, sample_time)
+def _(model: Coloured | Reparametrised, sample_time: float) -> control.lti.LTI:
+    return system_of(model.plant if isinstance(model, Coloured) else model.coefficients, sample_time)
 
 
 def _discrete(rows: list[list[tuple[Array, Array]]], sample_time: float) -> control.lti.LTI:
-    """From entries in q^-1, ascending: in z both have the same length."""
+    """Return the system of entries in q^-1, ascending: in z both polynomials have the same length."""
     import control
 
-    above: Entries = []
-    below: Entries = []
-    for row in rows:
-        lengths = [max(top.size, bottom.size) for top, bottom in row]
-        padded = [
-            [np.pad(p, (0, n - p.size)).tolist() for p in entry]
-            for entry, n in zip(row, lengths, strict=True)
+    lengths = [[max(top.size, bottom.size) for top, bottom in row] for row in rows]
+    above, below = (
+        [
+            [np.pad(entry[part], (0, n - entry[part].size)).tolist() for entry, n in zip(*pair, strict=True)]
+            for pair in zip(rows, lengths, strict=True)
         ]
-        above.append([top for top, _ in padded])
-        below.append([bottom for _, bottom in padded])
+        for part in (0, 1)
+    )
     return control.TransferFunction(above, below, sample_time)

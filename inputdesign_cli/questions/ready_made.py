@@ -1,4 +1,4 @@
-"""Signals that need no spec, as records with units, and what they excite."""
+"""Make signals that need no spec as records with units, and measure what they excite."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _USUAL = 1000
 
 @dataclass(frozen=True)
 class ReadyMade:
-    """What signal is asked for.
+    """The signal that is asked for.
 
     Attributes:
         kind: prbs, multisine, chirp or steps.
-        bits: of the register of a prbs; None: as many as the samples take without repetition.
+        bits: of the register of a prbs; None: enough for the samples without repetition.
         number: lines of a multisine, levels of steps.
         band: of a multisine or a chirp, in rad per time unit; None: all frequencies.
         samples: None: one period, or 1000.
@@ -57,7 +57,7 @@ class ReadyMade:
 
 
 def make_signal(asked: ReadyMade) -> Results:
-    """The record as signal.csv, its figures, and what it excites.
+    """Return the record as signal.csv, its figures, and what it excites.
 
     Raises:
         SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.
@@ -85,7 +85,7 @@ def make_signal(asked: ReadyMade) -> Results:
 
 
 def _made(asked: ReadyMade) -> tuple[Array, int]:
-    """The record (N, inputs) from -1 to 1, and its period."""
+    """Return the record (N, inputs) from -1 to 1, and its period."""
     rng, r = np.random.default_rng(asked.seed), asked.inputs
     if asked.kind == "prbs":
         bits = asked.bits or register_length(-(-(asked.samples or _USUAL) // asked.hold))
@@ -102,7 +102,7 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
         if r > 1:
             raise bad_spec(
                 "not-supported",
-                "a chirp has one frequency at a time, so that several inputs would be told apart by nothing",
+                "a chirp has one frequency at a time, so that it cannot separate effects of several inputs",
                 hint="use a multisine for several inputs, or one chirp after the other",
             )
         _check_turns(asked, samples)
@@ -128,7 +128,7 @@ def _check_apart(u: Array, asked: ReadyMade) -> None:
     raise bad_spec(
         "bad-period",
         f"of {asked.inputs} inputs over {len(u)} samples, {asked.inputs - rank} follow from the others, "
-        "so that what they do could not be told apart",
+        "so that their effects could not be separated",
         hint=f"write {longer}, and --samples enough for them",
     )
 
@@ -189,7 +189,7 @@ def _multisine(asked: ReadyMade, samples: int, rng: np.random.Generator) -> Arra
 
 
 def _band(asked: ReadyMade) -> tuple[float, float]:
-    """In rad/sample."""
+    """Return the band in rad/sample, all frequencies where none is asked for."""
     lo, hi = asked.band or (0.0, math.inf)
     nyquist = math.pi / asked.sample_time
     if asked.band is not None and hi > nyquist * (1 + 1e-4):
@@ -202,7 +202,7 @@ def _band(asked: ReadyMade) -> tuple[float, float]:
 
 
 def _lines(asked: ReadyMade, record: Array) -> Curves:
-    """The powers of the lines of the record, means left out."""
+    """Return the powers of the lines of the record without its means."""
     columns = np.fft.rfft(record - record.mean(axis=0), axis=0)[1:] / len(record)
     powers = 2.0 * np.abs(columns) ** 2
     if len(record) % 2 == 0:

@@ -1,6 +1,6 @@
-"""What every kind of question answers, and the one dispatch: which kind a spec asks.
+"""Dispatch a spec to the kind of question that it asks; every kind solves and simulates.
 
-A kind is imported when it is asked for, so that a command waits for its own alone.
+A kind is imported when it is asked for, so that a command waits for no other.
 """
 
 from __future__ import annotations
@@ -13,60 +13,42 @@ from inputdesign_cli.specification import Spec
 
 
 class Task(Protocol):
-    """A question, built from a spec once; what can be wrong before anything long is computed was told then.
+    """A question that was built and checked.
 
-    Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`), not its
-    place in a file: the dispatch adds that (`Spec.place`).
+    Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`). The verbs
+    add its place in a file (`Spec.place`).
     """
 
     def solve(self) -> Results:
-        """The answer: a design with its proof, or what a given excitation buys."""
+        """Return a design with its proof, or the accuracy that a given excitation buys."""
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """The answer, with the experiment tried many times on the true system.
+        """Return the answer of `solve`, with the experiment tried many times on the true system.
 
         Args:
             executor: where batches of runs are computed (default: in this process).
         """
 
 
-def _check_uncertainty(spec: Spec) -> None:
-    """Raise `SpecError` (`not-supported`) where what is asked is not looked at for several plants."""
-    accuracy = spec.accuracy
-    elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
-    if spec.uncertainty is None or not (elsewhere or spec.plant.kind == "regression"):
-        return
-    raise spec.complain(
-        "not-supported",
-        "this kind of design is not looked at for several plants at once",
-        hint="remove uncertainty, or ask for a design with model_error, information or a criterion",
-        key="uncertainty",
-    )
-
-
 def build_analysis(spec: Spec) -> Task:
-    """The task of a given excitation, whatever is asked of it.
+    """Return the task of a given excitation, whatever is asked of it.
 
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    _check_uncertainty(spec)
     if spec.accuracy.frequency_response is not None and not spec.designs:
-        from inputdesign_cli.questions.frequency_response.build import build_response_task
-
-        return build_response_task(spec)
+        return _response(spec)
     from inputdesign_cli.questions.given.build import build_given
 
     return build_given(spec)
 
 
 def build_task(spec: Spec) -> Task:
-    """The task of a spec; everything that can be wrong with the spec comes to light here.
+    """Return the task of a spec; everything that can be wrong with the spec is reported here.
 
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    _check_uncertainty(spec)
     if spec.campaign is not None:
         from inputdesign_cli.questions.campaign.build import build_campaign
 
@@ -74,9 +56,7 @@ def build_task(spec: Spec) -> Task:
     if not spec.designs:
         return build_analysis(spec)
     if spec.accuracy.frequency_response is not None:
-        from inputdesign_cli.questions.frequency_response.build import build_response_task
-
-        return build_response_task(spec)
+        return _response(spec)
     if spec.plant.kind == "regression":
         from inputdesign_cli.questions.regression.build import build_regression_task
 
@@ -88,3 +68,9 @@ def build_task(spec: Spec) -> Task:
     from inputdesign_cli.questions.least_cost.build import build_convex
 
     return build_convex(spec)
+
+
+def _response(spec: Spec) -> Task:
+    from inputdesign_cli.questions.frequency_response.build import build_response_task
+
+    return build_response_task(spec)

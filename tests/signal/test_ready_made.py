@@ -112,7 +112,7 @@ def test_inputs_of_a_period_are_independent_or_refused(bits):
     for inputs in range(2, 2**bits + 2):
         asked = ReadyMade("prbs", bits=bits, levels=((-1.0, 1.0),) * inputs)
         if inputs > 2**bits - 2:
-            with pytest.raises(SpecError, match="told apart"):
+            with pytest.raises(SpecError, match="follow from the others"):
                 make_signal(asked)
             continue
         columns = make_signal(asked).tables["signal"].columns

@@ -7,6 +7,9 @@ from collections.abc import Iterable, Mapping
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.specification import Spec
 
+ONE_PLANT = "remove uncertainty, or ask for a design with model_error, information or a criterion"
+"""What to do about `uncertainty` in a question of one plant."""
+
 
 def refuse_unhandled(
     spec: Spec,

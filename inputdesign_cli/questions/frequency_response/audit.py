@@ -1,7 +1,7 @@
-"""The last check of a frequency response: the outcome as it is written, reread, evaluated by other means.
+"""Reread the written outcome of a frequency response, and evaluate it by other means.
 
-The powers are those of `result.json` as text, and the record is that of signal.csv: its deviations follow
-from its own transforms.
+Powers come from the text of `result.json`. The deviations of the record in signal.csv follow from its own
+transforms.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Spec -> the question of `accuracy.frequency_response`, checked before anything is computed."""
+"""Build the question of `accuracy.frequency_response` from its spec, and check it before it is computed."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from inputdesign_cli.questions.building.signal_settings import build_record_requ
 from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.system import build_cost, build_model
 from inputdesign_cli.questions.building.tables import has_column
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, refuse_unhandled
 from inputdesign_cli.questions.frequency_response.build_lines import (
     build_grid,
     build_periods,
@@ -29,27 +30,17 @@ from inputdesign_cli.questions.frequency_response.solve import ResponseTask
 from inputdesign_cli.questions.frequency_response.terms import KEY, ResponseTerms
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.spectrum import GivenMultisine
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
-_LIMITS = ("energy", "spectrum")
 _SIGNAL = (
-    "hold",
-    "lines",
-    "amplitudes",
-    "ramp",
-    "bits",
-    "quantisation",
-    "scale",
-    "order",
-    "samples",
-    "start",
+    *("hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "scale", "order"),
+    *("samples", "start"),
 )
 
 
 def build_response_task(spec: Spec) -> ResponseTask:
-    """The task, with all that can be wrong with it already complained of.
+    """Return the task; everything that can be wrong with its spec is reported here.
 
     Raises:
         SpecError: what this version does not design; lines that the period does not have.
@@ -87,7 +78,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
 
 
 def build_measurement(spec: Spec) -> Measurement:
-    """How a frequency response is measured by data: the lines of the spec, or what the data excite.
+    """Return how data measure a frequency response: at the lines of the spec, or where they excite it.
 
     Raises:
         SpecError, DataError: see `build_response_task`.
@@ -102,7 +93,7 @@ def build_measurement(spec: Spec) -> Measurement:
 
 
 def _admitted(spec: Spec, grid: HarmonicGrid, response: ComplexArray) -> NDArray[np.float64]:
-    """r_adm (L, p, r); infinite for entries of G that are zero, where a share of |G| is asked for.
+    """Return r_adm (L, p, r); of a share of |G| it is infinite for entries of G that are zero.
 
     Raises:
         SpecError: `admissible-not-positive`.
@@ -138,7 +129,7 @@ def _admitted(spec: Spec, grid: HarmonicGrid, response: ComplexArray) -> NDArray
 
 
 def _noise(spec: Spec, model: Model, grid: HarmonicGrid) -> Array:
-    """Phi_v (L, p): that of the model, or of a table."""
+    """Return Phi_v (L, p), by the model or by a table."""
     stated = stated_response(spec)
     if stated.noise is not None:
         return _tabulated(spec, stated.noise, grid.frequencies, "noise_spectrum", (model.outputs,))
@@ -146,7 +137,7 @@ def _noise(spec: Spec, model: Model, grid: HarmonicGrid) -> Array:
 
 
 def _tabulated(spec: Spec, name: str, w: Array, column: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """(L, entries): a column of a file at the lines, or one column for each output or entry."""
+    """Return a column of a file at the lines (L, entries), or one column for each output or entry."""
     key = f"{KEY}.{'table' if column == 'r_adm' else 'noise'}"
     band = (float(w[0]), float(w[-1]))
     entries = int(np.prod(shape))
@@ -158,7 +149,7 @@ def _tabulated(spec: Spec, name: str, w: Array, column: str, shape: tuple[int, .
 
 
 def _given(spec: Spec, grid: HarmonicGrid) -> Array | None:
-    """(L, 1): the powers that a given multisine has at the lines; None where powers are designed.
+    """Return the powers (L, 1) of a given multisine at the lines; None if powers are designed.
 
     Raises:
         SpecError: `not-supported`, `not-exciting`, `bad-period`.
@@ -166,17 +157,14 @@ def _given(spec: Spec, grid: HarmonicGrid) -> Array | None:
     given = spec.given
     if given is None:
         return None
-    match given:
-        case GivenMultisine() if spec.plant.inputs == 1:
-            sinusoids = list(zip(given.frequencies, given.rows[0], strict=True))
-        case _:
-            raise refuse(
-                "spectrum.given",
-                what="tell the deviations of a frequency response by this excitation",
-                hint="give {type: multisine, frequencies, amplitudes} of one input",
-            )
+    if given.type != "multisine" or spec.plant.inputs > 1:
+        raise refuse(
+            "spectrum.given",
+            what="compute the deviations of a frequency response by this excitation",
+            hint="give {type: multisine, frequencies, amplitudes} of one input",
+        )
     powers = np.zeros(grid.excited.size)
-    for n, (frequency, amplitude) in enumerate(sinusoids):
+    for n, (frequency, amplitude) in enumerate(zip(given.frequencies, given.rows[0], strict=True)):
         place = frequency * spec.sample_time * grid.period / (2.0 * np.pi)
         if abs(place - np.rint(place)) > 1e-6 * place:
             raise bad_spec(
@@ -199,38 +187,28 @@ def _given(spec: Spec, grid: HarmonicGrid) -> Array | None:
 
 
 def _check_supported(spec: Spec) -> None:
-    """Say plainly what is not done for a frequency response, rather than ignore it."""
-    others = [name for name in spec.accuracy.requirements if name != "frequency_response"]
-    for name in (*others, *spec.accuracy.goals):
-        what = f"handle {name} beside frequency_response"
-        raise refuse(f"accuracy.{name}", what=what, hint="keep one of them")
+    """Refuse what is not done for a frequency response, rather than ignore it."""
+    others = {*spec.accuracy.requirements, *spec.accuracy.goals} - {"frequency_response"}
     if not spec.plant.sampled:
         what = "measure lines of a plant that is not sampled"
         raise refuse("plant", what=what, hint="add sample: zoh")
-    if spec.closed_loop:
-        what, hint = "measure a frequency response in closed loop", "remove the controller"
-        raise refuse("experiment.controller", what=what, hint=hint)
-    if spec.experiment.prior is not None:
-        raise refuse("experiment.prior", what="use prior information here", hint="remove it")
     if any(spec.noise.drifts):
         what = "measure lines in noise that drifts"
         raise refuse("noise.drift", what=what, hint="write a root of D inside the unit circle")
-    for name in spec.limits.stated(*_LIMITS):
-        what = f"enforce limits.{name} for a frequency response"
-        raise refuse(f"limits.{name}", what=what, hint="limit powers, amplitude or rate")
-    if spec.limits.band is not None:
-        what, hint = "take limits.band here", f"state {KEY}.band"
-        raise refuse("limits.band", what=what, hint=hint)
     if spec.spectrum is not None and spec.designs:
-        what, hint = "take a family of spectra here", "remove spectrum: the lines are those of the accuracy"
+        what, hint = "take a family of spectra here", "remove spectrum: the lines follow from the accuracy"
         raise refuse("spectrum", what=what, hint=hint)
-    if spec.solver.method != "exchange":
-        what = f"use the method {spec.solver.method} here"
-        raise refuse("solver.method", what=what, hint="remove method")
-    if spec.signal.type not in (None, "multisine"):
-        what = f"make {spec.signal.type} signals here"
-        raise refuse("signal.type", what=what, hint="use multisine")
-    for name in spec.signal.stated(*_SIGNAL):
-        raise refuse(f"signal.{name}", what=f"apply signal.{name} here", hint="remove it")
-    if spec.report.ellipses is not None:
-        raise refuse("report.ellipses", what="draw ellipses here", hint="remove report")
+    remedies = {
+        **{f"accuracy.{name}": "keep one of them" for name in sorted(others)},
+        "experiment.controller": "remove the controller",
+        "experiment.prior": "remove it",
+        **dict.fromkeys(("limits.energy", "limits.spectrum"), "limit powers, amplitude or rate"),
+        "limits.band": f"state {KEY}.band",
+        "solver.method": "remove method",
+        "signal.type": "use multisine",
+        **dict.fromkeys((f"signal.{name}" for name in _SIGNAL), "remove it"),
+        "report.ellipses": "remove report",
+        "uncertainty": ONE_PLANT,
+    }
+    handled = {"solver.method": ("exchange",), "signal.type": ("multisine",)}
+    refuse_unhandled(spec, "frequency_response", remedies, handled)

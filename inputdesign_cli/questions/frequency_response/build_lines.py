@@ -1,4 +1,4 @@
-"""`accuracy.frequency_response` -> the periods of its record and the harmonics that are measured."""
+"""Build the periods of a record for `accuracy.frequency_response` and the harmonics that are measured."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from inputdesign_cli.signal.harmonic_grid import (
 from inputdesign_cli.specification import FrequencyResponse, Spec
 from inputdesign_cli.specification.models.sizes import most
 
-# Beside the transient, periods of a block where nothing is said: their scatter tells the noise.
+# Periods of a block after the transient, if none are stated: their scatter shows the noise.
 _COUNTED = 4
 
-# Longer periods that are tried, up to so many times as long.
+# The longest period that is tried, relative to the stated one, and the number of tries.
 _LONGEST, _TRIED = 1e3, 400
 
 
 def stated_response(spec: Spec) -> FrequencyResponse:
-    """What `accuracy.frequency_response` says.
+    """Return `accuracy.frequency_response`.
 
     Raises:
         SpecError: `missing-key`.
@@ -44,7 +44,7 @@ def stated_response(spec: Spec) -> FrequencyResponse:
 
 
 def build_periods(spec: Spec) -> Periods:
-    """How the record repeats; it ends with whole periods, and is no longer than the experiment.
+    """Return how the record repeats; it has whole periods, and is no longer than the experiment.
 
     Raises:
         SpecError: `bad-period`, `missing-key`.
@@ -99,7 +99,7 @@ def build_periods(spec: Spec) -> Periods:
 
 
 def build_grid(spec: Spec, period: int) -> HarmonicGrid:
-    """The lines, and the silent ones where nonlinearity is looked for.
+    """Return the lines, and the silent ones that show a nonlinearity.
 
     Raises:
         SpecError: `too-few-lines`, `out-of-range`.
@@ -127,7 +127,7 @@ def build_grid(spec: Spec, period: int) -> HarmonicGrid:
 
 
 def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.int_]:
-    """As many lines as asked for, or every harmonic but what is left out to tell nonlinearity.
+    """Return the lines that are asked for, or all harmonics but the silent ones that show a nonlinearity.
 
     Raises:
         SpecError: `too-few-lines`.
@@ -142,7 +142,7 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
     except TooFewHarmonicsError as error:
         kind = "odd harmonics" if group is not None else "harmonics"
         asked = "at least one is" if candidates is None else f"{candidates} are"
-        left_out = ", with those left out to tell nonlinearity" if candidates != stated.lines else ""
+        left_out = ", with the silent lines that show a nonlinearity" if candidates != stated.lines else ""
         raise bad_spec(
             "too-few-lines",
             f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
@@ -157,7 +157,7 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
 
 
 def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
-    """Which period holds the lines, and which experiment of as many periods; nothing where none is found."""
+    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
     for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
         try:
             harmonics_between(longer, band, lines, odd=odd)

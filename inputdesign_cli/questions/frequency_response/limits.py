@@ -1,4 +1,4 @@
-"""Why limits exclude the accuracy of a frequency response, in the words of the spec, and what would do."""
+"""Say why limits exclude the accuracy of a frequency response, and which numbers of the spec would do."""
 
 from __future__ import annotations
 
@@ -15,61 +15,53 @@ from inputdesign_cli.questions.common.within_limits import named
 
 
 def unreachable(units: Units, error: UnreachableError, samples: int) -> InfeasibleError:
-    """Why the limits exclude the accuracy, in the words of the spec, and what would do."""
-    if not np.isfinite(error.factor):
-        names = " and ".join(dict.fromkeys(limit.key for limit in error.limits))
-        return InfeasibleError(
-            Diagnostic(
-                "contradictory-limits",
-                f"{names} contradict each other: no powers of these lines keep all of them",
-                "lower min or raise max of these limits",
-                error.limits[0].key,
-            )
+    """Return the error that limits exclude the accuracy, with the numbers of the spec that would do."""
+    factor, limits = error.factor, tuple(dict.fromkeys(error.limits))
+    if not np.isfinite(factor):
+        names = " and ".join(dict.fromkeys(limit.key for limit in limits))
+        return InfeasibleError.because(
+            "contradictory-limits",
+            f"{names} contradict each other: no powers of these lines keep all of them",
+            "lower min or raise max of these limits",
+            limits[0].key,
         )
-    factor = error.factor
-    exhausted = " and ".join(dict.fromkeys(named(limit) for limit in error.limits))
-    needed = [f"{limit.key} to {rounded_up(_raised(limit, factor))}" for limit in dict.fromkeys(error.limits)]
-    more = int(np.ceil(samples * factor**2))
-    return InfeasibleError(
-        Diagnostic(
-            "infeasible",
-            f"the limits buy standard deviations {rounded_up(factor, 4)} times those admitted; {exhausted} "
-            "is exhausted",
-            f"raise {' and '.join(needed)}, count {more} samples in place of {samples} "
-            f"({units.length(more).split(':')[0]}), or admit {rounded_up(factor, 4)} times as much",
-            error.limits[0].key,
-            details={"factor": factor},
-        )
+    exhausted = " and ".join(dict.fromkeys(map(named, limits)))
+    needed = (f"{limit.key} to {rounded_up(_raised(limit, factor))}" for limit in limits)
+    more, times = int(np.ceil(samples * factor**2)), rounded_up(factor, 4)
+    message = f"the limits buy standard deviations {times} times those admitted; {exhausted} is exhausted"
+    hint = (
+        f"raise {' and '.join(needed)}, count {more} samples in place of {samples} "
+        f"({units.length(more).split(':')[0]}), or admit {times} times as much"
     )
+    details = {"factor": factor}
+    return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
 
 
 def _raised(limit: PowerLimit, factor: float) -> float:
-    """The number of the spec with which deviations `factor` times as large become those admitted."""
+    """Return the number of the spec at which deviations are smaller by `factor`."""
     return factor * limit.bound**0.5 if limit.implied else factor**2 * limit.bound
 
 
 def too_long(units: Units, length: int, most: int) -> InfeasibleError:
-    """The shortest record is longer than limits allow."""
+    """Return the error that the shortest record is longer than limits allow."""
     limit = units.length(length, "limits")
-    return InfeasibleError(
-        Diagnostic(
-            "too-long",
-            f"the shortest record of whole periods takes {length} samples, transient included, and {most} "
-            "are allowed",
-            f"write {limit}, allow more power, or ask for less accuracy",
-            limit.split(":")[0],
-        )
+    return InfeasibleError.because(
+        "too-long",
+        f"the shortest record of whole periods takes {length} samples, transient included, and {most} "
+        "are allowed",
+        f"write {limit}, allow more power, or ask for less accuracy",
+        limit.split(":")[0],
     )
 
 
 def too_tight(units: Units, keys: Sequence[str], beyond: float, length: int) -> InfeasibleError:
-    """The lines would do, but no record of them that was found keeps to the limits on single samples."""
-    more = int(np.ceil(length * beyond**2))
+    """Return the error that no record of the lines was found within the limits on single samples."""
+    more, times = int(np.ceil(length * beyond**2)), rounded_up(beyond, 4)
     return InfeasibleError.because(
         "limits-too-tight",
-        f"no record of {length} samples within {' and '.join(keys)} was found that meets the accuracy: that "
-        f"of the lowest peaks would have to be {rounded_up(beyond, 4)} times as large as they allow",
-        f"about {more} samples do ({units.length(more)}); raise the limits, admit {rounded_up(beyond, 4)} "
-        "times as much, or write objective: shortest_experiment",
+        f"no record of {length} samples within {' and '.join(keys)} was found that meets the accuracy: the "
+        f"one of the lowest peaks would have to be {times} times as large as they allow",
+        f"about {more} samples do ({units.length(more)}); raise the limits, admit {times} times as much, "
+        "or write objective: shortest_experiment",
         keys[0],
     )

@@ -1,4 +1,4 @@
-"""Records -> the frequency response without a model, and whether it meets what the spec asks."""
+"""Measure the frequency response without a model, and whether it meets what the spec asks."""
 
 from __future__ import annotations
 
@@ -14,22 +14,16 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE, inputs_do_not_repeat, unexcited_lines
 from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
-from inputdesign_cli.identification import FrequencyResponse, frequency_response, response_delays
+from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.period_drift import period_drift
-from inputdesign_cli.identification.periodic_response import (
-    PeriodicResponse,
-    differing,
-    excited_lines,
-    periodic_response,
-)
+from inputdesign_cli.identification.periodic_response import PeriodicResponse, differing, excited_lines
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.identification.spikes import period_spikes
 from inputdesign_cli.outcome.results import Results
@@ -37,7 +31,7 @@ from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.responses import response_of_data
-from inputdesign_cli.questions.frequency_response.measured import Judged, measured_results
+from inputdesign_cli.questions.frequency_response.measured import Judged, Measured, measured_results
 from inputdesign_cli.questions.frequency_response.terms import ResponseTerms
 from inputdesign_cli.questions.frequency_response.whole_periods import Counted, whole_periods
 from inputdesign_cli.records import Preparation, Record, read_data
@@ -62,16 +56,6 @@ class Measurement:
     operating_point: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class _Measured:
-    """A response with the data that count for it; with lines of a spec also how it compares."""
-
-    data: Record
-    response: FrequencyResponse
-    judged: Judged | None = None
-    findings: tuple[Finding, ...] = ()
-
-
 def measure(
     question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
 ) -> Results:
@@ -92,23 +76,12 @@ def measure(
     else:
         counted = whole_periods(terms.periods, data, name, units.sample_time)
         found = _at_lines(question, terms, counted, name, assess=assess)
-    of_reference = data.r is not None and terms is None
-    shown = response_of_data(units, question.model, found.response, by_reference=of_reference)
-    table, curves, response = shown
-    return measured_results(
-        question.header,
-        found.data,
-        table,
-        curves,
-        response,
-        found.judged,
-        found.findings,
-        time.perf_counter() - started,
-        assess=assess,
-    )
+    by_reference = data.r is not None and terms is None
+    shown = response_of_data(units, question.model, found.response, by_reference=by_reference)
+    return measured_results(question.header, found, shown, time.perf_counter() - started, assess=assess)
 
 
-def _without_lines(question: Measurement, data: Record, name: str) -> _Measured:
+def _without_lines(question: Measurement, data: Record, name: str) -> Measured:
     """Return the response where the data excite it."""
     delays = partial(response_delays, question.model, step=question.header.units.step)
     found = frequency_response(data.u, data.y, data.r, lengths=data.lengths, delays=delays)
@@ -118,17 +91,17 @@ def _without_lines(question: Measurement, data: Record, name: str) -> _Measured:
             f"{name} excites no frequency enough for a response without a model",
             hint="record longer, or excite more frequencies",
         )
-    return _Measured(data, found)
+    return Measured(data, found)
 
 
 def _at_lines(
     question: Measurement, terms: ResponseTerms, counted: Counted, name: str, *, assess: bool
-) -> _Measured:
+) -> Measured:
     """Return the response at the lines of the spec that the data excite."""
-    data, periods, repeats = counted.data, counted.periods, counted.repeats
-    excited = excited_lines(data.u, periods, terms.grid.excited, repeats=repeats)
+    data, periods = counted.data, counted.periods
+    excited = excited_lines(data.u, periods, terms.grid.excited, repeats=counted.repeats)
     missing = unexcited_lines(question.header.units, terms.grid.frequencies, excited)
-    found = periodic_response(data.u, data.y, periods, terms.grid.excited[excited], repeats=repeats)
+    found = counted.response(terms.grid.excited[excited])
     if found is None or (assess and missing):
         why = missing[0].message if missing else "the inputs are alike at the lines of the spec"
         raise DataError.because("not-exciting", f"{name}: {why}", hint=REMEDY)
@@ -137,13 +110,13 @@ def _at_lines(
     # Periods of outputs differ by those of inputs that do not repeat.
     if judged.differing <= UNLIKE:
         judged = _doubted(question, terms, found, counted, judged)
-    return _Measured(data, of_periods(found, periods.period), judged, tuple(seen))
+    return Measured(data, of_periods(found, periods.period), judged, tuple(seen))
 
 
 def _doubted(
     question: Measurement, terms: ResponseTerms, found: PeriodicResponse, counted: Counted, judged: Judged
 ) -> Judged:
-    """Return the same with what decides besides noise, and with the silent lines after drifts are taken away.
+    """Return the comparison with spikes, drifts, and a nonlinearity by the silent lines without drifts.
 
     Spikes are in every line, so that silent lines show nothing then.
     """
@@ -157,7 +130,7 @@ def _doubted(
     drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)
     if drift is not None:
         counted = replace(counted, data=replace(data, y=data.y - drift.curve))
-        without = periodic_response(data.u, counted.data.y, periods, found.harmonics, repeats=repeats)
+        without = counted.response(found.harmonics)
         if without is not None:
             scatter = np.abs(found.deviation**2 - without.deviation**2)
             moved = judged.lines.ratios(np.sqrt(np.abs(found.G - without.G) ** 2 + scatter))
@@ -171,7 +144,7 @@ def _doubted(
 
 
 def _noise_at_rest(model: Model, terms: ResponseTerms, judged: Judged) -> Array:
-    """(p,): the spectrum of the noise of the data towards frequency zero, by that at their lowest line.
+    """Return the spectrum (p,) of the noise of the data near frequency zero, by the one at their lowest line.
 
     Noise of the spec may go on rising below that line.
     """
@@ -209,31 +182,25 @@ def judge_lines(
     freedom = 2 * found.freedom * window
     tests = max(len(found.harmonics) // window, 1) * found.noise.shape[1]
     rare = 0.5 * (1.0 - _SURE) / tests
-    low, high = (
-        float(np.sqrt(freedom / (2.0 * scipy.special.gammaincinv(0.5 * freedom, p))))
-        for p in (1.0 - rare, rare)
-    )
-    # Where r_adm is a share of |G|, it is known as well as |G| is.
+    chances = np.array([1.0 - rare, rare])
+    low, high = np.sqrt(freedom / (2.0 * scipy.special.gammaincinv(0.5 * freedom, chances))).tolist()
+    # If r_adm is a share of |G|, it is known as well as |G| is.
     far = -float(scipy.special.ndtri(0.25 * (1.0 - _SURE) / smooth.size)) * np.sqrt(0.5)
     away = far * smooth
     at_least = lines.at(np.maximum(np.abs(found.G) - away, 1e-9 * away))
     at_most = lines.at(np.abs(found.G) + away)
+    # Sizes are less by `far` deviations at most, and noise comes out anew, in these data and in others.
+    anew = 1.0 + scipy.special.ndtri(_SURE) / np.sqrt(freedom)
+    needed = np.max(lines.ratios(smooth)) * (high + far * (lines.share or 0.0)) * anew
     return Judged(
         grid=replace(terms.grid, excited=found.harmonics),
         asked=excited.size,
         differing=differing(counted.data.u, periods, repeats=repeats),
-        # Sizes are less by `far` deviations at most, and noise comes out anew, in these data and in those.
-        times=float(
-            np.max(lines.ratios(smooth))
-            * (high + far * (lines.share or 0.0))
-            * (1.0 + scipy.special.ndtri(_SURE) / np.sqrt(freedom))
-        )
-        ** 2,
+        times=float(needed) ** 2,
         periods=periods,
         lines=lines,
         expected=expected,
         found=smooth,
-        ratios=lines.ratios(smooth),
         least=low * at_most.ratios(smooth),
         largest=high * at_least.ratios(smooth),
         counted=counted.kept * periods.blocks * periods.period,
@@ -243,7 +210,7 @@ def judge_lines(
 
 
 def _averaged(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """(L, p): means over `window` neighbours, at the ends over the nearest so many."""
+    """Return means (L, p) over `window` neighbours, at the ends over the nearest ones."""
     sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
     first = np.clip(np.arange(len(values)) - window // 2, 0, len(values) - window)
     return np.asarray((sums[first + window] - sums[first]) / window)
@@ -285,6 +252,6 @@ def _distorted(
 
 
 def _between(w: Array, lines: Array, values: Array) -> Array:
-    """(n, p): values (L, p) at lines (L,), at frequencies between, linear in both logarithms."""
+    """Return values (L, p) at lines (L,) between them, at w (n,), linear in both logarithms."""
     logs = [np.interp(np.log(w), np.log(lines), np.log(column)) for column in values.T]
     return np.exp(np.stack(logs, axis=1))

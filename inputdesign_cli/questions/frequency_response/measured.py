@@ -1,10 +1,10 @@
-"""A measured frequency response: its deviations against those admitted, and its outcome."""
+"""Compare a measured frequency response with what is admitted, and write its outcome."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE
 from inputdesign_cli.findings.nonlinear_response import Distorted, nonlinear_response, silent_lines_answer
 from inputdesign_cli.findings.scattered_periods import within_chance
+from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
@@ -29,19 +30,18 @@ from inputdesign_cli.specification.models.sizes import most
 
 @dataclass(frozen=True)
 class Judged:
-    """The deviations (L, p, r) of data: with the noise of the spec, and with that of the data.
+    """The deviations (L, p, r) of data by the noise of the spec (`expected`) and of the data (`found`).
 
     Attributes:
         lines: with the measured G.
-        ratios: (L,) of the latter over r_adm, the largest entry.
-        least, largest: (L,), between which the true ratios lie, with 95 % all of them.
+        least, largest: (L,), the limits of the true ratios, which hold for all lines with 95 %.
         counted: samples that count.
-        asked: lines of the spec, of which these are the ones that the inputs excite.
+        asked: the number of lines of the spec; these are the ones that the inputs excite.
         differing: the share of the power of the inputs that differs from period to period.
         noise: (L, p), the spectrum of the noise of the data, averaged along the lines.
         times: with this multiple of the periods a verdict would be met, by the same plant and noise.
         moved: (L,), the change of the response by a drift, over what is admitted.
-        distorted: its change by a nonlinearity; None where none is seen, or none is watched for.
+        distorted: its change by a nonlinearity; None if none is seen or looked for.
         scattered: findings on spikes and drifts, which are in the scatter of the periods too.
     """
 
@@ -50,7 +50,6 @@ class Judged:
     lines: ResponseLines
     expected: NDArray[np.float64]
     found: NDArray[np.float64]
-    ratios: Array
     least: Array
     largest: Array
     counted: int
@@ -62,6 +61,11 @@ class Judged:
     distorted: Distorted | None = None
     scattered: tuple[Finding, ...] = ()
     silent: Mapping[str, SilentLines] = field(default_factory=dict)
+
+    @cached_property
+    def ratios(self) -> Array:
+        """The largest deviation (L,) of an entry by the noise of the data, over r_adm."""
+        return self.lines.ratios(self.found)
 
     @property
     def worst(self) -> int:
@@ -91,7 +95,7 @@ class Judged:
 
     @property
     def periods_needed(self) -> int | None:
-        """The periods (of each block) that would have to count; None where more are no remedy."""
+        """The periods (of each block) that would have to count; None if more are no remedy."""
         samples = self.times * self.counted
         # Of inputs that do not repeat the mean of the periods falls as the noise does.
         if self.differing > UNLIKE or samples > most("signal.samples"):
@@ -108,14 +112,20 @@ class Judged:
         return f"more periods of this signal are no remedy, as the inputs {why}: {REMEDY}"
 
 
+@dataclass(frozen=True)
+class Measured:
+    """A response with the data that count for it; with lines of a spec also how it compares."""
+
+    data: Record
+    response: FrequencyResponse
+    judged: Judged | None = None
+    findings: tuple[Finding, ...] = ()
+
+
 def measured_results(
     header: Header,
-    data: Record,
-    table: Table,
-    curves: ResponseCurves,
-    response: MeasuredLines,
-    judged: Judged | None,
-    findings: Sequence[Finding],
+    measured: Measured,
+    shown: tuple[Table, ResponseCurves, MeasuredLines],
     seconds: float,
     *,
     assess: bool,
@@ -123,28 +133,27 @@ def measured_results(
     """Return the outcome, frequency_response.csv and its figure; with lines of a spec also their deviations.
 
     Args:
-        response: beside the nominal plant, see `response_of_data`.
+        shown: the response beside the nominal plant, see `response_of_data`.
         assess: whether the result is a verdict.
     """
-    tables: dict[str, Table] = {"frequency_response": table}
-    drawn: dict[str, Curves] = {"frequency_response": curves}
-    found, assessment = list(findings), None
-    status: Literal["measured", "met", "missed", "undecided"] = "measured"
+    table, curve, response = shown
+    data, judged, found = measured.data, measured.judged, list(measured.findings)
+    tables, curves = {"frequency_response": table}, dict[str, Curves](frequency_response=curve)
+    assessment = None
     if judged is not None:
         w = judged.grid.frequencies / header.units.frequency
         listed = {"deviation": judged.expected, "deviation_data": judged.found}
-        shown = ("deviation_data", "these data")
-        columns, drawn["deviations"] = deviation_curves(header.units, w, judged.lines, listed, shown)
+        drawn = ("deviation_data", "these data")
+        columns, curves["deviations"] = deviation_curves(header.units, w, judged.lines, listed, drawn)
         tables["deviations"] = Table(columns)
         response = _of_lines(response, judged, w, len(data.lengths), data.lengths[0])
         doubts = judged.doubts(header.units)
         if assess:
             assessment, doubts = _assessment(header.units, judged, w, doubts)
-            status = assessment.verdict
         found += [*silent_lines_answer(judged.silent), *doubts]
     outcome = Outcome(
         title=header.title,
-        status=status,
+        status="measured" if assessment is None else assessment.verdict,
         samples=len(data.y),
         identification=Identification(method=response.method),
         frequency_response=replace(response, blocks=1 if judged is None else judged.periods.blocks),
@@ -153,7 +162,7 @@ def measured_results(
         notes=data.notes or None,
         timing_s={"measurement": seconds},
     )
-    return Results(outcome.saying(found), header.resolved_spec, header.units.time_unit, tables, drawn)
+    return Results(outcome.saying(found), header.resolved_spec, header.units.time_unit, tables, curves)
 
 
 def _of_lines(response: MeasuredLines, judged: Judged, w: Array, records: int, samples: int) -> MeasuredLines:
@@ -180,14 +189,13 @@ def _of_lines(response: MeasuredLines, judged: Judged, w: Array, records: int, s
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, SilentLine]:
     """Return `nonlinearity` of the result, by kind of the lines: odd and even; lists are by output."""
+
+    def by_output(values: Array) -> tuple[float, ...]:
+        return tuple(values.tolist())
+
     return {
-        kind: SilentLine(
-            found.lines,
-            tuple(found.over_noise.tolist()),
-            tuple(found.probability.tolist()),
-            tuple(found.rms.tolist()),
-        )
-        for kind, found in silent.items()
+        kind: SilentLine(one.lines, by_output(one.over_noise), by_output(one.probability), by_output(one.rms))
+        for kind, one in silent.items()
     }
 
 

@@ -1,4 +1,4 @@
-"""A frequency response that is designed or tried -> its outcome, tables and figures."""
+"""Write the outcome, tables and figures of a frequency response that is designed or tried."""
 
 from __future__ import annotations
 
@@ -49,6 +49,9 @@ def response_outcome(
     units, lines, designed = terms.header.units, terms.lines, terms.goal != "given"
     ratios = lines.ratios(lines.deviations(plan.powers, plan.counted))
     worst, (power, cost) = int(np.argmax(ratios)), terms.powers(plan.powers)
+    entry = signal_entry(request, units, terms.experiment, plan.record)
+    entry |= {"worst_ratio": plan.record.worst_ratio, "start_shift": plan.shift}
+    odd, even = (terms.grid.at(silent) / units.frequency for silent in (terms.grid.odd, terms.grid.even))
     met = "met" if ratios[worst] <= 1.0 + _ROUNDING else "missed"
     objective, baseline = _objective(terms, plan) if designed else (None, None)
     powers = _matrices(plan.powers) if units.inputs > 1 else plan.powers[:, 0]
@@ -61,7 +64,7 @@ def response_outcome(
         power=power,
         spectrum=Spectrum("multisine", {"frequencies": terms.frequency, "powers": powers}),
         baseline=baseline,
-        signal=_signal(terms, plan, request),
+        signal=read_plain(Signal, entry),
         frequency_response=MeasuredLines(
             lines=int(ratios.size),
             period=terms.grid.period,
@@ -71,7 +74,7 @@ def response_outcome(
             counted=plan.counted,
             worst_ratio=float(ratios[worst]),
             worst_frequency=float(terms.frequency[worst]),
-            detection=_detection(terms),
+            detection=DetectionLines(odd, even) if even.size else None,
         ),
         solver=Solver("lines", terms.tolerance) if designed else None,
         timing_s=timing,
@@ -97,11 +100,6 @@ def _objective(terms: ResponseTerms, plan: Planned) -> tuple[Objective, Baseline
     gap = abs(value - bound) / value
     kind = _KINDS[terms.goal]
     return Objective(kind, value, lower_bound=min(bound, value), relative_gap=gap), Baseline(white)
-
-
-def _signal(terms: ResponseTerms, plan: Planned, request: RecordRequest) -> Signal:
-    entry = signal_entry(request, terms.header.units, terms.experiment, plan.record)
-    return read_plain(Signal, {**entry, "worst_ratio": plan.record.worst_ratio, "start_shift": plan.shift})
 
 
 def _findings(terms: ResponseTerms, plan: Planned, power: Powers) -> list[Finding]:
@@ -181,11 +179,6 @@ def tried_lines(
     )
 
 
-def _detection(terms: ResponseTerms) -> DetectionLines | None:
-    grid, unit = terms.grid, terms.header.units.frequency
-    return DetectionLines(grid.at(grid.odd) / unit, grid.at(grid.even) / unit) if grid.even.size else None
-
-
 def _matrices(powers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(L, r, r): uncorrelated inputs."""
+    """Return the powers of uncorrelated inputs as matrices (L, r, r)."""
     return np.einsum("lr,rs->lrs", powers, np.eye(powers.shape[1]))

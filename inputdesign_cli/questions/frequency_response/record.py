@@ -1,4 +1,4 @@
-"""The record of given lines whose peaks, or peaks beside their limits, are low."""
+"""Make a record of given lines with low peaks, relative to the limits on them."""
 
 from __future__ import annotations
 
@@ -33,38 +33,42 @@ class LineRecords:
     bounds: Bounds
 
     def best(self, powers: NDArray[np.float64], length: int) -> Array:
-        """(length, r): of several choices of phases that of the lowest peak, for powers (L, r)."""
+        """Return the record (length, r) of the lowest peak among several choices of phases.
+
+        Args:
+            powers: (L, r) of the lines.
+        """
         r, period, settings = powers.shape[1], self.grid.period, self.settings
         diagonal = np.einsum("lr,rs->lrs", powers, np.eye(r)).astype(complex)
         lines = Lines(self.grid.frequencies, diagonal, period)
         limited = limited_responses(self.experiment, self.bounds, 1.0, 1, self.grid.frequencies)
-        best: tuple[float, Array] | None = None
-        for number in range(settings.candidates):
+
+        def drawn(number: int) -> Array:
             rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(_STREAM, number)))
             angles = 2.0 * np.pi * rng.random(len(powers))
             if settings.phases in ("schroeder", "optimised") and number == 0:
                 angles = schroeder_phases(lines, period * r)
             if settings.phases == "optimised":
                 angles = low_peak_phases(lines, period * r, angles, limited=limited)
-            u = multisine_record(lines, length, rng, "orthogonal", angles=angles)
-            height = self.beyond(u) if self.bounds.hard else float(np.max(np.abs(u)))
-            if best is None or height < best[0]:
-                best = height, u
-            if settings.phases == "schroeder":
-                break
-        assert best is not None
-        return best[1]
+            return multisine_record(lines, length, rng, "orthogonal", angles=angles)
+
+        def height(u: Array) -> float:
+            return self.beyond(u) if self.bounds.hard else float(np.max(np.abs(u)))
+
+        return min(
+            map(drawn, range(1 if settings.phases == "schroeder" else settings.candidates)), key=height
+        )
 
     def beyond(self, u: Array) -> float:
-        """The largest share of their limits that samples of u (n, r), its moves and outputs take."""
-        bounds, found = self.bounds, [0.0]
-        if bounds.amplitude is not None:
-            found.append(float(np.max(np.abs(u) / bounds.amplitude)))
-        if bounds.rate is not None:
-            found.append(float(np.max(np.abs(np.diff(u, axis=0, prepend=0.0)) / bounds.rate)))
+        """Return the largest share of their limits that samples of u (n, r), its moves and outputs take."""
+        bounds, moves = self.bounds, np.diff(u, axis=0, prepend=0.0)
+        limited = [(u, bounds.amplitude), (moves, bounds.rate)]
         if bounds.output is not None:
-            model = self.experiment.model
-            quiet = np.zeros((1, 1, model.outputs))
-            y = model.simulate(u[None], quiet, 1.0)[0][0]
-            found.append(float(np.max(np.abs(y) / bounds.output)))
-        return max(found)
+            limited.append((self.answer(u), bounds.output))
+        shares = [float(np.max(np.abs(x) / most)) for x, most in limited if most is not None]
+        return max(shares, default=0.0)
+
+    def answer(self, u: Array) -> Array:
+        """Return the outputs (n, p) to inputs u (n, r) from rest, without noise."""
+        model = self.experiment.model
+        return np.asarray(model.simulate(u[None], np.zeros((1, 1, model.outputs)), 1.0)[0][0])

@@ -1,4 +1,4 @@
-"""The lines of a frequency response: designed, realised, reread, and tried on a simulated true system."""
+"""Design the lines of a frequency response, realise and reread them, and try them on a true system."""
 
 from __future__ import annotations
 
@@ -10,17 +10,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.cost import weights_of
-from inputdesign_cli.design.response import (
-    ResponseDesign,
-    ResponseProblem,
-    UnreachableError,
-    cheapest,
-    most_accurate,
-)
+from inputdesign_cli.design.response import ResponseDesign, UnreachableError, cheapest, most_accurate
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
-from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
 from inputdesign_cli.outcome.results import Results
@@ -56,7 +48,7 @@ class ResponseTask:
     simulation: Simulation
 
     def solve(self) -> Results:
-        """The powers of the lines, their proof, and a record.
+        """Return the powers of the lines, their proof, and a record.
 
         Raises:
             InfeasibleError: the limits exclude the accuracy.
@@ -65,7 +57,7 @@ class ResponseTask:
         return self._solved()[1]
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """The same, with the deviations of many simulated experiments beside the designed ones.
+        """Return the design, and beside its deviations the scatter of many simulated experiments.
 
         Raises:
             SpecError: `not-supported` for inputs to compare with; see `solve`.
@@ -114,30 +106,10 @@ class ResponseTask:
                 key="simulation.runs",
             )
 
-    def _problem(self, samples: int) -> ResponseProblem:
-        terms = self.terms
-        shape = terms.lines.G.shape[0], terms.experiment.inputs
-        price = sum(
-            (w * self._row(kind, channel) for kind, channel, w in weights_of(terms.cost)), np.zeros(shape)
-        )
-        rows = [self._row(limit.kind, limit.channel).ravel() for limit in terms.limits]
-        return ResponseProblem(
-            terms.lines.needed(samples).ravel(),
-            price.ravel(),
-            terms.limits,
-            np.array(rows).reshape(len(rows), np.prod(shape)),
-        )
-
-    def _row(self, kind: PowerKind, channel: int | None) -> NDArray[np.float64]:
-        """(L, r): what a unit of power of each line adds to a power."""
-        gains = self.terms.gains(kind)
-        return np.asarray(gains.sum(axis=1) if channel is None else gains[:, channel])
-
     def _designed(self) -> tuple[ResponseDesign, int]:
         """Return the powers and the samples that count."""
-        terms = self.terms
-        samples = terms.experiment.samples
-        problem = self._problem(samples)
+        terms, samples = self.terms, self.terms.experiment.samples
+        problem = terms.problem(samples)
         if self.given is not None:
             flat = self.given.ravel()
             return ResponseDesign(flat, float(problem.price @ flat), float(problem.price @ flat)), samples
@@ -180,7 +152,7 @@ class ResponseTask:
         """Return the record of a design, scaled so that it meets the accuracy or keeps to the limits."""
         terms = self.terms
         samples, beyond, counted = self._realised(design, counted)
-        problem, noise = self._problem(counted), terms.lines.noise
+        problem, noise = self.terms.problem(counted), terms.lines.noise
         if not terms.tabulated:
             times = counted // (terms.periods.blocks * terms.periods.period)
             spectrum = NoiseSpectrum.of(terms.experiment.model)
@@ -196,8 +168,7 @@ class ResponseTask:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
-        shift = self._shifted(samples, exact)
-        return Planned(design, problem, powers, counted, len(samples), record, exact, shift)
+        return Planned(design, problem, powers, counted, record, exact, self._shifted(samples, exact))
 
     def _length(self, counted: int) -> int:
         """Return the length of a record, transient included.
@@ -227,7 +198,5 @@ class ResponseTask:
     def _shifted(self, u: Array, deviations: NDArray[np.float64]) -> float:
         """Return the largest shift of G by the start, in standard deviations."""
         terms = self.terms
-        quiet = np.zeros((1, 1, terms.experiment.model.outputs))
-        y = terms.experiment.model.simulate(u[None], quiet, 1.0)[0][0]
-        U, Y = (terms.periods.means(signal, terms.grid.excited) for signal in (u, y))
+        U, Y = (terms.periods.means(x, terms.grid.excited) for x in (u, self._records.answer(u)))
         return float(np.max(np.abs(response_at(U, Y) - terms.lines.G) / deviations))

@@ -1,4 +1,4 @@
-"""How a frequency response is asked for, and what the designed record of it does."""
+"""State how a frequency response is asked for, and what a record designed for it does."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.response import Goal, ResponseDesign, ResponseLines, ResponseProblem
 from inputdesign_cli.identification.periodic_response import Periods
@@ -49,22 +49,36 @@ class ResponseTerms:
 
     @property
     def frequency(self) -> Array:
-        """(L,): of the lines, in the user's unit."""
+        """Return the frequencies (L,) of the lines in the unit of the spec."""
         return self.grid.frequencies / self.header.units.frequency
 
     def gains(self, kind: PowerKind) -> Array:
-        """(L, channels, r): what a unit of power of each line adds to each power."""
+        """Return what a unit of power of each line adds to each power, (L, channels, r)."""
         return np.asarray(np.abs(self.experiment.response(kind, self.grid.frequencies)) ** 2)
 
+    def problem(self, samples: int) -> ResponseProblem:
+        """Return the prices and limits of the lines, and the powers that meet the accuracy in `samples`."""
+
+        def added(kind: PowerKind, channel: int | None) -> NDArray[np.float64]:
+            gains = self.gains(kind)
+            return np.asarray(gains.sum(axis=1) if channel is None else gains[:, channel]).ravel()
+
+        needed = self.lines.needed(samples).ravel()
+        paid = (w * added(kind, channel) for kind, channel, w in weights_of(self.cost))
+        rows = [added(limit.kind, limit.channel) for limit in self.limits]
+        return ResponseProblem(
+            needed, sum(paid, np.zeros(needed.size)), self.limits, np.array(rows).reshape(-1, needed.size)
+        )
+
     def powers(self, lines: NDArray[np.float64]) -> tuple[Powers, float]:
-        """Mean squares by channel, and the cost, of lines with powers (L, r)."""
+        """Return mean squares by channel, and the cost, of lines with powers (L, r)."""
         found = {kind: np.einsum("lar,lr->a", self.gains(kind), lines).tolist() for kind in POWER_KINDS}
         return Powers(**{kind: tuple(power) for kind, power in found.items()}), weighted_sum(self.cost, found)
 
 
 @dataclass(frozen=True)
 class Planned:
-    """The experiment to be applied: powers (L, r), `counted` of `length` samples, the record, its deviations.
+    """The experiment to be applied: powers (L, r), the samples that count, the record, its deviations.
 
     Attributes:
         problem: for the samples that count.
@@ -76,19 +90,23 @@ class Planned:
     problem: ResponseProblem
     powers: NDArray[np.float64]
     counted: int
-    length: int
     record: Record
     deviations: NDArray[np.float64]
     shift: float
 
     @property
+    def length(self) -> int:
+        """The number of samples of the record, transient included."""
+        return len(self.record.samples)
+
+    @property
     def applied(self) -> NDArray[np.float64]:
-        """(L, r): the powers of the record."""
+        """Return the powers (L, r) of the record."""
         return self.powers * (1.0 + self.record.extra_power)
 
     @property
     def flat(self) -> NDArray[np.float64]:
-        """(L, r): equal lines with the power of the record in each input."""
+        """Return equal lines (L, r) with the power of the record in each input."""
         return np.broadcast_to(self.applied.mean(axis=0), self.powers.shape)
 
 
@@ -99,12 +117,12 @@ def deviation_curves(
     listed: Mapping[str, NDArray[np.float64]],
     found: tuple[str, str] | None = None,
 ) -> tuple[dict[str, Array], DeviationCurves]:
-    """Return the columns of deviations.csv and its figure, entry by entry of those that are bounded.
+    """Return the columns of deviations.csv and its figure, for the entries of G that are bounded.
 
     Args:
         w: (L,), the lines in the user's unit.
         listed: columns (L, p, r), of which `deviation` is the designed one.
-        found: the column to draw beside it, and its label.
+        found: another column to draw, and its label.
     """
     columns: dict[str, Array] = {units.frequency_header: w}
     panels = []

@@ -1,4 +1,4 @@
-"""Which samples of data are the periods that a design counts, gaps or not."""
+"""Pick the samples of data that are whole periods of a design, with gaps or without."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.counted_periods import periods_between_gaps, samples_before_periods
-from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
 from inputdesign_cli.records import Record
 
 
 @dataclass(frozen=True)
 class Counted:
-    """Record that count, how they repeat, the number of records of equal length, and what is left out."""
+    """Data that count, how they repeat, the number of records of equal length, and what is left out."""
 
     data: Record
     periods: Periods
@@ -28,13 +28,18 @@ class Counted:
         """Periods of one phase that count, in all records."""
         return self.repeats * self.periods.kept(self.data.lengths[0])
 
+    def response(self, harmonics: NDArray[np.int_]) -> PeriodicResponse | None:
+        """Return the response at harmonics (L,); None if the inputs are alike there."""
+        data = self.data
+        return periodic_response(data.u, data.y, self.periods, harmonics, repeats=self.repeats)
+
 
 def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Counted:
     """Return the data that count.
 
-    Records of equal length stay as they are. Of pieces between gaps, and of records of several lengths, the
-    periods that lie in one piece are taken: those that begin at the sample of a period of which there are
-    most, counted from the begin of each file, so that all have the same phase.
+    Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
+    periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
+    the one with the most periods.
 
     Args:
         name: of the file that messages name.
@@ -82,11 +87,9 @@ def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> Count
 
 
 def _places(data: Record, step: float) -> NDArray[np.int64]:
-    """(N,): the number of samples between the begin of a file and each of its samples."""
-    ends = np.cumsum([count for _, count in data.files])[:-1]
-    return np.concatenate([np.round((part - part[0]) / step) for part in np.split(data.time, ends)]).astype(
-        np.int64
-    )
+    """Return the number (N,) of samples between the begin of a file and each of its samples."""
+    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
+    return np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
 
 
 def _check(each: int, together: int, stated: Periods, name: str) -> None:

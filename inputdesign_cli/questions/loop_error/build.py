@@ -23,7 +23,8 @@ from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
 from inputdesign_cli.questions.building.signal_settings import build_bounds, stated_peaks
-from inputdesign_cli.questions.building.unhandled import check_compared, refuse_unhandled
+from inputdesign_cli.questions.building.system import build_cost
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
 from inputdesign_cli.questions.loop_error.build_plant import estimated_model, matrix_plant
 from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms
@@ -62,18 +63,14 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
     )
-    cost, spectrum = spec.cost, spec.spectrum
+    spectrum = spec.spectrum
     terms = LoopErrorTerms(
         header=build_header(spec),
         law=name,
         covariance=error.covariance,
         samples=spec.experiment.samples,
         tolerance=spec.solver.tolerance,
-        cost={
-            "input": np.asarray(cost.input_power),
-            "output": np.asarray(cost.output_power),
-            "excitation": np.asarray(cost.excitation_power),
-        },
+        cost=build_cost(spec),
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
     return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, error, problem))
@@ -179,6 +176,7 @@ def _check_supported(spec: Spec) -> None:
         "spectrum.type": "use type: pointwise, which is best at every frequency",
         "experiment.controller": "remove the controller",
         "report.ellipses": "remove report",
+        "uncertainty": ONE_PLANT,
         "experiment.prior": "remove it",
         "solver.method": "remove method",
         "signal.type": "use multisine or filtered_noise",

@@ -1,4 +1,4 @@
-"""Spec -> the plant of a closed-loop error: polynomials that a law inverts, and what is estimated."""
+"""Build the plant of a closed-loop error: polynomials that a law inverts, and the estimated model."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _INTEGRATES = 1e-7
 
 
 def estimated_model(spec: Spec) -> Model | None:
-    """The model in what is estimated; None where that is every coefficient of a plant in q^-1.
+    """Return the model in the estimated parameters; None if they are all coefficients of a plant in q^-1.
 
     Raises:
         SpecError: `nothing-to-estimate` where the plant is known; see `build_model`, `check_model` and
@@ -52,7 +52,7 @@ def estimated_model(spec: Spec) -> Model | None:
 
 
 def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
-    """The matrix of polynomials of `plant` or of the true system `simulation.plant`.
+    """Return the matrix of polynomials of `plant` or of the true system `simulation.plant`.
 
     Raises:
         SpecError: `not-supported`; `inaccurate-conversion` of states.
@@ -102,7 +102,7 @@ def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, k
 def _of_states(
     spec: Spec, plant: StateSpacePlant, noise: Noise | SimulationNoise, key: str
 ) -> PolynomialModel:
-    """G entry by entry, and H of the gain K or of C and D."""
+    """Return a model with G entry by entry, and H by the gain K or by C and D."""
     model = state_space_model(spec, plant, noise.covariance(plant.outputs))
     C, D = per_output(noise.C), per_output(noise.D)
     step = model.sample_time or 0.0
@@ -125,7 +125,7 @@ def _of_states(
 
 
 def _in_delays(A: Array, B: Array, C: Array, D: Array, *, lag: int) -> tuple[Rows, Rows]:
-    """Numerators and monic denominators in q^-1 of a system in states, that is late by `lag` samples more."""
+    """Return numerators and monic denominators in q^-1 of a system in states, delayed by `lag` samples."""
     above, below = [], []
     for row in transfer_functions(A, B, C, D, discrete=True):
         # Excess poles are samples of delay; a zero is one coefficient.

@@ -9,11 +9,13 @@ from typing import Literal
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.design.loop_error.weight import adjoint
+from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.loop_error import LossStudy
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.outcome import (
@@ -52,7 +54,7 @@ class LoopErrorTerms:
         covariance: of the estimate, in the limit of a high model order or exact for the model structure.
         samples: of the experiment.
         tolerance: relative gap to be proved.
-        cost: weights of the powers of "input", "output" and "excitation", one number or one a channel.
+        cost: weights of the powers.
         grid: number of frequencies of spectrum.csv.
     """
 
@@ -61,7 +63,7 @@ class LoopErrorTerms:
     covariance: Literal["asymptotic", "parametric"]
     samples: int
     tolerance: float
-    cost: Mapping[str, Array]
+    cost: Mapping[PowerKind, Weight]
     grid: int
 
 
@@ -70,12 +72,9 @@ def design_outcome(
 ) -> Outcome:
     """Return what result.json says of a design."""
     criterion, samples, white = design.criterion, terms.samples, design.white
-    inputs = tuple(np.diag(design.input_covariance).tolist())
-    outputs = tuple(np.diag(design.output_covariance).tolist())
-    power = Powers(inputs, outputs, inputs)
+    inputs, outputs = (np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance))
     lo, hi = (edge / terms.header.units.sample_time for edge in design.problem.band)
-    of = {"input": inputs, "output": outputs, "excitation": inputs}
-    cost = sum(float(np.sum(weight * of[kind])) for kind, weight in terms.cost.items())
+    cost = weighted_sum(terms.cost, {"input": inputs, "output": outputs, "excitation": inputs})
     informations = {"design": design.information, "white": white.information}
     return Outcome(
         title=terms.header.title,
@@ -89,7 +88,7 @@ def design_outcome(
         ),
         cost=cost,
         samples=samples,
-        power=power,
+        power=_powers(inputs, outputs),
         closed_loop_error=ClosedLoopError(
             law=terms.law,
             covariance=terms.covariance,
@@ -148,11 +147,16 @@ def theory_of(theory: LossTheory) -> TheoreticalLoss:
 
 
 def _white_power(design: LoopErrorDesign) -> Powers:
+    """Return the powers of white noise of the same total power."""
     weights, level = design.rule.weights, design.white.level
     G = design.problem.plant.plant_at(design.rule.nodes)
     output = level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
-    inputs = (level * float(weights.sum()),) * design.problem.plant.inputs
-    return Powers(inputs, tuple(output.tolist()), inputs)
+    return _powers([level * float(weights.sum())] * design.problem.plant.inputs, output.tolist())
+
+
+def _powers(inputs: list[float], outputs: list[float]) -> Powers:
+    """Return powers by channel of an experiment in open loop, where the excitation is the input."""
+    return Powers(tuple(inputs), tuple(outputs), tuple(inputs))
 
 
 def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:

@@ -12,7 +12,7 @@ from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
-from inputdesign_cli.questions.building.unhandled import check_compared, refuse_unhandled
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.regression.outcome import RegressionTerms
 from inputdesign_cli.questions.regression.regressors import RegressorSettings
 from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
@@ -86,7 +86,7 @@ def _trial(spec: Spec) -> RegressionTrial | None:
     if simulation is None or true is None or true.kind != "parameters":
         return None
     check_compared(simulation.compare, *get_args(Contender))
-    contenders: list[Contender] = [name for name in get_args(Contender) if name in simulation.compare]
+    known: dict[str, Contender] = {name: name for name in get_args(Contender)}
     variance = relative = None
     if simulation.noise is not None:
         _refuse_coloured(simulation.noise, "simulation.noise")
@@ -94,7 +94,14 @@ def _trial(spec: Spec) -> RegressionTrial | None:
         if simulation.noise.variance is not None:
             variance = float(np.ravel(np.asarray(simulation.noise.variance, dtype=float))[0])
     theta = np.array(true.parameters, dtype=float)
-    return RegressionTrial(theta, simulation.runs, simulation.seed, tuple(contenders), variance, relative)
+    return RegressionTrial(
+        theta,
+        simulation.runs,
+        simulation.seed,
+        tuple(known[name] for name in simulation.compare),
+        variance,
+        relative,
+    )
 
 
 def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
@@ -126,6 +133,7 @@ def _check_supported(spec: Spec) -> None:
         "experiment.prior": "remove it",
         **dict.fromkeys(limits, "remove it, or use limits.energy"),
         "report.ellipses": "remove report",
+        "uncertainty": ONE_PLANT,
         "solver.method": "use exchange (the default) or alternating",
         **dict.fromkeys(_SIGNAL_KEYS, "remove it; samples, periods, seed and start count"),
     }

@@ -15,6 +15,7 @@ from inputdesign_cli.design.regression import (
     error_bound,
     error_sensitivity,
     least_energy,
+    least_error,
 )
 from inputdesign_cli.monte_carlo.regression import Estimates
 from inputdesign_cli.outcome import (
@@ -53,6 +54,14 @@ class RegressionTerms:
     samples: int
     target: float | None
     energy: float | None
+
+    def free(self) -> tuple[Array, float]:
+        """Return the best moments R (n, n) of any structure, and the bound that proves them."""
+        if self.target is not None:
+            R = least_energy(self.regression, self.target)
+            return R, energy_bound(self.regression, self.target, R)
+        assert self.energy is not None
+        return least_error(self.regression, self.energy), error_bound(self.regression, self.energy)
 
 
 @dataclass(frozen=True)
@@ -99,7 +108,7 @@ def moments_outcome(
             value,
             lower_bound=design.bound,
             relative_gap=gap,
-            any_structure_bound=_any_structure(terms) if terms.toeplitz else design.bound,
+            any_structure_bound=terms.free()[1] if terms.toeplitz else design.bound,
         ),
         cost=design.energy,
         samples=terms.samples,
@@ -161,14 +170,6 @@ def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Es
         mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
         mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
     )
-
-
-def _any_structure(terms: RegressionTerms) -> float:
-    """Return the bound over every R, whatever its structure."""
-    if terms.target is not None:
-        return energy_bound(terms.regression, terms.target, least_energy(terms.regression, terms.target))
-    assert terms.energy is not None
-    return error_bound(terms.regression, terms.energy)
 
 
 def _white(terms: RegressionTerms, value: float) -> White | None:

@@ -9,15 +9,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.regression import (
-    OutOfReachError,
-    Regression,
-    design_toeplitz,
-    energy_bound,
-    error_bound,
-    least_energy,
-    least_error,
-)
+from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
@@ -155,15 +147,8 @@ class RegressionTask:
         return record, Results(outcome, terms.header.resolved_spec, units.time_unit, tables, curves)
 
     def _free(self) -> MomentsDesign:
-        regression, target, energy = self.terms.regression, self.terms.target, self.terms.energy
-        if target is not None:
-            R = least_energy(regression, target)
-            bound = energy_bound(regression, target, R)
-        else:
-            assert energy is not None
-            R = least_error(regression, energy)
-            bound = error_bound(regression, energy)
-        return MomentsDesign(R, None, regression.error(R), bound, 1e-9, Solver("closed_form"))
+        R, bound = self.terms.free()
+        return MomentsDesign(R, None, self.terms.regression.error(R), bound, 1e-9, Solver("closed_form"))
 
     def _toeplitz(self) -> MomentsDesign:
         terms = self.terms
