@@ -14,7 +14,8 @@ from inputdesign_cli.errors import STANDARD_STREAM, DataError
 from inputdesign_cli.records.arrays import MOST_UNPACKED, read_mat, read_npz
 from inputdesign_cli.records.cells import written_out
 from inputdesign_cli.records.moments import with_days
-from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.sheet import Sheet, unreadable
 from inputdesign_cli.records.text import decoded, read_text, sheet_of
 from inputdesign_cli.regular_file import read_regular
 
@@ -23,32 +24,26 @@ PARQUET = (".parquet", ".pq")
 EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
 _OF_VARIABLES = (".mat", ".npz")
 _ZIP, _OLE, _ARRAY = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x93NUMPY"
-# How compressed files begin.
-_COMPRESSED = {
-    b"\x1f\x8b": "gzip",
-    b"BZh": "bzip2",
-    b"\xfd7zXZ\x00": "xz",
-    b"\x28\xb5\x2f\xfd": "zstd",
-    b"7z\xbc\xaf\x27\x1c": "7z",
-}
+# How compressed files begin: gzip, bzip2, xz, zstd and 7z.
+_COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ\x00", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf\x27\x1c")
 # What the workbooks of Excel have inside, and those of ODF.
 _WORKBOOK = ("[Content_Types].xml", "xl/", "content.xml")
 
 
-def read_sheet(path: Path, *, key: str = "", written: Written | None = None) -> Sheet:
+def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = None) -> Sheet:
     """Return the columns of a data file, times of a day with their days.
 
     Args:
         key: the key of the spec that names the file, for diagnostics.
-        written: how it is written, where the user says so.
+        preparation: separator, decimal mark and form of times, where the user says so.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    return with_days(_read(path, key, written or Written()))
+    return with_days(_read(path, key, preparation or Preparation()))
 
 
-def _read(path: Path, key: str, written: Written) -> Sheet:
+def _read(path: Path, key: str, given: Preparation) -> Sheet:
     file, _, named = path.name.partition("#")
     kind = Path(file).suffix.lower()
     if kind not in (*EXCEL, *_OF_VARIABLES):  # only their sheets and variables have names
@@ -57,15 +52,15 @@ def _read(path: Path, key: str, written: Written) -> Sheet:
     if len(raw) > _MOST_BYTES:
         raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
     if kind == ".npz":  # an archive itself
-        return read_npz(path, key, raw, named, written)
+        return read_npz(path, key, raw, named, given)
     _check_unpacked(path, key, raw, workbook=kind in EXCEL)
     if kind == ".mat":
-        return read_mat(path, key, raw, named, written)
+        return read_mat(path, key, raw, named, given)
     if kind in PARQUET:
-        return _read_parquet(path, key, raw, written)
+        return _read_parquet(path, key, raw, given)
     if kind in EXCEL:
-        return _read_workbook(path, key, raw, named, written)
-    return read_text(path, key, decoded(path, key, raw), written)
+        return _read_workbook(path, key, raw, named, given)
+    return read_text(path, key, decoded(path, key, raw), given)
 
 
 def _bytes(path: Path, key: str) -> bytes:
@@ -88,9 +83,8 @@ def _bytes(path: Path, key: str) -> bytes:
 
 def _check_unpacked(path: Path, key: str, raw: bytes, *, workbook: bool) -> None:
     """Raise `DataError` (`data-unreadable`) for compressed files, and for endings of another kind."""
-    for mark, kind in _COMPRESSED.items():
-        if raw.startswith(mark) and not (mark == b"BZh" and not raw[3:4].isdigit()):
-            raise _compressed(path, key, kind)
+    if raw.startswith(_COMPRESSED) and (raw[:3] != b"BZh" or raw[3:4].isdigit()):
+        raise _compressed(path, key)
     if raw.startswith(_ARRAY):
         raise unreadable(
             path, key, "holds an array of NumPy without names", "write numpy.savez('data.npz', u=.., y=..)"
@@ -104,7 +98,7 @@ def _check_unpacked(path: Path, key: str, raw: bytes, *, workbook: bool) -> None
                 path, key, "holds arrays of NumPy under another ending", "give it the ending .npz"
             )
         if names and not any(name.startswith(_WORKBOOK) for name in names):
-            raise _compressed(path, key, "zip")
+            raise _compressed(path, key)
         if not names and not workbook:
             hint = "write or copy it anew, and unpack it where it is an archive"
             raise unreadable(path, key, "is a damaged zip archive or workbook", hint)
@@ -122,20 +116,20 @@ def _contents(raw: bytes) -> tuple[list[str], int]:
         return [], 0
 
 
-def _compressed(path: Path, key: str, kind: str) -> DataError:
-    return unreadable(path, key, f"is compressed ({kind})", "unpack it, and name the file that it holds")
+def _compressed(path: Path, key: str) -> DataError:
+    return unreadable(path, key, "is compressed", "unpack it, and name the file that it holds")
 
 
-def _read_parquet(path: Path, key: str, raw: bytes, written: Written) -> Sheet:
+def _read_parquet(path: Path, key: str, raw: bytes, given: Preparation) -> Sheet:
     """The columns of a parquet file, its index among them."""
     frame = _loaded(path, key, "a parquet file", lambda pandas: _frame(pandas, path, key, raw))
     names = [str(name) for name in frame]
     rows = zip(*(written_out(frame[name].to_numpy()) for name in frame), strict=True)
     body = [(line, list(row)) for line, row in enumerate(rows, start=1)]
-    return sheet_of(path, key, (1, ", ".join(names)), names, body, replace(written, decimal="."))
+    return sheet_of(path, key, (1, ", ".join(names)), names, body, replace(given, decimal="."))
 
 
-def _read_workbook(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+def _read_workbook(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
     """The table in a sheet of a workbook, the first unless one is named; lines are its rows."""
     how = {"header": None, "sheet_name": None, "dtype": object}
     frames = _loaded(path, key, "a workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), **how))
@@ -143,7 +137,7 @@ def _read_workbook(path: Path, key: str, raw: bytes, named: str, written: Writte
         raise unreadable(path, key, "has no such sheet", f"the sheets are {', '.join(frames)}")
     first, *others = frames
     rows = map(written_out, frames[named or first].to_numpy(dtype=object))
-    stated = replace(written, separator="\t", decimal=".")
+    stated = replace(given, separator="\t", decimal=".")
     try:
         sheet = read_text(path, key, "\n".join(map("\t".join, rows)), stated)
     except DataError as error:

@@ -25,7 +25,8 @@ from inputdesign_cli.records.cells import (
     is_unit,
     is_value,
 )
-from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.sheet import Sheet, unreadable
 
 Rows = list[tuple[int, list[str]]]
 BLANK, COMMENT, COMMENTED = "blank", "a comment", "commented numbers"
@@ -81,21 +82,21 @@ def decoded(path: Path, key: str, raw: bytes) -> str:
     raise unreadable(path, key, what, "take the line out, or save the file as UTF-8", line)
 
 
-def read_text(path: Path, key: str, text: str, written: Written) -> Sheet:
+def read_text(path: Path, key: str, text: str, given: Preparation) -> Sheet:
     """Return the table in a text file.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
     said = {"tab": "\t", "\\t": "\t", "blank": None, " ": None}
-    separator = said.get(written.separator, written.separator) if written.separator else _separator_of(text)
+    separator = said.get(given.separator, given.separator) if given.separator else _separator_of(text)
     rows, passed, comment = _rows_of(path, key, text, separator)
     filled = [i for i, (_, row) in enumerate(rows) if any(map(str.strip, row))]
     rows = rows[filled[0] : filled[-1] + 1] if filled else []
     head, names, body = _headed(rows[_table_begins(rows) :], comment, separator)
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
-    sheet = sheet_of(path, key, head, names, body, written, separator)
+    sheet = sheet_of(path, key, head, names, body, given, separator)
     # Blank lines between most rows mean nothing.
     between = [(line, kind) for line, kind in passed if body[0][0] < line < body[-1][0]]
     spaced = 2 * sum(kind == BLANK for _, kind in between) > len(body)
@@ -108,7 +109,7 @@ def sheet_of(
     head: tuple[int, str],
     names: Sequence[str],
     body: Rows,
-    written: Written,
+    given: Preparation,
     separator: str | None = "\t",
 ) -> Sheet:
     """Return the sheet with these rows of cells.
@@ -122,8 +123,8 @@ def sheet_of(
     cells = [[row[i] if i < len(row) else "" for _, row in body] for i in range(width)]
     every = [cell for column in cells for cell in column if cell.strip()]
     decimal, stated = (
-        written.decimal or decimal_of(every, between_commas=separator == ","),
-        bool(written.decimal),
+        given.decimal or decimal_of(every, between_commas=separator == ","),
+        bool(given.decimal),
     )
     columns = tuple(column_of(column, decimal, stated=stated) for column in cells)
     # Messages may show what is a table of numbers, and no secret.
@@ -138,7 +139,7 @@ def sheet_of(
     if long is not None:
         message = f"line {body[long][0]} has {len(body[long][1])} fields, and the header {width}"
         raise sheet.error("data-extra-field", message, _EXTRA, long)
-    return in_stated_form(sheet, cells, written)
+    return in_stated_form(sheet, cells, given)
 
 
 def _separator_of(text: str) -> str | None:
