@@ -336,7 +336,7 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
 
 
 def _role(name: str) -> str:
-    """Return `u`, `y` or `r` (a reference) where the words of a name agree, as in `FIC101.OP`; else nothing."""
+    """Return `u`, `y` or `r` (a reference) where the words of a name agree, as in `FIC101.OP`."""
     words = re.split(r"[\W_\d]+", name_and_unit(name)[0].lower())
     found = {_ROLES[word] for word in words if word in _ROLES}
     return found.pop() if len(found) == 1 else ""

@@ -23,11 +23,6 @@ _MOST_BYTES = 100 * 2**20
 PARQUET = (".parquet", ".pq")
 EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
 _OF_VARIABLES = (".mat", ".npz")
-_ZIP, _OLE, _ARRAY = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x93NUMPY"
-# How compressed files begin: gzip, bzip2, xz, zstd and 7z.
-_COMPRESSED = (b"\x1f\x8b", b"BZh", b"\xfd7zXZ\x00", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf\x27\x1c")
-# What the workbooks of Excel have inside, and those of ODF.
-_WORKBOOK = ("[Content_Types].xml", "xl/", "content.xml")
 
 
 def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = None) -> Sheet:
@@ -53,12 +48,12 @@ def _read(path: Path, key: str, given: Preparation) -> Sheet:
         raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
     if kind == ".npz":  # an archive itself
         return read_npz(path, key, raw, named, given)
-    _check_unpacked(path, key, raw, workbook=kind in EXCEL)
     if kind == ".mat":
         return read_mat(path, key, raw, named, given)
     if kind in PARQUET:
         return _read_parquet(path, key, raw, given)
     if kind in EXCEL:
+        _check_unpacked(path, key, raw)
         return _read_workbook(path, key, raw, named, given)
     return read_text(path, key, decoded(path, key, raw), given)
 
@@ -81,43 +76,15 @@ def _bytes(path: Path, key: str) -> bytes:
         raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file") from None
 
 
-def _check_unpacked(path: Path, key: str, raw: bytes, *, workbook: bool) -> None:
-    """Raise `DataError` (`data-unreadable`) for compressed files, and for endings of another kind."""
-    if raw.startswith(_COMPRESSED) and (raw[:3] != b"BZh" or raw[3:4].isdigit()):
-        raise _compressed(path, key)
-    if raw.startswith(_ARRAY):
-        raise unreadable(
-            path, key, "holds an array of NumPy without names", "write numpy.savez('data.npz', u=.., y=..)"
-        )
-    if raw.startswith(_ZIP):
-        names, size = _contents(raw)
-        if size > MOST_UNPACKED:
-            raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
-        if names and all(name.endswith(".npy") for name in names):
-            raise unreadable(
-                path, key, "holds arrays of NumPy under another ending", "give it the ending .npz"
-            )
-        if names and not any(name.startswith(_WORKBOOK) for name in names):
-            raise _compressed(path, key)
-        if not names and not workbook:
-            hint = "write or copy it anew, and unpack it where it is an archive"
-            raise unreadable(path, key, "is a damaged zip archive or workbook", hint)
-    if raw.startswith((_ZIP, _OLE)) and not workbook:
-        hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
-        raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
-
-
-def _contents(raw: bytes) -> tuple[list[str], int]:
-    """The names in an archive and the bytes that it unpacks to; nothing where it cannot be read."""
+def _check_unpacked(path: Path, key: str, raw: bytes) -> None:
+    """Raise `DataError` (`data-unreadable`) for a workbook that unpacks to too much."""
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            return archive.namelist(), sum(entry.file_size for entry in archive.infolist())
+            size = sum(entry.file_size for entry in archive.infolist())
     except Exception:  # a broken archive makes its reader raise anything
-        return [], 0
-
-
-def _compressed(path: Path, key: str) -> DataError:
-    return unreadable(path, key, "is compressed", "unpack it, and name the file that it holds")
+        return
+    if size > MOST_UNPACKED:
+        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
 
 
 def _read_parquet(path: Path, key: str, raw: bytes, given: Preparation) -> Sheet:

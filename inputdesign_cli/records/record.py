@@ -274,7 +274,9 @@ def _recorded(signals: Signals, step: float, segments: Sequence[Segment], r: int
     times = np.concatenate([part.time for part in segments])
     at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
     values = np.column_stack([signals.u[:, :r], signals.y])[at]
-    held = np.concatenate([part.held for part in segments])
+    y, begins = values[:, r:], np.cumsum([0, *(len(part.time) for part in segments)])[:-1]
+    held = np.concatenate([np.zeros_like(y[:1], dtype=bool), y[1:] == y[:-1]])
+    held[begins] = False
     return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
 
 

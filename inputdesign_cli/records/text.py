@@ -37,6 +37,8 @@ _MARKS = (
 )
 # Asked of charset-normalizer where a text is neither UTF-8 nor, by its bytes, Windows-1252.
 _OTHERS = ["utf_16_le", "utf_16_be", "cp932", "gb18030", "big5", "euc_kr", "euc_jp", "cp1251"]
+# How archives, workbooks and arrays begin.
+_BINARY = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x93NUMPY")
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1b\ufffd]")
 # Fewer bytes that are no ASCII are faults of a logger.
 _HIGH, _FEW = bytes(range(128, 256)), 3
@@ -74,8 +76,8 @@ def decoded(path: Path, key: str, raw: bytes) -> str:
     first = _CONTROL.search(text)
     if first is None:
         return text
-    if len(_CONTROL.findall(text)) > max(_FEW, 0.01 * len(text)):
-        hint = "name a CSV file; arrays have the ending .mat or .npz, tables .xlsx or .parquet"
+    if raw.startswith(_BINARY) or len(_CONTROL.findall(text)) > max(_FEW, 0.01 * len(text)):
+        hint = "unpack it, or save it as CSV; arrays have the ending .mat or .npz, tables .xlsx or .parquet"
         raise unreadable(path, key, "is no text", hint)
     line = len(f"{text[: first.start()]}|".splitlines())
     what = f"is no clean text: line {line} has a character that no text has (code {ord(first[0])})"
