@@ -35,7 +35,7 @@ OPENED = {
     "sweeps/point.py": (1, "a temporary folder of its own"),
 }
 # Functions of ours with one of these names read by `read_regular`.
-OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.tasks.build.files.text"}
+OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.records.text"}
 
 
 def opened(path: Path) -> int:

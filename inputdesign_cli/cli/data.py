@@ -246,7 +246,7 @@ def preparation(
         typer.BadParameter: One of them cannot be read.
     """
     from inputdesign_cli.records import DETRENDS, Preparation
-    from inputdesign_cli.records.naming import TIME_UNITS
+    from inputdesign_cli.records.columns import TIME_UNITS
 
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise typer.BadParameter("it is a positive number", param_hint="--sample-time")

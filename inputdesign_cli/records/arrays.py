@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.records.cells import is_number, written_out
-from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.sheet import Sheet, unreadable
 from inputdesign_cli.records.text import sheet_of
 
 MOST_UNPACKED = 2**30
@@ -33,7 +34,7 @@ _PLAIN, _ARRAY, _COMPRESSED = {*range(1, 8), 9, 12, 13, 16, 17, 18}, 14, 15
 _DEEPEST = 30
 
 
-def read_npz(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+def read_npz(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
     """Return the arrays of an .npz file by their names, or only the one that is `named`.
 
     Raises:
@@ -53,10 +54,10 @@ def read_npz(path: Path, key: str, raw: bytes, named: str, written: Written) -> 
         raise unreadable(path, key, "is no .npz file of numbers", _NUMPY) from None
     if large:
         raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
-    return _sheet(path, key, arrays, named, written, _NUMPY)
+    return _sheet(path, key, arrays, named, given, _NUMPY)
 
 
-def read_mat(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+def read_mat(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
     """Return the arrays of a .mat file, or the signals of an iddata that was saved as a struct.
 
     Raises:
@@ -78,7 +79,7 @@ def read_mat(path: Path, key: str, raw: bytes, named: str, written: Written) -> 
     except Exception:  # a broken file makes its reader raise anything
         raise unreadable(path, key, "is no .mat file that can be read", "save it in MATLAB anew") from None
     return _sheet(
-        path, key, {name: x for name, x in found.items() if name[:2] != "__"}, named, written, _MATLAB
+        path, key, {name: x for name, x in found.items() if name[:2] != "__"}, named, given, _MATLAB
     )
 
 
@@ -106,7 +107,9 @@ def _check_elements(data: bytes, order: str, most: int, depth: int = 0) -> int:
     return most
 
 
-def _sheet(path: Path, key: str, values: Mapping[str, Any], named: str, written: Written, hint: str) -> Sheet:
+def _sheet(
+    path: Path, key: str, values: Mapping[str, Any], named: str, given: Preparation, hint: str
+) -> Sheet:
     """The columns in named values, or in the one that is `named`; fields of structs have their own names."""
     if named and named not in values:
         raise unreadable(path, key, "has no such variable", f"it holds {', '.join(values)}")
@@ -149,7 +152,7 @@ def _sheet(path: Path, key: str, values: Mapping[str, Any], named: str, written:
         more = "keep the signals of one experiment in a file, all of one length, a sample in each row"
         raise unreadable(path, key, f"holds arrays of different lengths ({shapes})", more)
     rows = [(line, list(row)) for line, row in enumerate(zip(*columns, strict=True), start=1)]
-    sheet = sheet_of(path, key, (1, ", ".join(names)), names, rows, replace(written, decimal="."))
+    sheet = sheet_of(path, key, (1, ", ".join(names)), names, rows, replace(given, decimal="."))
     step, unit = steps[0] if steps else None, units[0] if units else None
     return replace(sheet, texts=(), sample_time=step, time_unit=unit)
 

@@ -10,9 +10,10 @@ from numbers import Real
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.records.columns import is_called_time, named_columns
 from inputdesign_cli.records.moments import is_moment, moments_column
-from inputdesign_cli.records.naming import is_called_time, named_columns
-from inputdesign_cli.records.sheet import Column, Sheet, Written
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.sheet import Column, Sheet
 
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
 # What sheets write in place of a number that they do not have.
@@ -124,25 +125,26 @@ def _like_thousands(texts: Sequence[str]) -> bool:
     return hundreds and any("." in text for text in there) and all(map(_WHOLE.fullmatch, there))
 
 
-def in_stated_form(sheet: Sheet, cells: Sequence[Sequence[str]], written: Written) -> Sheet:
+def in_stated_form(sheet: Sheet, cells: Sequence[Sequence[str]], given: Preparation) -> Sheet:
     """Return the sheet with times read in the form that the user states: of the named column, or of any.
 
     Raises:
         DataError: `data-not-a-number`, no column holds times in this form.
     """
-    if written.time_format is None:
+    if given.time_format is None:
         return sheet
-    named = named_columns(sheet, written.time.strip().lower()) if written.time else []
+    own = given.columns.get("time", "").strip().lower()
+    named = named_columns(sheet, own) if own else []
     columns, read = list(sheet.columns), False
     for i, column in enumerate(columns):
         likely = column.fault is not None or column.dated or is_called_time(sheet.name_of(i))
         if i in named or (likely and not named):
             texts = ["" if is_missing(cell) else cell.strip().removesuffix(".0") for cell in cells[i]]
-            found = moments_column(texts, written.time_format)
+            found = moments_column(texts, given.time_format)
             if found is not None and found.dated:
                 columns[i], read = found, True
     if not read:
-        message = f"no column of {sheet.path.name} holds times in the form {written.time_format}"
+        message = f"no column of {sheet.path.name} holds times in the form {given.time_format}"
         hint = "mind its marks and digits, name the column (--columns time=NAME), or leave --time-format out"
         raise sheet.error("data-not-a-number", message, hint, 0)
     return replace(sheet, columns=tuple(columns))

@@ -11,8 +11,8 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.record_columns import name_and_unit
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.records.naming import named_columns, roles_of, time_columns
 from inputdesign_cli.records.sheet import Column, Sheet
+from inputdesign_cli.specification.models.units import SECONDS
 
 NO_TIMES = "none"
 _CHANNELS = {
@@ -21,6 +21,101 @@ _CHANNELS = {
 }
 # What separates entries of the option, or quotes it.
 _SEPARATORS = frozenset(',="')
+TIME_UNITS = tuple(SECONDS)
+_UNITS = {
+    **{unit: unit for unit in TIME_UNITS},
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("mins", "minute", "minutes"), "min"),
+    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
+    **dict.fromkeys(("day", "days"), "d"),
+}
+_TIME = re.compile(
+    r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
+)
+# What clocks are called too, where nothing is called as times are; other things may be, so its numbers rise.
+_CLOCK = re.compile(
+    r"(uhrzeit|zeitpunkt|messzeit|datum|date|clock|hora|fecha|marca[ _]de[ _]tiempo)(?![^\W_]).*"
+)
+# The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
+_SHORT = re.compile(
+    r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
+)
+_MOSTLY = 0.9
+# Words that say, or make it likely, that a column holds the input, the output or the reference. They are
+# proposed, and never taken unasked.
+_WORDS = {
+    "u": "u input op mv co out heater heating valve pump fan motor actuator duty command cmd drive steam",
+    "y": "y output pv meas measured cv temperature temp level flow pressure speed position sensor response",
+    "r": "sp setpoint ref reference w",
+}
+_ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
+
+
+def named_columns(sheet: Sheet, start: str) -> list[int]:
+    """Return where columns of this name are, else of this beginning (u1 is not u10), else of this number."""
+    header = sheet.header
+    exact = [i for i, name in enumerate(header) if name == start]
+    begun = exact or [
+        i
+        for i, name in enumerate(header)
+        if name.startswith(start) and not (start[-1:].isdigit() and name[len(start)].isdigit())
+    ]
+    if begun or not start.isdecimal():
+        return begun
+    return [int(start) - 1] if 1 <= int(start) <= len(sheet.columns) else []
+
+
+def time_columns(sheet: Sheet) -> list[str]:
+    """Return the names, in small letters, of columns of times; the number of one without a name.
+
+    If no name is one of times, columns that are called as clocks are and rise, or hold dates or times of day.
+    At last columns whose dates cannot be read: to do without them would be to guess.
+    """
+    header = sheet.header
+    called = [
+        (header[i] if i < len(header) and header[i] else str(i + 1), column)
+        for i, column in enumerate(sheet.columns)
+    ]
+    found = [
+        name
+        for name, column in called
+        if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly(column.numbers, rises=True))
+    ]
+    if found:
+        return found
+    clocks = [
+        (name, column)
+        for name, column in called
+        if _mostly(column.numbers, rises=not column.dated) and (column.dated or _CLOCK.fullmatch(name))
+    ] or [(name, column) for name, column in called if column.undated]
+    # Dates and times of day that were joined are the same column.
+    once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
+    dates = [name for name in once if name.startswith("dat")]
+    return dates if dates or (len(once) > 1 and clocks[0][1].fault is None) else once
+
+
+def _mostly(x: Array, *, rises: bool) -> bool:
+    """Whether numbers rise from row to row, or at least change."""
+    steps = np.diff(x[~np.isnan(x)])
+    return bool(np.mean(steps > 0.0 if rises else steps != 0.0) > _MOSTLY) if steps.size else False
+
+
+def is_called_time(name: str) -> bool:
+    """Return whether a name is one of times or of clocks."""
+    return any(pattern.fullmatch(name.lower()) for pattern in (_TIME, _CLOCK, _SHORT))
+
+
+def time_unit_of(name: str) -> str | None:
+    """Return the unit in the name of a column of times: `time_ms`, `Time (sec)`."""
+    words = re.findall(r"[a-z]+", name.lower())
+    return _UNITS.get(words[-1]) if len(words) > 1 else None
+
+
+def plain_time_unit(unit: str | None) -> str | None:
+    """Return our spelling of a unit of time; None if it is none."""
+    return None if unit is None else _UNITS.get(unit.strip().lower())
 
 
 def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
@@ -224,19 +319,27 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
         for i, column in enumerate(sheet.columns)
         if i not in (*taken, *times) and column.fault is None and not np.isnan(column.numbers).all()
     ]
-    roles = roles_of(sheet.names or [""] * len(sheet.columns))
+    roles = [_role(sheet.name_of(i)) if sheet.shown else "" for i in range(len(sheet.columns))]
     found = {"time": called(sheet, times[0])} if times else {}
     found |= {channel: name for channel, name in named.items() if channel[0] in "uyt"}
     left = sorted(set(wanted) - found.keys() - {"time"})
-    for suiting in (lambda letter: (letter,), lambda _: ("",), lambda _: ("", "u", "y", "r")):
-        for channel in left:
-            fit = [i for i in free if sheet.shown and roles[i] in suiting(channel[0])]
-            if fit and channel not in found:
-                found[channel] = called(sheet, fit[0])
-                free.remove(fit[0])
+    for surely in (True, False):
+        for channel in (one for one in left if one not in found):
+            fit = [i for i in free if sheet.shown and (not surely or roles[i] == channel[0])]
+            if fit:
+                best = min(fit, key=lambda i: roles[i] != "" and not surely)
+                found[channel] = called(sheet, best)
+                free.remove(best)
     found |= {channel: "NAME" for channel in left if channel not in found}
     in_order = sorted(found, key=lambda channel: (channel != "time", channel))
     return f'--columns "{",".join(f"{channel}={found[channel]}" for channel in in_order)}"'
+
+
+def _role(name: str) -> str:
+    """Return `u`, `y` or `r` (a reference) where the words of a name agree, as in `FIC101.OP`."""
+    words = re.split(r"[\W_\d]+", name_and_unit(name)[0].lower())
+    found = {_ROLES[word] for word in words if word in _ROLES}
+    return found.pop() if len(found) == 1 else ""
 
 
 def called(sheet: Sheet, at: int) -> str:

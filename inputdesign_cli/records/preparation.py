@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from inputdesign_cli.records.sheet import Written
-
 Detrend = Literal["none", "constant", "linear", "auto"]
 Run = tuple[str, int, int]
 """Rows of a file, the first and the last; no name: of the only file."""
@@ -47,8 +45,3 @@ class Preparation:
     def levels(self) -> Mapping[str, float]:
         """By channel, the levels of the signals: the operating point, if that is what is taken away."""
         return self.operating_point if self.detrend == "none" else {}
-
-    @property
-    def written(self) -> Written:
-        """How the file is written."""
-        return Written(self.separator, self.decimal, self.time_format, self.columns.get("time", ""))

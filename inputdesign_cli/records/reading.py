@@ -14,7 +14,8 @@ from inputdesign_cli.errors import STANDARD_STREAM, DataError
 from inputdesign_cli.records.arrays import MOST_UNPACKED, read_mat, read_npz
 from inputdesign_cli.records.cells import written_out
 from inputdesign_cli.records.moments import with_days
-from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.sheet import Sheet, unreadable
 from inputdesign_cli.records.text import decoded, read_text, sheet_of
 from inputdesign_cli.regular_file import read_regular
 
@@ -22,33 +23,22 @@ _MOST_BYTES = 100 * 2**20
 PARQUET = (".parquet", ".pq")
 EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
 _OF_VARIABLES = (".mat", ".npz")
-_ZIP, _OLE, _ARRAY = b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x93NUMPY"
-# How compressed files begin.
-_COMPRESSED = {
-    b"\x1f\x8b": "gzip",
-    b"BZh": "bzip2",
-    b"\xfd7zXZ\x00": "xz",
-    b"\x28\xb5\x2f\xfd": "zstd",
-    b"7z\xbc\xaf\x27\x1c": "7z",
-}
-# What the workbooks of Excel have inside, and those of ODF.
-_WORKBOOK = ("[Content_Types].xml", "xl/", "content.xml")
 
 
-def read_sheet(path: Path, *, key: str = "", written: Written | None = None) -> Sheet:
+def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = None) -> Sheet:
     """Return the columns of a data file, times of a day with their days.
 
     Args:
         key: the key of the spec that names the file, for diagnostics.
-        written: how it is written, where the user says so.
+        preparation: separator, decimal mark and form of times, where the user says so.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    return with_days(_read(path, key, written or Written()))
+    return with_days(_read(path, key, preparation or Preparation()))
 
 
-def _read(path: Path, key: str, written: Written) -> Sheet:
+def _read(path: Path, key: str, given: Preparation) -> Sheet:
     file, _, named = path.name.partition("#")
     kind = Path(file).suffix.lower()
     if kind not in (*EXCEL, *_OF_VARIABLES):  # only their sheets and variables have names
@@ -57,15 +47,15 @@ def _read(path: Path, key: str, written: Written) -> Sheet:
     if len(raw) > _MOST_BYTES:
         raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
     if kind == ".npz":  # an archive itself
-        return read_npz(path, key, raw, named, written)
-    _check_unpacked(path, key, raw, workbook=kind in EXCEL)
+        return read_npz(path, key, raw, named, given)
     if kind == ".mat":
-        return read_mat(path, key, raw, named, written)
+        return read_mat(path, key, raw, named, given)
     if kind in PARQUET:
-        return _read_parquet(path, key, raw, written)
+        return _read_parquet(path, key, raw, given)
     if kind in EXCEL:
-        return _read_workbook(path, key, raw, named, written)
-    return read_text(path, key, decoded(path, key, raw), written)
+        _check_unpacked(path, key, raw)
+        return _read_workbook(path, key, raw, named, given)
+    return read_text(path, key, decoded(path, key, raw), given)
 
 
 def _bytes(path: Path, key: str) -> bytes:
@@ -86,56 +76,27 @@ def _bytes(path: Path, key: str) -> bytes:
         raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file") from None
 
 
-def _check_unpacked(path: Path, key: str, raw: bytes, *, workbook: bool) -> None:
-    """Raise `DataError` (`data-unreadable`) for compressed files, and for endings of another kind."""
-    for mark, kind in _COMPRESSED.items():
-        if raw.startswith(mark) and not (mark == b"BZh" and not raw[3:4].isdigit()):
-            raise _compressed(path, key, kind)
-    if raw.startswith(_ARRAY):
-        raise unreadable(
-            path, key, "holds an array of NumPy without names", "write numpy.savez('data.npz', u=.., y=..)"
-        )
-    if raw.startswith(_ZIP):
-        names, size = _contents(raw)
-        if size > MOST_UNPACKED:
-            raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
-        if names and all(name.endswith(".npy") for name in names):
-            raise unreadable(
-                path, key, "holds arrays of NumPy under another ending", "give it the ending .npz"
-            )
-        if names and not any(name.startswith(_WORKBOOK) for name in names):
-            raise _compressed(path, key, "zip")
-        if not names and not workbook:
-            hint = "write or copy it anew, and unpack it where it is an archive"
-            raise unreadable(path, key, "is a damaged zip archive or workbook", hint)
-    if raw.startswith((_ZIP, _OLE)) and not workbook:
-        hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
-        raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
-
-
-def _contents(raw: bytes) -> tuple[list[str], int]:
-    """The names in an archive and the bytes that it unpacks to; nothing where it cannot be read."""
+def _check_unpacked(path: Path, key: str, raw: bytes) -> None:
+    """Raise `DataError` (`data-unreadable`) for a workbook that unpacks to too much."""
     try:
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            return archive.namelist(), sum(entry.file_size for entry in archive.infolist())
+            size = sum(entry.file_size for entry in archive.infolist())
     except Exception:  # a broken archive makes its reader raise anything
-        return [], 0
+        return
+    if size > MOST_UNPACKED:
+        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
 
 
-def _compressed(path: Path, key: str, kind: str) -> DataError:
-    return unreadable(path, key, f"is compressed ({kind})", "unpack it, and name the file that it holds")
-
-
-def _read_parquet(path: Path, key: str, raw: bytes, written: Written) -> Sheet:
+def _read_parquet(path: Path, key: str, raw: bytes, given: Preparation) -> Sheet:
     """The columns of a parquet file, its index among them."""
     frame = _loaded(path, key, "a parquet file", lambda pandas: _frame(pandas, path, key, raw))
     names = [str(name) for name in frame]
     rows = zip(*(written_out(frame[name].to_numpy()) for name in frame), strict=True)
     body = [(line, list(row)) for line, row in enumerate(rows, start=1)]
-    return sheet_of(path, key, (1, ", ".join(names)), names, body, replace(written, decimal="."))
+    return sheet_of(path, key, (1, ", ".join(names)), names, body, replace(given, decimal="."))
 
 
-def _read_workbook(path: Path, key: str, raw: bytes, named: str, written: Written) -> Sheet:
+def _read_workbook(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
     """The table in a sheet of a workbook, the first unless one is named; lines are its rows."""
     how = {"header": None, "sheet_name": None, "dtype": object}
     frames = _loaded(path, key, "a workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), **how))
@@ -143,7 +104,7 @@ def _read_workbook(path: Path, key: str, raw: bytes, named: str, written: Writte
         raise unreadable(path, key, "has no such sheet", f"the sheets are {', '.join(frames)}")
     first, *others = frames
     rows = map(written_out, frames[named or first].to_numpy(dtype=object))
-    stated = replace(written, separator="\t", decimal=".")
+    stated = replace(given, separator="\t", decimal=".")
     try:
         sheet = read_text(path, key, "\n".join(map("\t".join, rows)), stated)
     except DataError as error:

@@ -145,7 +145,7 @@ def read_log(path: Path, preparation: Preparation) -> Record:
     Raises:
         DataError: the file cannot be read, or does not show its inputs and outputs.
     """
-    sheet = read_sheet(path, written=preparation.written)
+    sheet = read_sheet(path, preparation=preparation)
     columns = with_headers(sheet, with_channels(sheet, preparation.columns))
     inputs, outputs = (count_of(letter, sheet, columns) for letter in "uy")
     references = reference_columns(inputs, sheet, columns, clean=True)
@@ -201,7 +201,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
 
 def _read(path: Path, units: Units, preparation: Preparation) -> Record:
     """Read one file for a plant."""
-    sheet = read_sheet(path, written=preparation.written)
+    sheet = read_sheet(path, preparation=preparation)
     columns = with_names_of(units, sheet, with_headers(sheet, preparation.columns))
     given = replace(preparation, columns=columns)
     references = reference_columns(units.inputs, sheet, columns, clean=False) if units.closed_loop else {}
@@ -274,7 +274,9 @@ def _recorded(signals: Signals, step: float, segments: Sequence[Segment], r: int
     times = np.concatenate([part.time for part in segments])
     at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
     values = np.column_stack([signals.u[:, :r], signals.y])[at]
-    held = np.concatenate([part.held for part in segments])
+    y, begins = values[:, r:], np.cumsum([0, *(len(part.time) for part in segments)])[:-1]
+    held = np.concatenate([np.zeros_like(y[:1], dtype=bool), y[1:] == y[:-1]])
+    held[begins] = False
     return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
 
 

@@ -36,21 +36,13 @@ class Segment:
     """A stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p).
 
     Attributes:
-        held: (n, p), whether an output was recorded as it was a sample before.
         lined: whether a line was taken away from an output.
     """
 
     time: Array
     u: Array
     y: Array
-    held: NDArray[np.bool_]
     lined: bool = False
-
-    @classmethod
-    def recorded(cls, time: Array, u: Array, y: Array) -> Segment:
-        """Return a segment from which nothing was taken away."""
-        held = np.concatenate([np.zeros((1, y.shape[1]), dtype=bool), y[1:] == y[:-1]])
-        return cls(time, u, y, held[: len(y)])
 
 
 def joined_rows(signals: Signals, *, resample: bool) -> Signals:
@@ -193,10 +185,7 @@ def _whole_segments(
         lines[signals.without],
         lines[short],
     )
-    return [Segment.recorded(time[part], signals.u[part], signals.y[part]) for part in longer], [
-        *passed,
-        *found,
-    ]
+    return [Segment(time[part], signals.u[part], signals.y[part]) for part in longer], [*passed, *found]
 
 
 def _passed_over(signals: Signals) -> tuple[NDArray[np.bool_], list[Finding]]:
@@ -219,7 +208,7 @@ def _resampled(part: Segment, step: float) -> Segment:
     """The segment at even times: outputs linearly between samples, inputs, which are held, at the nearest."""
     even, nearest = _even_instants(part, step)
     y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
-    return Segment.recorded(even, part.u[nearest], y)
+    return Segment(even, part.u[nearest], y)
 
 
 def _moves_between(part: Segment, step: float) -> int:
@@ -252,7 +241,7 @@ def _detrended(part: Segment, signals: Signals, preparation: Preparation) -> tup
             found.append(trend_removed(name, away, line=line))
             columns.append(x - away)
         taken[letter] = np.column_stack(columns)
-    return Segment(part.time, taken["u"], taken["y"], part.held, lined), found
+    return Segment(part.time, taken["u"], taken["y"], lined), found
 
 
 def trend(x: Array, kind: Detrend) -> tuple[Array, bool]:

@@ -19,16 +19,6 @@ _PLAIN = (
 
 
 @dataclass(frozen=True)
-class Written:
-    """How a file is written, as the user says: separator, decimal mark, form of times in column `time`."""
-
-    separator: str | None = None
-    decimal: str | None = None
-    time_format: str | None = None
-    time: str = ""
-
-
-@dataclass(frozen=True)
 class Column:
     """Numbers (n,), NaN where a cell is empty.
 

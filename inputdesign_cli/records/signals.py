@@ -16,15 +16,17 @@ from inputdesign_cli.findings.outlying_values import beyond_precision
 from inputdesign_cli.findings.record_columns import sheets_unread
 from inputdesign_cli.findings.record_times import TIMES_READ
 from inputdesign_cli.records.columns import (
+    TIME_UNITS,
     called,
     channel_columns,
     column_named,
     columns_of,
+    plain_time_unit,
     rising,
     time_column,
+    time_unit_of,
 )
 from inputdesign_cli.records.moments import SAY, are_clock_digits, are_digits
-from inputdesign_cli.records.naming import TIME_UNITS, plain_time_unit, time_unit_of
 from inputdesign_cli.records.preparation import Preparation, Run
 from inputdesign_cli.records.sheet import Sheet
 

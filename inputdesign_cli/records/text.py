@@ -25,7 +25,8 @@ from inputdesign_cli.records.cells import (
     is_unit,
     is_value,
 )
-from inputdesign_cli.records.sheet import Sheet, Written, unreadable
+from inputdesign_cli.records.preparation import Preparation
+from inputdesign_cli.records.sheet import Sheet, unreadable
 
 Rows = list[tuple[int, list[str]]]
 BLANK, COMMENT, COMMENTED = "blank", "a comment", "commented numbers"
@@ -36,6 +37,8 @@ _MARKS = (
 )
 # Asked of charset-normalizer where a text is neither UTF-8 nor, by its bytes, Windows-1252.
 _OTHERS = ["utf_16_le", "utf_16_be", "cp932", "gb18030", "big5", "euc_kr", "euc_jp", "cp1251"]
+# How archives, workbooks and arrays begin.
+_BINARY = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x93NUMPY")
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1b\ufffd]")
 # Fewer bytes that are no ASCII are faults of a logger.
 _HIGH, _FEW = bytes(range(128, 256)), 3
@@ -73,29 +76,29 @@ def decoded(path: Path, key: str, raw: bytes) -> str:
     first = _CONTROL.search(text)
     if first is None:
         return text
-    if len(_CONTROL.findall(text)) > max(_FEW, 0.01 * len(text)):
-        hint = "name a CSV file; arrays have the ending .mat or .npz, tables .xlsx or .parquet"
+    if raw.startswith(_BINARY) or len(_CONTROL.findall(text)) > max(_FEW, 0.01 * len(text)):
+        hint = "unpack it, or save it as CSV; arrays have the ending .mat or .npz, tables .xlsx or .parquet"
         raise unreadable(path, key, "is no text", hint)
     line = len(f"{text[: first.start()]}|".splitlines())
     what = f"is no clean text: line {line} has a character that no text has (code {ord(first[0])})"
     raise unreadable(path, key, what, "take the line out, or save the file as UTF-8", line)
 
 
-def read_text(path: Path, key: str, text: str, written: Written) -> Sheet:
+def read_text(path: Path, key: str, text: str, given: Preparation) -> Sheet:
     """Return the table in a text file.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
     said = {"tab": "\t", "\\t": "\t", "blank": None, " ": None}
-    separator = said.get(written.separator, written.separator) if written.separator else _separator_of(text)
+    separator = said.get(given.separator, given.separator) if given.separator else _separator_of(text)
     rows, passed, comment = _rows_of(path, key, text, separator)
     filled = [i for i, (_, row) in enumerate(rows) if any(map(str.strip, row))]
     rows = rows[filled[0] : filled[-1] + 1] if filled else []
     head, names, body = _headed(rows[_table_begins(rows) :], comment, separator)
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
-    sheet = sheet_of(path, key, head, names, body, written, separator)
+    sheet = sheet_of(path, key, head, names, body, given, separator)
     # Blank lines between most rows mean nothing.
     between = [(line, kind) for line, kind in passed if body[0][0] < line < body[-1][0]]
     spaced = 2 * sum(kind == BLANK for _, kind in between) > len(body)
@@ -108,7 +111,7 @@ def sheet_of(
     head: tuple[int, str],
     names: Sequence[str],
     body: Rows,
-    written: Written,
+    given: Preparation,
     separator: str | None = "\t",
 ) -> Sheet:
     """Return the sheet with these rows of cells.
@@ -122,8 +125,8 @@ def sheet_of(
     cells = [[row[i] if i < len(row) else "" for _, row in body] for i in range(width)]
     every = [cell for column in cells for cell in column if cell.strip()]
     decimal, stated = (
-        written.decimal or decimal_of(every, between_commas=separator == ","),
-        bool(written.decimal),
+        given.decimal or decimal_of(every, between_commas=separator == ","),
+        bool(given.decimal),
     )
     columns = tuple(column_of(column, decimal, stated=stated) for column in cells)
     # Messages may show what is a table of numbers, and no secret.
@@ -138,7 +141,7 @@ def sheet_of(
     if long is not None:
         message = f"line {body[long][0]} has {len(body[long][1])} fields, and the header {width}"
         raise sheet.error("data-extra-field", message, _EXTRA, long)
-    return in_stated_form(sheet, cells, written)
+    return in_stated_form(sheet, cells, given)
 
 
 def _separator_of(text: str) -> str | None:

@@ -219,8 +219,7 @@ def _at_rest(path: Path, step: float) -> tuple[float, float, str]:
 def _seconds_apart(path: Path) -> float | None:
     """The time between the rows of a file, where a column tells it."""
     from inputdesign_cli.records import read_sheet
-    from inputdesign_cli.records.columns import column_named, columns_of
-    from inputdesign_cli.records.naming import time_columns
+    from inputdesign_cli.records.columns import column_named, columns_of, time_columns
     from inputdesign_cli.records.signals import time_unit_in
 
     sheet = read_sheet(path, key="noise")

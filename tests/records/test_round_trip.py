@@ -193,5 +193,5 @@ def test_numbers_are_exact(values, mark, decimal, form, tmp_path):
     body = "\n".join(f"{cell.replace('.', decimal)}{mark}1" for cell in cells)
     (tmp_path / "log.csv").write_text(f"u{mark}y\n{body}\n")
     prepared = Preparation(separator={"\t": "tab"}.get(mark, mark), decimal=decimal)
-    found = read_sheet(tmp_path / "log.csv", written=prepared.written)
+    found = read_sheet(tmp_path / "log.csv", preparation=prepared)
     np.testing.assert_array_equal(found.columns[0].numbers, values)

@@ -117,8 +117,9 @@ def test_a_column_that_only_begins_like_a_time_is_none(estimated):
     ("content", "said"),
     [
         (b"0.1,0.2\n0.3,0.4\n", "it has no header.*--columns"),
-        (b"PK\x03\x04\x00\x00\xff", "is a damaged zip archive or workbook"),
-        (b"\xd0\xcf\x11\xe0\xff", "is a spreadsheet.*save the sheet as CSV"),
+        (b"PK\x03\x04\x00\x00\xff", "save it as CSV"),
+        (b"\xd0\xcf\x11\xe0\xff", "save it as CSV"),
+        (b"\x1f\x8b\x08", "unpack it"),
     ],
 )
 def test_what_is_no_table_is_told_with_what_to_do(content, said, tmp_path):

@@ -201,7 +201,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     """
     started = time.perf_counter()
     counts = {"u": header.units.inputs, "y": header.units.outputs}
-    sheet = read_sheet(paths[0], written=preparation.written)
+    sheet = read_sheet(paths[0], preparation=preparation)
     own = {
         name: column
         for name, column in with_channels(sheet, preparation.columns).items()
