@@ -24,7 +24,7 @@ RECORD_UNDETERMINED = FindingKind(
     "record-undetermined",
     Severity.DOUBT,
     "the record does not determine all parameters",
-    "To working precision the samples do not tell all parameters apart. Their accuracy cannot be computed.",
+    "To working precision the samples do not determine all parameters. Their accuracy cannot be computed.",
     "Take more samples (`signal.samples`), or a model of lower order.",
 )
 RECORD_MISSES = FindingKind(
@@ -100,7 +100,7 @@ def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
         return []
     if not np.isfinite(record.worst_ratio):
         message = (
-            "the record does not tell all parameters apart to working precision: its accuracy cannot be "
+            "the record does not determine all parameters to working precision: its accuracy cannot be "
             "computed; take more samples (signal.samples), or a model of lower order"
         )
         return [RECORD_UNDETERMINED.found(message, where="signal.samples")]

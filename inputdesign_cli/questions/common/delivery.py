@@ -82,7 +82,7 @@ class Report:
     def with_record(
         self, request: RecordRequest, shown: Shown, experiment: Experiment, record: Record, signal: Signal
     ) -> Report:
-        """Return the same with a record, its curves and its files."""
+        """Add a record, its curves and its files."""
         units = shown.header.units
         tables, drawn = signal_curves(request, units, experiment, record)
         return Report(
@@ -95,7 +95,7 @@ class Report:
     def foreseeing(
         self, foresight: Foresight | None, record: Array, requirements: Sequence[Requirement]
     ) -> Report:
-        """Return the same with the other minima that data of this record (n, r) would leave."""
+        """Add the other minima that data of this record (n, r) would leave."""
         if foresight is None:
             return self
         found = foresight.foreseen(record, requirements, self.outcome)

@@ -71,8 +71,8 @@ def tried_input(
         within_r_u_limits=within.within_r_u_limits,
         mean_estimate=_named(trials, trials.theta.mean(axis=0)),
         cost=weighted_sum(cost, trials.power),
-        power=_powers(trials.power),
-        total_power=_powers(trials.total_power),
+        power=Powers.of(trials.power),
+        total_power=Powers.of(trials.total_power),
         not_converged=int(np.sum(~trials.converged)),
     )
     if modelled is not None:
@@ -104,10 +104,6 @@ def tried_input(
 
 def _named(trials: Trials, values: Array) -> dict[str, float]:
     return dict(zip(trials.names, values.tolist(), strict=True))
-
-
-def _powers(found: Mapping[PowerKind, list[float]]) -> Powers:
-    return Powers(**{kind: tuple(values) for kind, values in found.items()})
 
 
 def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesignModel:

@@ -210,7 +210,7 @@ def powers_by_kind(
 
 def powers(problem: Problem, basis: Basis, x: Array) -> Powers:
     """Return the same at the plant of the spec."""
-    return Powers(**{kind: tuple(found) for kind, found in powers_by_kind(problem, basis, x).items()})
+    return Powers.of(powers_by_kind(problem, basis, x))
 
 
 def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:

@@ -119,7 +119,7 @@ def plants_kept(
     Args:
         units: of the spec.
         plants: all beside the plant of the spec.
-        kept: the numbers of those that count.
+        kept: the numbers of the plants that count.
         at_each: what these keep, the plant of the spec first.
         binding: places among them.
         floors: of those that count.
@@ -263,7 +263,7 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnE
     Args:
         done: the design.
         plants: that it is for.
-        binding: places among those that are kept, the plant of the spec being 0.
+        binding: places among the plants that are kept, the plant of the spec being 0.
     """
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
@@ -308,7 +308,7 @@ def fan_curves(
     Args:
         done: the design.
         numbers: what the scenarios are called, in their order; the plant of the spec is 0.
-        active: the places of those that bind, in that order.
+        active: the places of binding plants, in that order.
     """
     problem, units = done.problem, done.units
     bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]

@@ -37,7 +37,7 @@ class Method:
 
     Attributes:
         tolerance: the relative gap that is proved.
-        any_spectrum_tolerance: the same for the bound over every spectrum; None leaves it out.
+        any_spectrum_tolerance: of the bound over every spectrum; None leaves it out.
         reach: how far spectra reach.
         grid: the program of the papers in place of the exchange.
         columns: a factor of few columns, see `FewColumns`.
