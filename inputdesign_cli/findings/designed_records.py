@@ -119,7 +119,6 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
     """Return a finding if a record is longer than was asked for, or dear for want of samples.
 
     Args:
-        record: as it was made.
         asked: its samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
         shares: of each limit on single samples that it takes.
@@ -193,7 +192,6 @@ def other_spectrum(asked: str, kind: str, limits: Sequence[str], power: float | 
 
     Args:
         asked: the kind of signal that was asked for; `kind`: that of the record.
-        kind: see there.
         limits: the keys that the record keeps.
         power: the limit on the input power that gives its spectrum; None if that is the designed one.
         goal: of the design.

@@ -41,13 +41,11 @@ class Informed:
     """What an information matrix says of errors over frequency, and what it is compared with.
 
     Attributes:
-        units: of the spec.
         errors: bounds on the model error; r_u of entries of G, if nothing is `stated`.
         information: M (k, k) in the coordinates of the errors.
         stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
         active: for each error, the frequencies of the experiment at which it binds; empty for none.
         white: M of the baseline; `equal` of white excitation with the means of the design.
-        equal: see there; both None if not compared with.
         record: M of the record to be applied.
         white_labels: what `white` and `equal` are called.
         of_several: whether the design serves other plants, too, which the curves do not show.

@@ -39,7 +39,6 @@ class Shown:
     """How an experiment is reported.
 
     Attributes:
-        header: of the results.
         unstated: errors of the entries of G that have r_u if no requirement bounds it.
         ellipses: pairs of parameters; None for a choice of them.
     """
@@ -126,7 +125,6 @@ def record_findings(
     """Return what a user should know before applying a record.
 
     Args:
-        request: what was asked of it.
         experiment: samples of the experiment.
         record: None if none was made.
         shares: of each limit on single samples that it takes.
@@ -149,8 +147,6 @@ def begun_anywhere(
 
     Args:
         signal: what is said of it so far.
-        experiment: that the record is for.
-        record: (n, r).
         step: time between samples in the unit of the experiment's frequencies.
         requirements: what the errors are measured by.
     """

@@ -42,11 +42,6 @@ def signal_of(
     it compares with the design. Other requirements have their worst ratio.
 
     Args:
-        request: what was asked of the record.
-        units: of the spec.
-        experiment: that the record is for.
-        record: as it was made.
-        requirements: in the coordinates of the experiment.
         designed: information matrix (k, k) of the design.
         spectrum: of the design, for the error of that of the record.
     """

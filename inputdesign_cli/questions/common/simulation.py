@@ -78,7 +78,6 @@ class Simulation:
         truth: None if the design model is the true system.
         renewed: whether each run realises the spectrum anew.
         compare: what else is tried at equal power: signals of a flat spectrum over the band, of these kinds.
-        cost: weights of the powers of an excitation.
         entries: see `ModelQuestion`.
     """
 

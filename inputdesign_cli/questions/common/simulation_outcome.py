@@ -23,7 +23,6 @@ def study_outcome(study: Study, inputs: Mapping[str, TriedInput], *, excitation:
     """Return `simulation` of the outcome.
 
     Args:
-        study: how the runs were made.
         inputs: what each excitation gave.
         excitation: whether each run realises the spectrum anew (`new`), or applies the one `record`.
     """
@@ -53,11 +52,8 @@ def tried_input(
     """Return what one excitation gave on the true system.
 
     Args:
-        units: of the spec.
-        tried: the runs.
         predicted: what is compared with them.
         errors: of the runs, see `Trials.errors`.
-        cost: weights of the powers of an excitation.
         modelled: runs in which the true system is the design model, if it is another one.
     """
     trials, information, r_adm = tried.trials, tried.information, predicted.r_adm

@@ -134,10 +134,7 @@ class GivenAsked:
     Attributes:
         requirements: are checked, not met.
         criterion: its value is computed, not bounded.
-        cost: weights of the powers.
         alpha: of r_u; `calibration` and `simulator` size it anew, see `Confidence`.
-        calibration: see there; None for the alpha as stated.
-        simulator: see there.
         limits: that the excitation is compared with.
         plants: others that the true one might be.
     """

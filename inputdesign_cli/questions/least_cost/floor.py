@@ -62,7 +62,6 @@ def floor_use(
     Args:
         floors: of the plants.
         numbers: what they are called.
-        names: of their parameters.
         thetas: (S, k), these parameters.
     """
     raised = [place for place, one in enumerate(floors) if one.raised]

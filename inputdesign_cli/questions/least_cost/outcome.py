@@ -155,7 +155,6 @@ def accuracy_of(
     """Return the largest ratio of the model error, and each requirement with its own.
 
     Args:
-        units: of the spec.
         confidence: with alpha of r_u.
         requirements: what is asked; criteria have no ratio.
         information: M (k, k) in their coordinates.
