@@ -218,10 +218,10 @@ class ConvexTask:
         if not done.excites:
             return Report(outcome, tables, curves, {})
         informed = self._informed(done)
-        white = (outcome.baseline and outcome.baseline.white) or White()
+        white = White() if outcome.baseline is None else outcome.baseline.white or White()
         if not informed.stated:
             known = _known(done, record, self.record.step, own_length=False)
-        kind = outcome.objective and outcome.objective.kind
+        kind = None if outcome.objective is None else outcome.objective.kind
         informed = replace(
             informed,
             record=known,
@@ -255,11 +255,11 @@ class ConvexTask:
     def _of_record(self, done: Designed, outcome: Outcome, made: Made, known: Array | None) -> Outcome:
         """Return the outcome with what a user should know before applying the record."""
         signal, record = outcome.signal, made.record
-        designed = outcome.model_error and outcome.model_error.confidence
-        findings = confidence_missed(designed, signal and signal.confidence)
+        designed = None if outcome.model_error is None else outcome.model_error.confidence
+        shares, recorded = (None, None) if signal is None else (signal.of_limits, signal.confidence)
+        findings = confidence_missed(designed, recorded)
         findings += made.findings
         limited = any(limit.upper for limit in done.design.problem.limits)
-        shares = signal and signal.of_limits
         findings += record_findings(made.request, done.experiment.samples, record, shares, of_powers=limited)
         if record is not None and known is not None and signal is not None:
             findings += _shortfall(done, record, known)
