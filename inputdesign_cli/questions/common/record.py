@@ -170,7 +170,7 @@ def make_record(
         record = best_record(generator, at, target, bounds, first=first, limiting=together(limiting))
         least = max(record.worst_ratio, MET) if meets else record.worst_ratio
         left = [n for n in range(len(plants)) if n not in numbers]
-        missed = _worst_few({n: _ratio_at(others[n], scores[n], record) for n in left}, least)
+        missed = _worst_few({n: ratio_at(others[n], scores[n], record.samples) for n in left}, least)
         beyond = _worst_few({n: _power_share(others[n], upper, record) for n in left if n not in missed}, MET)
         higher = beyond_peaks(record.samples, [n for n in others if n not in limiting])
         if not (missed or beyond or higher):
@@ -222,10 +222,10 @@ def _binding(design: Design) -> list[int]:
     return [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
 
 
-def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Record) -> float:
-    """The worst ratio of a record at one plant."""
+def ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Array) -> float:
+    """Return the score of a record (n, r) at a plant; infinite if it does not excite every parameter."""
     try:
-        return score(plant.information(record.samples))
+        return score(plant.information(record))
     except np.linalg.LinAlgError:
         return np.inf
 

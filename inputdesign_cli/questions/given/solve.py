@@ -40,6 +40,7 @@ from inputdesign_cli.questions.common.record import (
     as_long,
     given_record,
     least_period,
+    ratio_at,
     worst_ratio,
 )
 from inputdesign_cli.questions.common.robust import Plants
@@ -348,17 +349,8 @@ class GivenTask:
             return None
         rng = np.random.default_rng(request.settings.seed)
         record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)
-        return Record(record, "multisine", _ratio_of(request, experiment, record, ratio))
-
-
-def _ratio_of(
-    request: RecordRequest, experiment: Experiment, record: Array, ratio: Callable[[Array], float]
-) -> float:
-    """The worst ratio of a record; infinite when it is too short to excite every parameter."""
-    try:
-        return ratio(FiniteRecord(experiment, len(record), request.step).information(record))
-    except np.linalg.LinAlgError:
-        return np.inf
+        plant = FiniteRecord(experiment, len(record), request.step)
+        return Record(record, "multisine", ratio_at(plant, ratio, record))
 
 
 def _check_excites(experiment: Experiment, information: Array) -> None:
