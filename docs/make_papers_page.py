@@ -16,9 +16,9 @@ from pathlib import Path
 from inputdesign_cli.outcome.golden import Row, compare
 from inputdesign_cli.outcome.golden_file import Golden, load_golden
 from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.questions.verbs import run_verb
 from inputdesign_cli.specification import load_spec
 from inputdesign_cli.sweeps.running import run_sweep
-from inputdesign_cli.sweeps.verbs import run_verb
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "papers.md"

@@ -77,7 +77,7 @@ def _compare(
     """
     from inputdesign_cli.outcome.golden import compare
     from inputdesign_cli.outcome.golden_file import load_golden
-    from inputdesign_cli.sweeps.verbs import execute
+    from inputdesign_cli.questions.verbs import execute
 
     for golden in [load_golden(path) for path in files]:
         results = {}

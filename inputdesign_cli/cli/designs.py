@@ -33,7 +33,7 @@ from inputdesign_cli.errors import STANDARD_STREAM
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.outcome.results import Results
-    from inputdesign_cli.sweeps.verbs import Verb
+    from inputdesign_cli.questions.verbs import Verb
 
 
 def solve(
@@ -152,7 +152,7 @@ def _results(
     """
     file = place.sources[0]
     with computing(file, quiet=quiet):
-        from inputdesign_cli.sweeps.verbs import run_verb
+        from inputdesign_cli.questions.verbs import run_verb
 
         spec = read_spec(file, overrides, confine)
         place = place.checked(spec)

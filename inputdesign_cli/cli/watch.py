@@ -81,7 +81,7 @@ def _follow_spec(
     from inputdesign_cli.cli.reading import read_spec
     from inputdesign_cli.live.changes import stamp, wait_for_change
     from inputdesign_cli.live.pages import Followed
-    from inputdesign_cli.sweeps.verbs import run_verb
+    from inputdesign_cli.questions.verbs import run_verb
 
     followed, files = Followed(spec.name), [spec]
     while True:

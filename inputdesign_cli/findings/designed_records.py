@@ -24,7 +24,7 @@ RECORD_UNDETERMINED = FindingKind(
     "record-undetermined",
     Severity.DOUBT,
     "the record does not determine all parameters",
-    "To working precision the samples do not tell all parameters apart. Their accuracy cannot be computed.",
+    "To working precision the samples do not determine all parameters. Their accuracy cannot be computed.",
     "Take more samples (`signal.samples`), or a model of lower order.",
 )
 RECORD_MISSES = FindingKind(
@@ -100,7 +100,7 @@ def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
         return []
     if not np.isfinite(record.worst_ratio):
         message = (
-            "the record does not tell all parameters apart to working precision: its accuracy cannot be "
+            "the record does not determine all parameters to working precision: its accuracy cannot be "
             "computed; take more samples (signal.samples), or a model of lower order"
         )
         return [RECORD_UNDETERMINED.found(message, where="signal.samples")]
@@ -119,7 +119,6 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
     """Return a finding if a record is longer than was asked for, or dear for want of samples.
 
     Args:
-        record: as it was made.
         asked: its samples by the spec, or by the spectrum.
         block: lengths are multiples of this.
         shares: of each limit on single samples that it takes.
@@ -193,7 +192,6 @@ def other_spectrum(asked: str, kind: str, limits: Sequence[str], power: float | 
 
     Args:
         asked: the kind of signal that was asked for; `kind`: that of the record.
-        kind: see there.
         limits: the keys that the record keeps.
         power: the limit on the input power that gives its spectrum; None if that is the designed one.
         goal: of the design.

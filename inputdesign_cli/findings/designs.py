@@ -124,10 +124,7 @@ def almost_free(units: Units, lines: Array, power: Array, costs: Array, dearest:
     """Return a finding if sinusoids of the design lie where power costs next to nothing.
 
     Args:
-        units: of the spec.
         lines: (n,) frequencies of the sinusoids, with their power (n,) and the price of power there (n,).
-        power: see there.
-        costs: see there.
         dearest: the largest price over frequency.
     """
     cheap = (costs < _FREE * dearest) & (power > _SUPPORT * power.sum())

@@ -10,7 +10,7 @@ FRESH_PLANTS_CUT = FindingKind(
     "fresh-plants-cut-short",
     Severity.NOTE,
     "the trial on fresh plants was cut short",
-    "Fewer plants were tried than `uncertainty.fresh` asks for. The 95 % limits count those that were tried.",
+    "Fewer plants were tried than `uncertainty.fresh` asks for. The 95 % limits count the ones tried.",
     "Allow more time.",
 )
 DRAWS_UNSTABLE = FindingKind(

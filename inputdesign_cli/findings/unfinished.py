@@ -15,19 +15,13 @@ DESIGN_UNFINISHED = FindingKind(
     "the gap says.",
     "Allow more time.",
 )
-BOUND_NOT_IN_TIME = FindingKind(
-    "no-bound-in-time",
-    Severity.NOTE,
-    "there was no time for the bound over every spectrum",
-    "The design is proved the best of its type of spectrum. Other types were not compared.",
-    "Allow more time, or loosen `solver.any_spectrum_tolerance`.",
-)
 OTHER_SPECTRA_LEFT_OUT = FindingKind(
     "other-spectra-left-out",
     Severity.NOTE,
-    "the bound over every spectrum was not asked for",
-    "The design is proved the best of its type of spectrum. Other types were not compared.",
-    "Leave out `--fast`, or write `solver.any_spectrum: true`.",
+    "there is no bound over every spectrum yet",
+    "The design is proved the best of its type of spectrum. Other types were not compared, for want of time "
+    "or because nobody asked for it.",
+    "Allow more time, leave out `--fast`, or write `solver.any_spectrum: true`.",
 )
 NO_BOUND_EXISTS = FindingKind(
     "no-bound-over-spectra",
@@ -75,14 +69,14 @@ def ended_early(status: str, objective: Objective) -> list[Finding]:
         f"{what_ended()} came before the bound over every spectrum; solver.any_spectrum_tolerance: 0.01 "
         "would take less time"
     )
-    return [BOUND_NOT_IN_TIME.found(message, where="solver")]
+    return [OTHER_SPECTRA_LEFT_OUT.found(message, where="solver")]
 
 
 def _how_far(objective: Objective) -> str:
     if objective.upper_bound:
         return f"no other gets above {objective.upper_bound:.6g}"
     if not objective.lower_bound:
-        return "nothing is proved yet of what others reach"
+        return "nothing is proved yet of others"
     gap = per_cent(1.0 if objective.relative_gap is None else objective.relative_gap, 2)
     return f"no other gets below {objective.lower_bound:.6g} ({gap} lower)"
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.codec import others
+
+if TYPE_CHECKING:
+    from inputdesign_cli.information import PowerKind
 
 Deviations = Mapping[str, float]
 """Standard deviations by the names of the parameters."""
@@ -37,6 +41,12 @@ class Powers:
     input: tuple[float, ...] | None = None
     output: tuple[float, ...] | None = None
     excitation: tuple[float, ...] | None = None
+
+    @classmethod
+    def of(cls, powers: Mapping[PowerKind, Iterable[float]]) -> Powers:
+        """Return powers from their values by kind; a kind that is none of these is left out."""
+        kinds: tuple[PowerKind, ...] = ("input", "output", "excitation")
+        return cls(*(tuple(powers[kind]) if kind in powers else None for kind in kinds))
 
 
 @dataclass(frozen=True)

@@ -90,8 +90,6 @@ def white_labels(kind: str | None, white: White, samples: int) -> tuple[str, str
 
     Args:
         kind: of the objective; None without one.
-        white: the baseline.
-        samples: of the design.
     """
     spent = objective(kind).spent
     if not spent:

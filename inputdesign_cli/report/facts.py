@@ -61,11 +61,19 @@ def _value_and_cost(outcome: Outcome) -> Iterator[Fact]:
     kind = None if found is None else found.kind
     if found is not None:
         name = cost if kind == "least_cost" else objective(kind).name
-        yield name, _clean(found.value, found.kind), "; ".join(filter(None, [_paid(outcome), white(outcome)]))
+        value, by = _clean(found.value, found.kind), _paid(outcome)
+        if kind == "shortest_experiment":
+            value, by = str(length(outcome)), f"by the spectrum alone {value}"
+        yield name, value, "; ".join(filter(None, [by, white(outcome)]))
     if outcome.closed_loop_error is not None:
         yield _of_structure(outcome.closed_loop_error)
     if kind != "least_cost" and outcome.cost is not None:
         yield cost, shown(outcome.cost), ""
+
+
+def length(outcome: Outcome) -> int | None:
+    """Return the samples of the record; without one those of the experiment."""
+    return outcome.samples if outcome.signal is None else outcome.signal.samples
 
 
 def _power_and_limits(outcome: Outcome) -> Iterator[Fact]:
@@ -373,14 +381,15 @@ def _signal(outcome: Outcome, signal: Signal) -> Iterator[str]:
 
 
 def _beside_the_design(found: Objective | None, signal: Signal) -> Iterator[str]:
-    """How much less accurate the samples are than the best spectrum, or how much more they cost."""
-    best = found if found is not None and found.kind == "accuracy_factor" else None
-    if signal.efficiency is not None or best is not None:
-        less = 1.0 - (1.0 if signal.efficiency is None else signal.efficiency)
-        if signal.worst_ratio is not None and found is not None:
-            less = 1.0 - found.value / signal.worst_ratio
-        if less >= _LITTLE_LESS:
-            yield f"{per_cent(less)} less accuracy than the design"
+    """Yield how much larger the errors of the samples are than those of the design, or how much they cost."""
+    if found is not None and found.kind == "accuracy_factor":
+        more = 0.0 if signal.worst_ratio is None else signal.worst_ratio / found.value - 1.0
+        if more >= _LITTLE_LESS:
+            yield f"errors {per_cent(more)} larger than by the design"
+        return
+    if signal.efficiency is not None:
+        if 1.0 - signal.efficiency >= _LITTLE_LESS:
+            yield f"{per_cent(1.0 - signal.efficiency)} less accuracy than the design"
         return
     more = signal.extra_power or 0.0
     if abs(more) >= _LITTLE_MORE:

@@ -23,7 +23,7 @@ from inputdesign_cli.report.evidence import (
     simulation_answer,
     simulation_table,
 )
-from inputdesign_cli.report.facts import facts, proofs, white
+from inputdesign_cli.report.facts import facts, length, proofs, white
 from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
@@ -192,7 +192,7 @@ def _answer(verb: str, outcome: Outcome) -> str:
         return f"The error of the model stays {verdict} what is admitted: r_u / r_adm is at most {ratio:.5g}."
     sentence = objective(found.kind).answer
     if found.kind == "shortest_experiment":
-        said = f"{sentence.format(outcome.samples)} (as a real number {found.value:.6g})"
+        said = f"{sentence.format(length(outcome))} (by the spectrum alone {found.value:.6g})"
     else:
         said = sentence.format(f"{found.value:.6g}")
     compared = white(outcome)

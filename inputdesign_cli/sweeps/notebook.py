@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.sweeps.grid import Settings
 from inputdesign_cli.sweeps.running import run_sweep
-from inputdesign_cli.sweeps.verbs import Verb
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -12,11 +12,11 @@ from typing import get_args
 
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweeps.grid import Grid, Settings, build_grid, parse_settings
 from inputdesign_cli.sweeps.point import PointJob
-from inputdesign_cli.sweeps.verbs import Verb
 from inputdesign_cli.version import __version__
 
 _KEY_LENGTH = 24

@@ -21,9 +21,9 @@ from inputdesign_cli.errors import (
 from inputdesign_cli.outcome.provenance import environment
 from inputdesign_cli.outcome.results import Json, typed
 from inputdesign_cli.outcome.text_formats import json_text
+from inputdesign_cli.questions.verbs import Verb, run_verb
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweeps.layout import Layout, at_work
-from inputdesign_cli.sweeps.verbs import Verb, run_verb
 
 STATUS = {EXIT_BAD_INPUT: "invalid", EXIT_INFEASIBLE: "infeasible", EXIT_INACCURATE: "inaccurate"}
 LOST, BROKEN = "lost", "error"

@@ -27,6 +27,7 @@ from inputdesign_cli.outcome.provenance import environment
 from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.outcome.text_formats import json_text
+from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps.earlier import check_same_sweep
 from inputdesign_cli.sweeps.grid import Settings
@@ -44,7 +45,6 @@ from inputdesign_cli.sweeps.point import (
     run_point_elsewhere,
 )
 from inputdesign_cli.sweeps.table import PENDING, table_lines
-from inputdesign_cli.sweeps.verbs import Verb
 
 DAMAGED = "damaged"
 """Of a listed point: what is there of it does not hold, so that it is computed again."""

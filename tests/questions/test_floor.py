@@ -63,7 +63,7 @@ def test_every_plant_whose_sensitivity_exceeds_what_is_asked_is_told_and_no_othe
     assert set(beyond) <= set(told["raised"])
     for one in told.get("worst", []):
         assert one["peak"] == pytest.approx(peaks[one["scenario"] - 1], rel=1e-3)
-    said = [note for note in found.get("notes", []) if "even if the plant were known exactly" in note]
+    said = [one for one in found.get("findings", []) if one["code"] == "plants-lost"]
     assert len(said) == bool(beyond)
 
 

@@ -109,9 +109,11 @@ signal: {type: multisine, candidates: 1}
 """
     outcome = solve(parse_spec(spec))
     result = outcome.result
-    less = 1 - result["objective"]["value"] / result["signal"]["worst_ratio"]
-    assert less > 0.01
+    more = result["signal"]["worst_ratio"] / result["objective"]["value"] - 1
+    assert more > 0.01
     line = next(text for name, text, _ in facts(outcome.outcome, "s") if name == "signal")
-    assert f"{100 * less:.3g} % less accuracy than the design" in line
+    assert f"errors {100 * more:.3g} % larger than by the design" in line
     assert "cost" not in line
-    assert any(f"reaches {result['signal']['worst_ratio']:.4g} times" in note for note in result["notes"])
+    (found,) = [one for one in result["findings"] if one["code"] == "record-less-accurate"]
+    assert found["figures"]["reached"] / found["figures"]["designed"] - 1 == pytest.approx(more)
+    assert f"{100 * more:.3g} % more" in found["message"]

@@ -15,7 +15,7 @@ from inputdesign_cli.outcome import ModelError as Bound
 from inputdesign_cli.outcome.curves import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.bound import bound_curves
+from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.confidence import Confidence
 
 
@@ -80,7 +80,7 @@ def bound_of_data(
             worst_ratio=violation.ratio,
             worst_frequency=None if frequency is None else frequency / units.frequency,
         )
-    table, curves = bound_curves(units, errors, information, stated=asked, label="data")
+    table, curves = Informed(units, errors, information, asked, label="data").bound()
     return table, curves, bound
 
 

@@ -38,137 +38,99 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Informed:
-    """An experiment with its information, as curves show it.
+    """What an information matrix says of errors over frequency, and what it is compared with.
 
     Attributes:
-        units: of the spec.
-        experiment: of the counted length.
-        information: M (k, k) in its coordinates; `white` that of white excitation.
-        white: see there; None if it is not compared with.
-        errors: bounds on the model error; entries of G without one, if nothing is `stated`.
-        stated: whether a requirement states r_adm.
-        pairs: of parameters that ellipses show.
-        active: for each error, the frequencies at which it binds; empty for none.
+        errors: bounds on the model error; r_u of entries of G, if nothing is `stated`.
+        information: M (k, k) in the coordinates of the errors.
+        stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
+        active: for each error, the frequencies of the experiment at which it binds; empty for none.
+        white: M of the baseline; `equal` of white excitation with the means of the design.
+        record: M of the record to be applied.
+        white_labels: what `white` and `equal` are called.
+        of_several: whether the design serves other plants, too, which the curves do not show.
+        label: what gave r_u.
     """
 
     units: Units
-    experiment: Experiment
-    information: Array
-    white: Array | None
     errors: Sequence[OnModelError]
-    stated: bool
-    pairs: Pairs | None
+    information: Array
+    stated: bool = True
     active: Sequence[Array] = ()
+    white: Array | None = None
+    equal: Array | None = None
+    record: Array | None = None
+    white_labels: tuple[str, str] = WHITE
+    of_several: bool = False
+    label: str = "design"
 
     def curves(
-        self,
-        *,
-        record: Array | None = None,
-        equal: Array | None = None,
-        white_labels: tuple[str, str] = WHITE,
-        of_several: bool = False,
-        flat: bool = True,
+        self, experiment: Experiment, pairs: Pairs | None, *, flat: bool = True
     ) -> tuple[dict[str, Table], dict[str, Curves]]:
         """Return the tables and figures of the bound, the loop and the parameters, as far as they exist.
 
         Args:
-            record: see `bound_curves`, as all but `flat`.
-            equal: see there.
-            white_labels: see there.
-            of_several: see there.
+            experiment: in the coordinates of the information.
+            pairs: of parameters that ellipses show.
             flat: whether ellipses show white excitation as well.
         """
         tables, curves = dict[str, Table](), dict[str, Curves]()
         with suppress(np.linalg.LinAlgError):  # a parameter that the design does not excite
-            tables["bound"], curves["bound"] = bound_curves(
-                self.units,
-                self.errors,
-                self.information,
-                white=self.white,
-                equal=equal,
-                white_labels=white_labels,
-                record=record,
-                stated=self.stated,
-                active=self.active,
-                of_several=of_several,
-            )
+            tables["bound"], curves["bound"] = self.bound()
             loops = nyquist_curves(self.units, self.errors[:1], self.information, self.active)
             tables, curves = tables | loops[0], curves | loops[1]
         white = self.white if flat else None
-        drawn = experiment_ellipses(self.experiment, self.information, white, self.pairs)
+        drawn = experiment_ellipses(experiment, self.information, white, pairs)
         return tables, curves if drawn is None else curves | {"ellipses": drawn}
 
-    def of_length(self, samples: int, *, flat: bool = True) -> dict[str, Curves]:
+    def of_length(
+        self, experiment: Experiment, pairs: Pairs | None, samples: int, *, flat: bool = True
+    ) -> dict[str, Curves]:
         """Return `bound` and `ellipses` of records of this many samples with the same spectrum."""
         found: dict[str, Curves] = {}
-        longer = self.experiment.of_length(self.information, samples)
-        white = None
-        if flat and self.white is not None:
-            white = self.experiment.of_length(self.white, samples)
+        longer = experiment.of_length(self.information, samples)
+        white = experiment.of_length(self.white, samples) if flat and self.white is not None else None
         with suppress(np.linalg.LinAlgError):
-            found["bound"] = bound_curves(self.units, self.errors, longer, stated=self.stated)[1]
-        drawn = experiment_ellipses(self.experiment, longer, white, self.pairs)
+            found["bound"] = Informed(self.units, self.errors, longer, self.stated).bound()[1]
+        drawn = experiment_ellipses(experiment, longer, white, pairs)
         return found if drawn is None else found | {"ellipses": drawn}
 
-
-def bound_curves(
-    units: Units,
-    errors: Sequence[OnModelError],
-    information: Array,
-    *,
-    white: Array | None = None,
-    record: Array | None = None,
-    stated: bool = True,
-    active: Sequence[Array] = (),
-    label: str = "design",
-    equal: Array | None = None,
-    white_labels: tuple[str, str] = WHITE,
-    of_several: bool = False,
-) -> tuple[Table, BoundCurves]:
-    """r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement.
-
-    Args:
-        information: M (k, k) in the coordinates of the errors; `white`, `equal` and `record`: that of the
-            baseline, of white excitation with the means of the design, and of the record to be applied.
-        stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
-        active: for each error, the frequencies of the experiment at which it binds; empty for none.
-        label: what gave r_u.
-        white_labels: what `white` and `equal` are called.
-        of_several: whether the design serves other plants, too, which these curves do not show.
-    """
-    binding = active or [np.zeros(0)] * len(errors)
-    peaks = _peaks(errors, information) if stated else np.zeros(0)
-    w = _axis(errors, np.concatenate([*binding, peaks]))
-    frequency = w / units.frequency
-    columns: dict[str, Array] = {units.frequency_header: frequency}
-    panels = []
-    for error, binds in zip(errors, binding, strict=True):
-        panel = BoundPanel(
-            frequency=frequency,
-            r_u=error.error_bound(information, w),
-            G_abs=error.nominal_size(w),
-            r_adm=error.admissible.at(w) if stated else None,
-            r_u_white=None if white is None else error.error_bound(white, w),
-            active=distinct(np.maximum(binds, w[0]), w[-1]) / units.frequency,
-            r_u_record=None if record is None else error.error_bound(record, w),
-            label=label,
-            r_u_equal=None if equal is None else error.error_bound(equal, w),
-            white_labels=white_labels,
-            entry=None if units.single else error.entry,
-            names=units.passage(error.entry),
-        )
-        suffix = "" if error.entry is None else units.suffix(*error.entry)
-        listed = {
-            "r_u": panel.r_u,
-            "r_adm": panel.r_adm,
-            "G_abs": panel.G_abs,
-            "r_u_white": panel.r_u_white,
-            "r_u_record": panel.r_u_record,
-            "r_u_equal": panel.r_u_equal,
-        }
-        columns |= {f"{name}{suffix}": values for name, values in listed.items() if values is not None}
-        panels.append(panel)
-    return Table(columns), BoundCurves(tuple(panels), of_several)
+    def bound(self) -> tuple[Table, BoundCurves]:
+        """Return r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement."""
+        binding = self.active or [np.zeros(0)] * len(self.errors)
+        peaks = _peaks(self.errors, self.information) if self.stated else np.zeros(0)
+        w = _axis(self.errors, np.concatenate([*binding, peaks]))
+        frequency = w / self.units.frequency
+        columns: dict[str, Array] = {self.units.frequency_header: frequency}
+        panels = []
+        for error, binds in zip(self.errors, binding, strict=True):
+            r_u, G_abs = error.error_bound(self.information, w), error.nominal_size(w)
+            suffix = "" if error.entry is None else self.units.suffix(*error.entry)
+            listed: dict[str, Array | None] = {
+                "r_u": r_u,
+                "r_adm": error.admissible.at(w) if self.stated else None,
+                "G_abs": G_abs,
+            }
+            for name, M in (("white", self.white), ("record", self.record), ("equal", self.equal)):
+                listed[f"r_u_{name}"] = None if M is None else error.error_bound(M, w)
+            columns |= {f"{name}{suffix}": found for name, found in listed.items() if found is not None}
+            panels.append(
+                BoundPanel(
+                    frequency=frequency,
+                    active=distinct(np.maximum(binds, w[0]), w[-1]) / self.units.frequency,
+                    label=self.label,
+                    white_labels=self.white_labels,
+                    entry=None if self.units.single else error.entry,
+                    names=self.units.passage(error.entry),
+                    r_u=r_u,
+                    G_abs=G_abs,
+                    r_adm=listed["r_adm"],
+                    r_u_white=listed["r_u_white"],
+                    r_u_record=listed["r_u_record"],
+                    r_u_equal=listed["r_u_equal"],
+                )
+            )
+        return Table(columns), BoundCurves(tuple(panels), self.of_several)
 
 
 def _peaks(errors: Sequence[OnModelError], information: Array) -> Array:

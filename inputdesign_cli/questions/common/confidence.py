@@ -100,13 +100,13 @@ def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
 
 
 def settled_alpha(needed: Callable[[float], float | None], start: float) -> float:
-    """The alpha whose design needs just that alpha.
+    """Return the alpha whose design needs just that alpha.
 
     A design for a larger alpha is more accurate, and needs a smaller one: log(needed / alpha) falls, and the
     secant method in log(alpha) finds its root.
 
     Args:
-        needed: the calibrated alpha of the design for an alpha; None where the limits leave no such design.
+        needed: the calibrated alpha of the design for an alpha; None if there is no design within the limits.
 
     Raises:
         InfeasibleError: no alpha was found whose design keeps within the limits.
@@ -132,7 +132,7 @@ def settled_alpha(needed: Callable[[float], float | None], start: float) -> floa
             "infeasible",
             "no design within the limits was found that keeps the exact confidence; that there is none is "
             "not proved",
-            hint="loosen the limits, or ask for confidence: 0.95, of which infeasible tells what is proved",
+            hint="loosen the limits, or ask for confidence: 0.95, for which `infeasible` is proved",
             key="limits",
         )
     raise InaccurateError.because(

@@ -39,7 +39,6 @@ class Shown:
     """How an experiment is reported.
 
     Attributes:
-        header: of the results.
         unstated: errors of the entries of G that have r_u if no requirement bounds it.
         ellipses: pairs of parameters; None for a choice of them.
     """
@@ -82,7 +81,7 @@ class Report:
     def with_record(
         self, request: RecordRequest, shown: Shown, experiment: Experiment, record: Record, signal: Signal
     ) -> Report:
-        """Return the same with a record, its curves and its files."""
+        """Add a record, its curves and its files."""
         units = shown.header.units
         tables, drawn = signal_curves(request, units, experiment, record)
         return Report(
@@ -95,7 +94,7 @@ class Report:
     def foreseeing(
         self, foresight: Foresight | None, record: Array, requirements: Sequence[Requirement]
     ) -> Report:
-        """Return the same with the other minima that data of this record (n, r) would leave."""
+        """Add the other minima that data of this record (n, r) would leave."""
         if foresight is None:
             return self
         found = foresight.foreseen(record, requirements, self.outcome)
@@ -126,7 +125,6 @@ def record_findings(
     """Return what a user should know before applying a record.
 
     Args:
-        request: what was asked of it.
         experiment: samples of the experiment.
         record: None if none was made.
         shares: of each limit on single samples that it takes.
@@ -149,8 +147,6 @@ def begun_anywhere(
 
     Args:
         signal: what is said of it so far.
-        experiment: that the record is for.
-        record: (n, r).
         step: time between samples in the unit of the experiment's frequencies.
         requirements: what the errors are measured by.
     """

@@ -1,4 +1,4 @@
-"""What is known of all spectra before a design begins, and told with it."""
+"""What is known of all spectra before a design begins."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class Reach:
     """How far spectra reach: whether all of them have a bound, and whether it is attained.
 
     Where it is only approached, at ends of the `band` of all spectra, that stays off them by so little that
-    nothing is lost to the tolerance. `note` says what the reader of a result must know of it; None where
+    nothing is lost to the tolerance. `note` says what the reader of a result must know of it; None if
     there is nothing to say.
     """
 

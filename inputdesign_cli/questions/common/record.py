@@ -70,7 +70,7 @@ class RecordRequest:
         limit_keys: of the spec, for what limits single samples.
         stated_method: whether the spec states the kind of signal.
         others: kinds of signals that may stand in for one that does not fit.
-        units: in which lengths are told.
+        units: of lengths in messages.
     """
 
     settings: SignalSettings
@@ -89,7 +89,7 @@ class RecordRequest:
     delivery: Delivery = Delivery()
 
     def length(self, experiment: int) -> int:
-        """Samples of the record of an experiment of so many: whole periods of held values."""
+        """Return the samples of the record of an experiment of this length: whole periods of held values."""
         block = self.settings.block
         return -(-(self.samples or experiment) // block) * block
 
@@ -99,7 +99,7 @@ class RecordRequest:
         return self.bounds.hard and self.settings.level is None
 
     def feasible(self, experiment: int, least: int) -> bool:
-        """Whether a record of this length is computed, with at least so many values a period."""
+        """Return whether a record of this length is computed, with at least `least` values a period."""
         samples = self.length(experiment)
         return samples <= self.longest and self.settings.period(samples) >= least
 
@@ -146,18 +146,8 @@ def make_record(
     )
     bounds = replace(request.bounds, powers=upper)
     meets = problem.goal != "factor" and request.meets
-    cost = design_cost(design, request.cost)
     plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
-    bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in problem.scenarios]
-
-    def target_at(numbers: Sequence[int]) -> Target:
-        def largest(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
-            return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
-
-        least = partial(largest, bounding) if meets else None
-        return Target(partial(largest, scores), meets, request.cost, cost, least)
-
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
@@ -176,17 +166,37 @@ def make_record(
         return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
 
     while True:
-        at, target = together(numbers), target_at(numbers)
+        at, target = together(numbers), _target(request, design, scores, numbers, meets=meets)
         record = best_record(generator, at, target, bounds, first=first, limiting=together(limiting))
         least = max(record.worst_ratio, MET) if meets else record.worst_ratio
         left = [n for n in range(len(plants)) if n not in numbers]
-        missed = _worst_few({n: _ratio_at(others[n], scores[n], record) for n in left}, least)
+        missed = _worst_few({n: ratio_at(others[n], scores[n], record.samples) for n in left}, least)
         beyond = _worst_few({n: _power_share(others[n], upper, record) for n in left if n not in missed}, MET)
         higher = beyond_peaks(record.samples, [n for n in others if n not in limiting])
         if not (missed or beyond or higher):
             return record
         numbers += [*missed, *beyond]
         limiting += higher
+
+
+def _target(
+    request: RecordRequest,
+    design: Design,
+    scores: Sequence[Callable[[Array], float]],
+    numbers: Sequence[int],
+    *,
+    meets: bool,
+) -> Target:
+    """Return what ranks records: the score at the plant, of these numbers, where it is worst."""
+    scenarios = design.problem.scenarios
+    bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in scenarios]
+
+    def largest(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
+        return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
+
+    least = partial(largest, bounding) if meets else None
+    cost = design_cost(design, request.cost)
+    return Target(partial(largest, scores), meets, request.cost, cost, least)
 
 
 def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:
@@ -212,10 +222,10 @@ def _binding(design: Design) -> list[int]:
     return [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
 
 
-def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Record) -> float:
-    """The worst ratio of a record at one plant."""
+def ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Array) -> float:
+    """Return the score of a record (n, r) at a plant; infinite if it does not excite every parameter."""
     try:
-        return score(plant.information(record.samples))
+        return score(plant.information(record))
     except np.linalg.LinAlgError:
         return np.inf
 
@@ -238,7 +248,7 @@ def _power_share(
 
 
 def ratio_before(design: Design, step: float) -> float:
-    """The worst ratio of what is known before any excitation, at the plant where it is worst.
+    """Return the worst ratio that information without excitation gives, at the plant where it is worst.
 
     Args:
         step: the sample time, in the unit of the experiment's frequencies.
@@ -255,14 +265,14 @@ def ratio_before(design: Design, step: float) -> float:
 
 
 def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
-    """Samples of records as long as the experiment, in whole periods; None where none are computed."""
+    """Return samples of records as long as the experiment, in whole periods; None if none are computed."""
     whole = replace(request, samples=None)
     inputs, samples = experiment.inputs, experiment.samples
     return whole.length(samples) if whole.feasible(samples, least_period(inputs)) else None
 
 
 def redrawn(request: RecordRequest, design: Design, inputs: int, samples: int) -> Redrawn:
-    """Other records of the designed spectrum, of so many samples, phases of sinusoids uniformly."""
+    """Return what draws other records of the designed spectrum of this length, with uniform phases."""
     settings, found = request.settings, design.result
     if settings.phases != "random":
         settings = replace(settings, phases="orthogonal")
@@ -302,9 +312,9 @@ def least_period(inputs: int) -> int:
 
 
 def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    """The largest ratio of several requirements as a function of the information of a record; 0 for none.
+    """Return the largest ratio of requirements as a function of the information of a record; 0 for none.
 
-    It raises `LinAlgError` where rounding would decide: the record tells parameters apart by less than that.
+    It raises `LinAlgError` if rounding would decide: the record hardly determines all parameters.
     """
     return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
 
@@ -322,7 +332,7 @@ def _largest(
 
 
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    """What ranks records: a criterion by itself, to be large, other requirements by their worst ratio."""
+    """Return what ranks records: a criterion, to be large, or the worst ratio of other requirements."""
     criterion = criterion_of(requirements)
     if criterion is None:
         return worst_ratio(requirements)

@@ -31,7 +31,7 @@ _TAKES_PART = 1e-6
 
 @dataclass(frozen=True)
 class Batch:
-    """Plants with parameters `thetas` (S, k), and how many were drawn until so many were stable."""
+    """Plants with parameters `thetas` (S, k), and how many were drawn until S were stable."""
 
     thetas: Array
     plants: tuple[Alternative, ...]
@@ -115,10 +115,10 @@ class Plants:
         r_adm: as the spec has it.
         paid: see `Problem`.
         discard: how many of the plants the design may leave out.
-        afresh: draws others from the same distribution, a few at a time; None where plants were listed.
+        afresh: draws others from the same distribution, a few at a time; None if plants were listed.
         fresh: how many of these were asked for.
-        at: the plant with parameters (k,), None where they are none; not given where plants were listed.
-        unknowns: of the program, None where they have no number.
+        at: the plant with parameters (k,), None if there is no such plant; not given if plants were listed.
+        unknowns: of the program, None if they have no number.
         region: where the design is to serve the worst plant that is found, too; `searched` what was found.
     """
 
@@ -137,9 +137,9 @@ class Plants:
 
 
 def without_dearest(question: Question, design: Design, discard: int) -> list[int]:
-    """The numbers of the `others` that stay when those that raise the optimum most are left out, one by one.
+    """Return the numbers of the `others` that stay if the dearest are left out, one by one.
 
-    Of the plants that bind those of the largest multipliers go first, and others take their place.
+    Binding plants with the largest multipliers go first, and others take their place.
     """
     kept = list(range(len(question.others)))
     while discard > 0:
@@ -170,7 +170,7 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
 def _worst(
     problem: Problem, design: Design, informations: NDArray[np.float64], above: float = -np.inf
 ) -> list[Kept]:
-    """The same with M_s (S, k, k), a share up to `above` being told as 0."""
+    """Return how near each scenario comes, with M_s (S, k, k); a share up to `above` may come out as 0."""
     worst = [Kept(0.0)] * len(problem.scenarios)
     for side in (False, True):
         admitted = _admitted(design.problem, design, side=side)
@@ -189,7 +189,7 @@ def delivered_samples(design: Design) -> int:
 
 
 def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.float64]:
-    """(S, k, k): what the spectrum tells of each scenario over so many samples."""
+    """Return the information (S, k, k) of the spectrum at each scenario over this many samples."""
     if problem.goal != "samples":
         return design.result.informations
     return problem.fixed_information + samples * (
@@ -211,10 +211,10 @@ class Tried:
 
 
 def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> list[Tried]:
-    """What plants keep that the design was not made for.
+    """Return what plants keep that the design was not made for.
 
     Args:
-        above: a share up to this one is told as 0, since no peak as low is searched to the last digit.
+        above: a share up to this one may come out as 0, since no peak as low is searched to the last digit.
     """
     seconds_left()
     try:
@@ -235,9 +235,9 @@ def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> 
 
 
 def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:
-    """Parameters (k,) that data of the design may tell where this is the true plant: one draw.
+    """Draw an estimate (k,) from data of the design if this is the true plant.
 
-    None where the experiment does not tell them all.
+    None if the experiment does not determine it.
     """
     try:
         alone = _at(design, samples, [plant])

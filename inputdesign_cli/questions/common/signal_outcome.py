@@ -42,23 +42,17 @@ def signal_of(
     it compares with the design. Other requirements have their worst ratio.
 
     Args:
-        request: what was asked of the record.
-        units: of the spec.
-        experiment: that the record is for.
-        record: as it was made.
-        requirements: in the coordinates of the experiment.
         designed: information matrix (k, k) of the design.
         spectrum: of the design, for the error of that of the record.
     """
     samples, made = record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)
-    criterion, value, efficiency, ratio = criterion_of(requirements), None, None, None
+    criterion, value, efficiency = criterion_of(requirements), None, None
+    ratio = record.worst_ratio if requirements and np.isfinite(record.worst_ratio) else None
     if criterion is not None:
         level = criterion.level(plant.information_of_experiment(samples))
         value = criterion.value(level)
         efficiency = None if designed is None else level / criterion.level(designed)
-    elif requirements and np.isfinite(record.worst_ratio):
-        ratio = record.worst_ratio
     delivery, y, u = request.delivery, plant.signals("output", samples), plant.signals("input", samples)
     peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
     found = Signal(
@@ -75,7 +69,7 @@ def signal_of(
         output_peak=_channels(np.abs(y).max(axis=0)),
         criterion=value,
         efficiency=efficiency,
-        worst_ratio=ratio,
+        worst_ratio=ratio if criterion is None else None,
         extra_power=record.extra_power if made else None,
         spectrum_error=None if spectrum is None else _spectrum_error(spectrum.lines(len(samples)), samples),
         limits=_limits(request, units, record) or None,
@@ -92,7 +86,7 @@ def signal_of(
 def signal_entry(
     request: RecordRequest, units: Units, experiment: Experiment, record: Record
 ) -> dict[str, object]:
-    """Return the same as plain data, for an outcome that is put together from them."""
+    """Return `signal_of` as plain data, for an outcome that is put together from them."""
     return dict(write_plain(signal_of(request, units, experiment, record)))
 
 

@@ -26,12 +26,12 @@ _EACH, _LONG = 20, 100
 
 @dataclass(frozen=True)
 class SimulatedEstimates:
-    """Of `runs` records of an excitation on the nominal plant.
+    """Estimates from `runs` records of an excitation on the nominal plant.
 
     Attributes:
         nominal: in raw parameters, as long as the records.
         step: time between samples in the unit of the experiment's frequencies.
-        sets: of so many runs each that correct; those that check are none of them.
+        sets: of `runs` runs each that correct alpha; others check it.
     """
 
     nominal: Experiment
@@ -85,7 +85,7 @@ class Simulator:
     step: float
 
     def of(self, excitation: Excitation, samples: int) -> SimulatedEstimates | None:
-        """Of records of so many samples; None where these are so long that asymptotic theory is to tell."""
+        """Return estimates from records of this length; None if long records make asymptotic theory good."""
         if samples * self.runs > _MOST:
             return None
         return SimulatedEstimates(replace(self.nominal, samples=samples), excitation, self.runs, self.step)

@@ -34,7 +34,7 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import TriedInput
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Loop, Model
-from inputdesign_cli.questions.common.bound import bound_curves
+from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.delivery import Delivered
 from inputdesign_cli.questions.common.simulation_curves import cloud, disturbance, error_bands
 from inputdesign_cli.questions.common.simulation_outcome import (
@@ -75,10 +75,9 @@ class Simulation:
 
     Attributes:
         nominal: the experiment on the design model, in raw parameters, prior information included.
-        truth: None where the design model is the true system.
+        truth: None if the design model is the true system.
         renewed: whether each run realises the spectrum anew.
         compare: what else is tried at equal power: signals of a flat spectrum over the band, of these kinds.
-        cost: weights of the powers of an excitation.
         entries: see `ModelQuestion`.
     """
 
@@ -205,7 +204,7 @@ def _predicted(
     """What the curve `bound` says; where there is none, the r_u that the `information` gives."""
     bound = foretold.get("bound")
     if not isinstance(bound, BoundCurves):
-        _, bound = bound_curves(plan.units, plan.entries, information, stated=False)
+        _, bound = Informed(plan.units, plan.entries, information, stated=False).bound()
     panels = bound.panels
     admissible = [panel.r_adm for panel in panels if panel.r_adm is not None]
     places = [panel.entry for panel in panels if panel.entry is not None]

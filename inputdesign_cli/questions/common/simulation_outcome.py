@@ -23,7 +23,6 @@ def study_outcome(study: Study, inputs: Mapping[str, TriedInput], *, excitation:
     """Return `simulation` of the outcome.
 
     Args:
-        study: how the runs were made.
         inputs: what each excitation gave.
         excitation: whether each run realises the spectrum anew (`new`), or applies the one `record`.
     """
@@ -53,11 +52,8 @@ def tried_input(
     """Return what one excitation gave on the true system.
 
     Args:
-        units: of the spec.
-        tried: the runs.
         predicted: what is compared with them.
         errors: of the runs, see `Trials.errors`.
-        cost: weights of the powers of an excitation.
         modelled: runs in which the true system is the design model, if it is another one.
     """
     trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
@@ -71,8 +67,8 @@ def tried_input(
         within_r_u_limits=within.within_r_u_limits,
         mean_estimate=_named(trials, trials.theta.mean(axis=0)),
         cost=weighted_sum(cost, trials.power),
-        power=_powers(trials.power),
-        total_power=_powers(trials.total_power),
+        power=Powers.of(trials.power),
+        total_power=Powers.of(trials.total_power),
         not_converged=int(np.sum(~trials.converged)),
     )
     if modelled is not None:
@@ -104,10 +100,6 @@ def tried_input(
 
 def _named(trials: Trials, values: Array) -> dict[str, float]:
     return dict(zip(trials.names, values.tolist(), strict=True))
-
-
-def _powers(found: Mapping[PowerKind, list[float]]) -> Powers:
-    return Powers(**{kind: tuple(values) for kind, values in found.items()})
 
 
 def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesignModel:

@@ -51,7 +51,7 @@ class Bought:
 
     Args:
         stated: the numbers of the spec that are loosened alike; none if that has no words.
-        limits: those of the spec; others of the problem are implied by them.
+        limits: of the spec; others of the problem are implied by them.
     """
 
     units: Units

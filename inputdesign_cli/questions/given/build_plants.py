@@ -62,11 +62,8 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
     """Return what the excitation keeps at the plants of `uncertainty`.
 
     Args:
-        at: the excitation.
         plants: all but the plant of the spec. The worst are left out, as many as may be discarded.
         nominal: what it keeps at the plant of the spec, whose parameters are `centre` (k,).
-        centre: see there.
-        units: of the spec.
 
     Raises:
         SpecError: `not-exciting` if parameters of a plant are undetermined.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -40,6 +40,7 @@ from inputdesign_cli.questions.common.record import (
     as_long,
     given_record,
     least_period,
+    ratio_at,
     worst_ratio,
 )
 from inputdesign_cli.questions.common.robust import Plants
@@ -134,10 +135,7 @@ class GivenAsked:
     Attributes:
         requirements: are checked, not met.
         criterion: its value is computed, not bounded.
-        cost: weights of the powers.
         alpha: of r_u; `calibration` and `simulator` size it anew, see `Confidence`.
-        calibration: see there; None for the alpha as stated.
-        simulator: see there.
         limits: that the excitation is compared with.
         plants: others that the true one might be.
     """
@@ -193,7 +191,7 @@ class GivenTask:
         confidence = Confidence.of(asked.calibration, requirements, information, asked.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
         informed, white = self._informed(experiment, requirements, information)
-        report = self._report(informed, white, requirements, confidence)
+        report = self._report(experiment, informed, white, requirements, confidence)
         record = self._record(experiment, worst_ratio(requirements))
         findings = record_findings(self.record, experiment.samples, None) if record is None else []
         if record is not None:
@@ -203,7 +201,7 @@ class GivenTask:
                 signal, start = begun_anywhere(signal, experiment, record.samples, step, requirements)
                 findings += start
             report = report.with_record(self.record, self.shown, experiment, record, signal)
-        power = _powers(excitation.power)
+        power = Powers.of(excitation.power)
         findings += limits_not_kept(asked.limits, experiment.samples, power, report.outcome.signal)
         report = replace(report, outcome=report.outcome.saying(findings))
         if record is not None:
@@ -216,7 +214,7 @@ class GivenTask:
             record.samples,
             self._renewed(len(record.samples)),
             confidence.alpha,
-            informed.of_length,
+            partial(informed.of_length, experiment, self.shown.ellipses),
             searching(self.foresight, record.samples, requirements),
         )
 
@@ -229,14 +227,22 @@ class GivenTask:
         white = GivenExcitation.even(self.experiment, level).information(experiment)
         stated, units = model_errors(requirements), self.shown.header.units
         errors = stated or [replace(error, experiment=experiment) for error in self.shown.unstated]
-        informed = Informed(units, experiment, information, white, errors, bool(stated), self.shown.ellipses)
-        return informed, White(cost=cost, excitation_power=level)
+        found = White(cost=cost, excitation_power=level)
+        kind = None if self.asked.criterion is None else self.asked.criterion(experiment).letter
+        labels = white_labels(kind, found, experiment.samples)
+        informed = Informed(units, errors, information, bool(stated), white=white, white_labels=labels)
+        return informed, found
 
     def _report(
-        self, informed: Informed, white: White, requirements: Sequence[Requirement], confidence: Confidence
+        self,
+        experiment: Experiment,
+        informed: Informed,
+        white: White,
+        requirements: Sequence[Requirement],
+        confidence: Confidence,
     ) -> Report:
         """Return what the excitation buys, with its tables and curves."""
-        units, excitation, experiment = informed.units, self.excitation, informed.experiment
+        units, excitation = informed.units, self.excitation
         beyond, of_table = self._beyond(experiment, requirements, informed.information)
         met = beyond <= max(_ROUNDING, of_table)
         error, listed = accuracy_of(units, confidence, requirements, informed.information, np.zeros(0))
@@ -246,7 +252,7 @@ class GivenTask:
             objective=self._objective(experiment, informed.information),
             cost=white.cost,
             samples=experiment.samples,
-            power=_powers(excitation.power),
+            power=Powers.of(excitation.power),
             model_error=error,
             requirements=listed,
             information=information_of(experiment, informed.information),
@@ -255,8 +261,7 @@ class GivenTask:
         )
         if met and of_table:
             outcome = outcome.saying([met_within_table(of_table)])
-        kind = outcome.objective and outcome.objective.kind
-        tables, curves = informed.curves(white_labels=white_labels(kind, white, experiment.samples))
+        tables, curves = informed.curves(experiment, self.shown.ellipses)
         if excitation.basis is not None and excitation.x is not None:
             level = white.excitation_power if units.inputs == 1 else None
             tables["spectrum"], curves["spectrum"] = spectrum_curves(
@@ -344,21 +349,8 @@ class GivenTask:
             return None
         rng = np.random.default_rng(request.settings.seed)
         record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)
-        return Record(record, "multisine", _ratio_of(request, experiment, record, ratio))
-
-
-def _powers(found: Mapping[PowerKind, Sequence[float]]) -> Powers:
-    return Powers(**{kind: tuple(values) for kind, values in found.items()})
-
-
-def _ratio_of(
-    request: RecordRequest, experiment: Experiment, record: Array, ratio: Callable[[Array], float]
-) -> float:
-    """The worst ratio of a record; infinite when it is too short to excite every parameter."""
-    try:
-        return ratio(FiniteRecord(experiment, len(record), request.step).information(record))
-    except np.linalg.LinAlgError:
-        return np.inf
+        plant = FiniteRecord(experiment, len(record), request.step)
+        return Record(record, "multisine", ratio_at(plant, ratio, record))
 
 
 def _check_excites(experiment: Experiment, information: Array) -> None:
@@ -368,7 +360,7 @@ def _check_excites(experiment: Experiment, information: Array) -> None:
         return
     raise bad_spec(
         "not-exciting",
-        f"this excitation tells nothing about {experiment.unexcited(vectors[:, 0])}: infinite variance",
+        f"this excitation has no information on {experiment.unexcited(vectors[:, 0])}: infinite variance",
         hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
         key="spectrum.given",
     )

@@ -49,7 +49,6 @@ def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0
     """Compare what the outcome claims with what its own spectrum gives, at the nominal plant and all others.
 
     Args:
-        done: the design.
         outcome: what is about to be written.
         on_grid: the requirements hold on the grid of the papers' program only, and are not claimed between.
         loose: what the value and its bounds may differ by if more than rounding parts them, as a share.

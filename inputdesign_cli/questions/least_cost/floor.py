@@ -50,7 +50,7 @@ def floor_at(requirements: Iterable[Requirement]) -> Floor:
 
 
 def floor_of(plant: Alternative) -> Floor:
-    """Return the same of a plant that the design was not made for."""
+    """Return how a plant that the design was not made for stands to its own r_adm."""
     return floor_at(make(plant.experiment) for make in (*plant.requirements, *plant.side))
 
 
@@ -62,7 +62,6 @@ def floor_use(
     Args:
         floors: of the plants.
         numbers: what they are called.
-        names: of their parameters.
         thetas: (S, k), these parameters.
     """
     raised = [place for place, one in enumerate(floors) if one.raised]

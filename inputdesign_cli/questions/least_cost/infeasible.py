@@ -137,7 +137,9 @@ def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
         return ""
     least = factor * limit.bound
     channel = "" if limit.channel is None else f" {limit.channel + 1}"
-    needs = f"needs {limit.kind}{channel} power >= {rounded_up(least)}"
+    moves = f"power of the moves of input{channel}"
+    power = moves if limit.kind == "moves" else f"{limit.kind}{channel} power"
+    needs = f"needs {power} >= {rounded_up(least)}"
     if limit.implied:
         peak = np.sqrt(limit.bound)
         least_peak = rounded_up(float(np.sqrt(least)))

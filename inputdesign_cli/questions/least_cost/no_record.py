@@ -18,13 +18,7 @@ _SHARE = 0.8
 
 
 def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:
-    """Raise `InfeasibleError` (`record-too-short`) if dead times take nearly all of a record.
-
-    Args:
-        request: what was asked of the record.
-        experiment: the one that was designed.
-        record: the best that was found.
-    """
+    """Raise `InfeasibleError` (`record-too-short`) if dead times take nearly all of a record."""
     size = len(record.samples)
     late = experiment.memory > _SHARE * size * request.step
     undetermined = not np.isfinite(record.worst_ratio)
@@ -59,7 +53,6 @@ def too_tight(
     """Return the error `limits-too-tight`.
 
     Args:
-        request: what was asked of the record.
         missed: the best record of the length that was asked for.
         longer: one that would do, if one was found.
         most_samples: the longest experiment, if the shortest is looked for.

@@ -155,7 +155,6 @@ def accuracy_of(
     """Return the largest ratio of the model error, and each requirement with its own.
 
     Args:
-        units: of the spec.
         confidence: with alpha of r_u.
         requirements: what is asked; criteria have no ratio.
         information: M (k, k) in their coordinates.
@@ -210,7 +209,7 @@ def powers_by_kind(
 
 def powers(problem: Problem, basis: Basis, x: Array) -> Powers:
     """Return the same at the plant of the spec."""
-    return Powers(**{kind: tuple(found) for kind, found in powers_by_kind(problem, basis, x).items()})
+    return Powers.of(powers_by_kind(problem, basis, x))
 
 
 def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:

@@ -74,8 +74,6 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
     """Return what a design keeps at the plants that it is for.
 
     Args:
-        done: the design.
-        plants: all beside the plant of the spec.
         peak: None if no limit on single samples depends on the plant.
     """
     kept, units = done.kept, done.units
@@ -117,9 +115,7 @@ def plants_kept(
     """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
 
     Args:
-        units: of the spec.
-        plants: all beside the plant of the spec.
-        kept: the numbers of those that count.
+        kept: the numbers of the plants that count.
         at_each: what these keep, the plant of the spec first.
         binding: places among them.
         floors: of those that count.
@@ -261,9 +257,7 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnE
     Data are judged at their estimate, so that some are drawn.
 
     Args:
-        done: the design.
-        plants: that it is for.
-        binding: places among those that are kept, the plant of the spec being 0.
+        binding: places among the plants that are kept, the plant of the spec being 0.
     """
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
@@ -306,9 +300,8 @@ def fan_curves(
     None if no model error is bounded.
 
     Args:
-        done: the design.
         numbers: what the scenarios are called, in their order; the plant of the spec is 0.
-        active: the places of those that bind, in that order.
+        active: the places of binding plants, in that order.
     """
     problem, units = done.problem, done.units
     bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]

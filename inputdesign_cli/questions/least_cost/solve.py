@@ -80,7 +80,7 @@ class ConvexTask:
         return self._delivered().results
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Return the same, with the design tried many times on the true system; see `common.simulation`.
+        """Return this with the design tried many times on the true system; see `common.simulation`.
 
         Raises:
             SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
@@ -137,7 +137,12 @@ class ConvexTask:
             record.samples,
             redrawn(made.request, made.design, inputs, samples),
             alpha,
-            partial(self._informed(done).of_length, flat=done.design.problem.demands.definite),
+            partial(
+                self._informed(done).of_length,
+                done.experiment,
+                self.shown.ellipses,
+                flat=done.design.problem.demands.definite,
+            ),
             searching(self.foresight, record.samples, done.problem.requirements),
         )
 
@@ -190,13 +195,12 @@ class ConvexTask:
         white = design.white.informations[0] / (design.white.s if design.problem.goal == "factor" else 1.0)
         return Informed(
             self.shown.header.units,
-            done.experiment,
-            done.information,
-            np.asarray(white),
             stated or [replace(error, experiment=done.experiment) for error in self.shown.unstated],
+            done.information,
             bool(stated),
-            self.shown.ellipses,
             [design.result.active_at(i) for i, r in enumerate(done.asked) if isinstance(r, OnModelError)],
+            np.asarray(white),
+            of_several=done.plants is not None,
         )
 
     def _illustrated(
@@ -214,18 +218,17 @@ class ConvexTask:
         if not done.excites:
             return Report(outcome, tables, curves, {})
         informed = self._informed(done)
-        white = (outcome.baseline and outcome.baseline.white) or White()
+        white = White() if outcome.baseline is None else outcome.baseline.white or White()
         if not informed.stated:
             known = _known(done, record, self.record.step, own_length=False)
-        more = informed.curves(
+        kind = None if outcome.objective is None else outcome.objective.kind
+        informed = replace(
+            informed,
             record=known,
             equal=equal_white(design, done.experiment.samples, white.ratio or 0.0),
-            white_labels=white_labels(
-                outcome.objective and outcome.objective.kind, white, done.experiment.samples
-            ),
-            of_several=done.plants is not None,
-            flat=problem.demands.definite,
+            white_labels=white_labels(kind, white, done.experiment.samples),
         )
+        more = informed.curves(done.experiment, self.shown.ellipses, flat=problem.demands.definite)
         tables, curves = tables | more[0], curves | more[1]
         optimality = optimality_curves(units, design)
         if optimality is not None:
@@ -252,11 +255,11 @@ class ConvexTask:
     def _of_record(self, done: Designed, outcome: Outcome, made: Made, known: Array | None) -> Outcome:
         """Return the outcome with what a user should know before applying the record."""
         signal, record = outcome.signal, made.record
-        designed = outcome.model_error and outcome.model_error.confidence
-        findings = confidence_missed(designed, signal and signal.confidence)
+        designed = None if outcome.model_error is None else outcome.model_error.confidence
+        shares, recorded = (None, None) if signal is None else (signal.of_limits, signal.confidence)
+        findings = confidence_missed(designed, recorded)
         findings += made.findings
         limited = any(limit.upper for limit in done.design.problem.limits)
-        shares = signal and signal.of_limits
         findings += record_findings(made.request, done.experiment.samples, record, shares, of_powers=limited)
         if record is not None and known is not None and signal is not None:
             findings += _shortfall(done, record, known)
@@ -267,7 +270,7 @@ class ConvexTask:
 
 
 def _known(done: Designed, record: Record | None, step: float, *, own_length: bool = True) -> Array | None:
-    """Return the information (k, k) of the record, or of one like it as long as the design.
+    """Return the information (k, k) of the record, or of its spectrum over the length of the design.
 
     None if it leaves a parameter undetermined.
     """

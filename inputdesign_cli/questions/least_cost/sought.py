@@ -37,7 +37,7 @@ class Method:
 
     Attributes:
         tolerance: the relative gap that is proved.
-        any_spectrum_tolerance: the same for the bound over every spectrum; None leaves it out.
+        any_spectrum_tolerance: of the bound over every spectrum; None leaves it out.
         reach: how far spectra reach.
         grid: the program of the papers in place of the exchange.
         columns: a factor of few columns, see `FewColumns`.
@@ -55,9 +55,7 @@ class Sought:
     """What is asked of a design.
 
     Attributes:
-        header: of the results.
         question: in it the experiment has one sample if the length is sought.
-        cost: weights of the powers.
         alpha: sizes the confidence region of r_u; `exact` calibrates it.
         exact: None for the alpha as stated.
         most_samples: the longest experiment allowed.
@@ -152,7 +150,6 @@ class Sought:
         """Raise `InfeasibleError` (`too-long`) if the shortest experiment is longer than limits.samples.
 
         Args:
-            done: the design.
             tolerance: of the design of the longest experiment, for the message.
             of_record: whether single samples are limited, so that a record may take more.
         """

@@ -123,11 +123,7 @@ def with_worst_plants(
     """Return the design for the worst plants of the region as well, added until none is found to be missed.
 
     Args:
-        plants: that the design is for.
         region: where worse ones are searched.
-        question: that the design answers.
-        first: the design so far.
-        solve: makes another.
     """
     answer, added = first, 0
     while True:

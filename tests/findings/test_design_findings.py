@@ -1,0 +1,102 @@
+"""Findings of designs, their records and their simulations: when they hold, and short sentences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.findings import (
+    designed_records as records,
+    designs,
+    simulated_runs as runs,
+    table_spectra,
+    uncertain_plants as plants,
+    unfinished,
+)
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.outcome import Objective
+from inputdesign_cli.outcome.design import Coverage
+from inputdesign_cli.outcome.robust import FloorUse, LostPlant
+from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, Searched, TriedInput, Violations
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.signal import Record
+from tests.support.wording import long_sentences
+
+UNITS = Units("s", 1.0, sampled=True, closed_loop=True, inputs=1, outputs=1)
+MODEL = PolynomialModel.single([0.0, 1.0], F=[1.0, -0.99])
+ASKED = Coverage(100, 0.9, (0.8, 0.95), 0.9, 100, 0.9, (0.85, 0.94), asked=0.95)
+RUNS = TriedInput(within_r_adm=0.8, within_r_adm_limits=(0.7, 0.9))
+ELSEWHERE = replace(
+    RUNS,
+    on_design_model=OnDesignModel(within_r_adm=0.95),
+    theory_on_truth=RatioAt(1.3, 0.2),
+    violations=Violations(4, np.array([0.1, 0.2, 0.3]), 1.5),
+)
+LOST = FloorUse(0.3, (1, 4, 9), (4,), (LostPlant(4, {"b1": 0.2, "f1": -0.9}, 3.1),))
+MADE = Record(np.ones((40, 1)), "filtered_noise", 1.2, extra_power=3.0, met=False)
+GAP = Objective("least_cost", 2.0, lower_bound=1.9, relative_gap=0.05)
+
+FOUND = {
+    "no-excitation-needed": [designs.nothing_needed(Experiment(MODEL, 500), at_every_plant=True)],
+    "input-without-power": designs.inputs_without_power([1.0, 0.0]),
+    "experiment-short": designs.short_experiment(Experiment(MODEL, 100)),
+    "excitation-almost-free": designs.almost_free(
+        UNITS, np.array([0.01, 1.0]), np.ones(2), np.array([1e-6, 1.0]), 1.0
+    ),
+    "design-unfinished": unfinished.ended_early("gap_open", GAP),
+    "other-spectra-left-out": [unfinished.other_spectra_left_out(), *unfinished.ended_early("optimal", GAP)],
+    "no-record-in-time": [unfinished.no_record_in_time(8)],
+    "accuracy-on-grid": [unfinished.on_grid(40, 1.01)],
+    "fresh-plants-cut-short": plants.fewer_plants(10, 120),
+    "draws-unstable": plants.unstable_draws(80, 100),
+    "plants-lost": plants.floor_findings(LOST, 20)[:1],
+    "plants-at-floor": plants.floor_findings(LOST, 20)[1:],
+    "record-not-computed": records.too_long(2_000_000, 1_000_000),
+    "record-undetermined": records.accuracy_missed(replace(MADE, worst_ratio=np.inf), held=False),
+    "record-misses-accuracy": [f for h in (True, False) for f in records.accuracy_missed(MADE, held=h)],
+    "record-dear": records.length_of_record(MADE, 40, 1, {}),
+    "record-longer": records.length_of_record(MADE, 20, 1, {"rate": 0.99}),
+    "record-less-accurate": records.less_accurate(1.2, 1.0),
+    "record-misses-requirement": records.requirement_missed(["model_error"], 1.1),
+    "start-from-rest": [records.start_matters(2.0), records.start_matters(np.inf)],
+    "other-signal": [
+        records.other_signal("a multisine"),
+        records.other_spectrum(
+            "noise", "a multisine", ["limits.amplitude.input", "limits.rate"], 2.0, "cost"
+        ),
+    ],
+    "confidence-missed": [
+        *runs.confidence_missed(ASKED, ASKED),
+        *runs.runs_miss_confidence(ASKED, RUNS),
+        *runs.runs_miss_confidence(replace(ASKED, runs=None), RUNS),
+    ],
+    "other-length": runs.other_length(1, 7),
+    "initial-estimate-off": runs.initial_estimate_off(UNITS, {"design": ELSEWHERE}),
+    "runs-see-one-minimum": runs.one_minimum(Searched(10, 3, 7)),
+    "met-within-table": [table_spectra.met_within_table(1e-5)],
+}
+
+
+@pytest.mark.parametrize("code", FOUND)
+def test_a_finding_has_its_code_and_short_sentences(code):
+    assert FOUND[code]
+    assert {one.code for one in FOUND[code]} == {code}
+    assert [long_sentences(one.message) for one in FOUND[code]] == [[]] * len(FOUND[code])
+
+
+def test_what_is_in_order_is_not_noted():
+    good = replace(MADE, met=True, extra_power=0.1)
+    assert designs.inputs_without_power([1.0, 0.5]) == []
+    assert designs.short_experiment(Experiment(MODEL, 1000)) == []
+    assert plants.fewer_plants(120, 120) == plants.unstable_draws(40, 100) == []
+    assert plants.floor_findings(None, 20) == []
+    assert records.too_long(500, 500) == records.accuracy_missed(good, held=True) == []
+    assert records.length_of_record(good, 40, 1, {}) == records.less_accurate(1.001, 1.0) == []
+    assert runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None) == []
+    assert runs.other_length(7, 7) == runs.one_minimum(None) == []
+
+
+def test_one_sample_is_singular():
+    assert "counts 1 sample," in runs.other_length(1, 7)[0].message
+    assert "counts 0 samples," in runs.other_length(0, 7)[0].message
