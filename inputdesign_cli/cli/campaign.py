@@ -8,22 +8,11 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.computing import computing
-from inputdesign_cli.cli.data import levels, named
-from inputdesign_cli.cli.options import (
-    Columns,
-    Confine,
-    Figures,
-    Json,
-    OperatingPoint,
-    Output,
-    Overrides,
-    Overwrite,
-    Quiet,
-    SpecFile,
-)
+from inputdesign_cli.cli.options import Changes, Figures, Json, Output, Overwrite, Quiet, Shown, SpecFile
 from inputdesign_cli.cli.reading import name_of, read_spec
+from inputdesign_cli.cli.rows import Columns, OperatingPoint, levels, named
 from inputdesign_cli.cli.run import Place, keep, renew
+from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 
 CampaignDirectory = Annotated[
@@ -56,8 +45,8 @@ _EXIT = {"running": EXIT_DONE, "stopped": EXIT_DONE, "missed": EXIT_MISSED, "und
 
 def campaign(
     spec: SpecFile,
-    overrides: Overrides = None,
-    confine: Confine = None,
+    *,
+    changes: Changes,
     output: Output = None,
     overwrite: Overwrite = False,
     figures: Figures = True,
@@ -75,10 +64,10 @@ def campaign(
         from inputdesign_cli import questions
         from inputdesign_cli.questions.campaign.directory import begun
 
-        stated = read_spec(spec, overrides, confine)
+        stated = read_spec(spec, changes)
         place = place.checked(stated)
         results = begun(partial(questions.next_round, stated), stated.resolve_path("."), place.directory)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, Shown(figures, json_output=json_output, quiet=quiet))
 
 
 def proceed(
@@ -130,7 +119,7 @@ def proceed(
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
             if not figures:
                 results = with_earlier_pictures(results, directory)
-        renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
+        renew(results, directory, Shown(figures, json_output=json_output, quiet=quiet))
     code = _EXIT[results.result["status"]]
     if code:
         raise typer.Exit(code)

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from inputdesign_cli.cli.data import named
+from inputdesign_cli.cli.rows import named
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
