@@ -5,29 +5,47 @@ Nothing heavy is imported here or at the top of a command's file: `idesign --hel
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer.core import TyperCommand, TyperOption
 
 from inputdesign_cli.cli.campaign import campaign, proceed, status
 from inputdesign_cli.cli.check import check
-from inputdesign_cli.cli.data import assess, identify
-from inputdesign_cli.cli.designs import analyse, simulate, solve
-from inputdesign_cli.cli.examples import examples
-from inputdesign_cli.cli.explore import explore
-from inputdesign_cli.cli.init import init
-from inputdesign_cli.cli.once import OnceCommand
-from inputdesign_cli.cli.reference import explain, schema
-from inputdesign_cli.cli.report import report
+from inputdesign_cli.cli.data import assess, explore, identify
+from inputdesign_cli.cli.designs import analyse, simulate, solve, validate
+from inputdesign_cli.cli.options import unfolded
+from inputdesign_cli.cli.reference import examples, explain, init, schema
 from inputdesign_cli.cli.signal import signal
 from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
-from inputdesign_cli.cli.validate import validate
-from inputdesign_cli.cli.watch import watch
+from inputdesign_cli.cli.watch import report, watch
 from inputdesign_cli.cli.wizard import wizard
 from inputdesign_cli.compute.threads import use_one_thread
 from inputdesign_cli.version import __version__
+
+if TYPE_CHECKING:
+    from typer._click import Context
+
+
+class OnceCommand(TyperCommand):
+    """Refuses options that stand there twice, unless they are repeatable."""
+
+    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
+        """What typer makes of the arguments.
+
+        Raises:
+            typer.BadParameter: An option that takes one value has several.
+        """
+        _, _, stated = self.make_parser(ctx).parse_args(args=list(args))
+        for option in stated:
+            single = isinstance(option, TyperOption) and not (option.multiple or option.is_flag)
+            if single and stated.count(option) > 1 and not ctx.resilient_parsing:  # as of completions
+                message = "it stands there twice, and takes one value: leave one of them out"
+                raise typer.BadParameter(message, param_hint=option.opts[0])
+        return super().parse_args(ctx, args)
+
 
 app = typer.Typer(
     name="idesign",
@@ -85,7 +103,7 @@ COMMANDS = (
 _NAMES = {"proceed": "next"}
 for command in COMMANDS:
     once = OnceCommand if command is signal else None
-    app.command(_NAMES.get(command.__name__), cls=once)(guarded(command))
+    app.command(_NAMES.get(command.__name__), cls=once)(guarded(unfolded(command)))
 
 
 def main() -> None:

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.computing import computing
-from inputdesign_cli.cli.data import levels, named, written
-from inputdesign_cli.cli.options import (
-    Columns,
-    Confine,
-    Decimal,
-    Figures,
-    Json,
-    OperatingPoint,
-    Output,
-    Overrides,
-    Overwrite,
-    Quiet,
-    Separator,
-    SpecFile,
-    TimeFormat,
-)
+from inputdesign_cli.cli.options import Changes, Figures, Json, Output, Overwrite, Quiet, Shown, SpecFile
 from inputdesign_cli.cli.reading import name_of, read_spec
+from inputdesign_cli.cli.rows import OperatingPoint, Written, levels
 from inputdesign_cli.cli.run import Place, keep, renew
+from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 
 CampaignDirectory = Annotated[
@@ -59,8 +46,8 @@ _EXIT = {"running": EXIT_DONE, "stopped": EXIT_DONE, "missed": EXIT_MISSED, "und
 
 def campaign(
     spec: SpecFile,
-    overrides: Overrides = None,
-    confine: Confine = None,
+    *,
+    changes: Changes,
     output: Output = None,
     overwrite: Overwrite = False,
     figures: Figures = True,
@@ -78,23 +65,21 @@ def campaign(
         from inputdesign_cli import questions
         from inputdesign_cli.questions.campaign.directory import begun
 
-        stated = read_spec(spec, overrides, confine)
+        stated = read_spec(spec, changes)
         place = place.checked(stated)
         results = begun(partial(questions.next_round, stated), stated.resolve_path("."), place.directory)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, Shown(figures, json_output=json_output, quiet=quiet))
 
 
 def proceed(
     directory: CampaignDirectory,
     data: Recorded = None,
+    *,
     withdraw: Withdraw = None,
     as_applied: AsApplied = False,
     regardless: Regardless = False,
-    columns: Columns = "",
+    written: Written,
     operating_point: OperatingPoint = "",
-    separator: Separator = None,
-    decimal: Decimal = None,
-    time_format: TimeFormat = None,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -115,7 +100,6 @@ def proceed(
         from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
         from inputdesign_cli.questions.campaign.pictures import with_earlier_pictures
-        from inputdesign_cli.records import Preparation
         from inputdesign_cli.specification import parse_spec
 
     with held(directory):
@@ -128,16 +112,12 @@ def proceed(
             elif data is None:
                 results = advanced(decide, memory, None, None, regardless=regardless)
             else:
-                point = levels(operating_point)
-                taken = Preparation(
-                    columns=named(columns, "--columns", "u1=Heater 1,y1=4"), operating_point=point
-                )
-                taken = written(taken, separator, decimal, time_format)
+                taken = replace(written.preparation(), operating_point=levels(operating_point))
                 part = questions.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
             if not figures:
                 results = with_earlier_pictures(results, directory)
-        renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
+        renew(results, directory, Shown(figures, json_output=json_output, quiet=quiet))
     code = _EXIT[results.result["status"]]
     if code:
         raise typer.Exit(code)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.examples import shipped
 from inputdesign_cli.cli.options import Json, Quiet
+from inputdesign_cli.cli.reference import shipped
 from inputdesign_cli.cli.terminal import aligned, status
 from inputdesign_cli.errors import EXIT_MISSED, DataError, IdesignError
 

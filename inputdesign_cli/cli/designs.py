@@ -1,34 +1,35 @@
-"""`idesign solve`, `idesign analyse` and `idesign simulate`: a spec in, a run out."""
+"""`idesign solve`, `idesign analyse` and `idesign simulate`: a spec in, a run out; and `idesign validate`."""
 
 from __future__ import annotations
 
+import json
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.options import (
-    Confine,
+    Changes,
     Fast,
-    FigureFormat,
-    Figures,
     Json,
     KeepPartial,
     NoOutput,
     Output,
-    Overrides,
     Overwrite,
     Quiet,
+    Shown,
     SpecFile,
+    Workers,
 )
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.streams import ending_early
-from inputdesign_cli.cli.trade import TradeWords, tell_trade
-from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
+from inputdesign_cli.cli.terminal import computing
+from inputdesign_cli.cli.trade import TradeWords, show_trade
 from inputdesign_cli.compute.time_limit import stoppable
-from inputdesign_cli.errors import STANDARD_STREAM
+from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -38,18 +39,15 @@ if TYPE_CHECKING:
 
 def solve(
     spec: SpecFile,
-    overrides: Overrides = None,
-    confine: Confine = None,
+    *,
+    changes: Changes,
     output: Output = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
     keep_partial: KeepPartial = False,
     fast: Fast = False,
     trade: TradeWords = None,
-    figures: Figures = True,
-    figure_format: FigureFormat = "png",
-    json_output: Json = False,
-    quiet: Quiet = False,
+    shown: Shown,
 ) -> None:
     """Design the experiment that a spec asks for.
 
@@ -61,44 +59,27 @@ def solve(
         message = "--trade needs a spec on disc and a directory to write, and does not go with --keep-partial"
         raise typer.BadParameter(message)
     if fast:
-        overrides = [*(overrides or []), "solver.any_spectrum=false"]
-    if not keep_partial:
-        results, place = _results("solve", place, overrides, confine, quiet)
-        keep(
-            results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet
-        )
-        if trade:
-            read = read_spec(spec, overrides, confine)
-            beside = place.directory.with_name(f"{place.directory.name}-trade")
-            tell_trade(
-                spec,
-                read,
-                trade.split(","),
-                beside,
-                overrides=overrides or [],
-                confine=confine,
-                figure_format=figure_format,
-                quiet=quiet or json_output,
-            )
-        return
-    with stoppable() as stop, ending_early(stop) as came:
-        results, place = _results("solve", place, overrides, confine, quiet)
-    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
+        changes = replace(changes, overrides=[*(changes.overrides or []), "solver.any_spectrum=false"])
+    came: list[int] = []
+    with ExitStack() as stack:
+        if keep_partial:
+            came = stack.enter_context(ending_early(stack.enter_context(stoppable())))
+        results, place = _results("solve", place, changes, shown.quiet)
+    keep(results, place, shown)
+    if trade:
+        show_trade(spec, read_spec(spec, changes), trade.split(","), place.directory, changes, shown)
     if came:
         raise typer.Exit(128 + came[0])
 
 
 def analyse(
     spec: SpecFile,
-    overrides: Overrides = None,
-    confine: Confine = None,
+    *,
+    changes: Changes,
     output: Output = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
-    figures: Figures = True,
-    figure_format: FigureFormat = "png",
-    json_output: Json = False,
-    quiet: Quiet = False,
+    shown: Shown,
 ) -> None:
     """Tell what accuracy a given excitation buys.
 
@@ -106,24 +87,19 @@ def analyse(
     directory and prints a summary.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
-    results, place = _results("analyse", place, overrides, confine, quiet)
-    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
+    results, place = _results("analyse", place, changes, shown.quiet)
+    keep(results, place, shown)
 
 
 def simulate(
     spec: SpecFile,
-    overrides: Overrides = None,
-    confine: Confine = None,
+    *,
+    changes: Changes,
     output: Output = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
-    jobs: Jobs = 1,
-    cluster: ClusterAddress = None,
-    worker_timeout: WorkerTimeout = None,
-    figures: Figures = True,
-    figure_format: FigureFormat = "png",
-    json_output: Json = False,
-    quiet: Quiet = False,
+    workers: Workers,
+    shown: Shown,
 ) -> None:
     """Try the designed experiment on the true system, many times.
 
@@ -132,21 +108,53 @@ def simulate(
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
-    results, place = _results(
-        "simulate", place, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
-    )
-    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
+    computes = workers.executor(quiet=shown.quiet)
+    results, place = _results("simulate", place, changes, shown.quiet, computes)
+    keep(results, place, shown)
+
+
+def validate(
+    specs: Annotated[list[Path], typer.Argument(metavar="SPEC...", help="The specs to check, YAML files.")],
+    *,
+    changes: Changes,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Check specs without computing a design.
+
+    A valid spec can be read and is well posed. One that states nothing of a design (accuracy, limits,
+    spectrum, ..) is checked for what `identify` needs. All problems of all files are reported at once.
+    """
+    from inputdesign_cli import questions
+
+    errors: list[IdesignError] = []
+    estimated: list[Path] = []
+    for path in specs:
+        try:
+            spec = read_spec(path, changes, design=None)
+            questions.validate(spec)
+        except IdesignError as error:
+            errors.append(error)
+        else:
+            estimated += [] if spec.asks_for_design else [path]
+            if not quiet and not json_output:
+                typer.echo(
+                    f"{path}: valid" + ("" if spec.asks_for_design else " for identify; no design is asked")
+                )
+    if errors:
+        worst = max(errors, key=lambda error: error.exit_code)
+        raise type(worst)([diagnostic for error in errors for diagnostic in error.diagnostics])
+    if json_output:
+        found = {"valid": [str(path) for path in specs]}
+        if estimated:
+            found["for_identify_only"] = [str(path) for path in estimated]
+        typer.echo(json.dumps(found, indent=1, ensure_ascii=False))
 
 
 def _results(
-    verb: Verb,
-    place: Place,
-    overrides: list[str] | None,
-    confine: Path | None,
-    quiet: bool,
-    executor: Executor | None = None,
+    verb: Verb, place: Place, changes: Changes, quiet: bool, executor: Executor | None = None
 ) -> tuple[Results, Place]:
-    """What a verb makes of a spec file for its place, which is looked at before.
+    """Return what a verb makes of a spec file, and its place, which is checked before.
 
     The numerical libraries are imported behind the message.
     """
@@ -154,6 +162,6 @@ def _results(
     with computing(file, quiet=quiet):
         from inputdesign_cli.questions.verbs import run_verb
 
-        spec = read_spec(file, overrides, confine)
+        spec = read_spec(file, changes)
         place = place.checked(spec)
         return run_verb(verb, spec, executor), place

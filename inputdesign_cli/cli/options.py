@@ -1,15 +1,56 @@
-"""Arguments and options that several commands share, so that they read the same everywhere."""
+"""Arguments and options that several commands share, so that they read the same everywhere.
+
+A parameter of a command whose type is a dataclass of this file stands for an option for each of its fields.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
+
+if TYPE_CHECKING:
+    from inputdesign_cli.compute.executor import Executor
+
+
+def unfolded(command: Callable[..., None]) -> Callable[..., None]:
+    """Return the command with an option for each field of its parameters that are dataclasses."""
+    hints = get_type_hints(command, include_extras=True)
+    groups = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    parameters: list[Parameter] = []
+    for parameter in signature(command).parameters.values():
+        if parameter.name not in groups:
+            parameters.append(parameter.replace(annotation=hints[parameter.name]))
+            continue
+        kind = hints[parameter.name]
+        types = get_type_hints(kind, include_extras=True)
+        for one in fields(kind):
+            default = Parameter.empty if one.default is MISSING else one.default
+            parameters.append(
+                Parameter(one.name, Parameter.KEYWORD_ONLY, default=default, annotation=types[one.name])
+            )
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        made = {
+            name: kind(**{one.name: given.pop(one.name) for one in fields(kind)})
+            for name, kind in groups.items()
+        }
+        command(**given, **made)
+
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    run.__dict__["__signature__"] = Signature(
+        [one.replace(kind=Parameter.KEYWORD_ONLY) for one in parameters]
+    )
+    return run
 
 
 def one_of(words: Sequence[str], help_text: str) -> Any:
@@ -43,88 +84,6 @@ Confine = Annotated[
         exists=True,
         file_okay=False,
         help="Refuse a spec that names files outside DIR (links followed).",
-    ),
-]
-DataFiles = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="DATA...",
-        help="Records of experiments with columns u and y, estimated jointly: CSV, TSV, .mat, .npz, and with "
-        "the extra data parquet and Excel.",
-    ),
-]
-OperatingPoint = Annotated[
-    str,
-    typer.Option(
-        "--operating-point",
-        metavar="u1=..,y1=..",
-        help="What channels vary about, such as u1=40,y1=52.3; it is subtracted. For inputs the default is "
-        "signal.offset.",
-    ),
-]
-Means = Annotated[
-    bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")
-]
-Columns = Annotated[
-    str,
-    typer.Option(
-        "--columns",
-        metavar="u1=..,y1=..",
-        help="Which column holds which channel, by name or number: u1=Heater 1,y1=4,time=1.",
-    ),
-]
-SampleTime = Annotated[
-    float | None,
-    typer.Option("--sample-time", metavar="T", help="Time between rows, where the file does not tell it."),
-]
-TimeUnit = Annotated[
-    str | None,
-    typer.Option("--time-unit", metavar="UNIT", help="Of the times in the file: s, ms, us, min, h or d."),
-]
-Resample = Annotated[
-    bool,
-    typer.Option(
-        "--resample",
-        help="Even out times that jitter by more than 25 % of the sample time, too; join columns that were "
-        "written at different times.",
-    ),
-]
-DetrendWord = Annotated[
-    str,
-    one_of(("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"),
-]
-Skip = Annotated[
-    int, typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of data of every file.")
-]
-Span = Annotated[
-    str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
-]
-Without = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--without",
-        metavar="ROWS",
-        help="Leave out these rows, as notes number them, such as 183-240,310; the record is cut there. Of "
-        "several files: log1.csv:183-240. Repeatable.",
-    ),
-]
-Separator = Annotated[
-    str | None,
-    typer.Option(
-        "--sep",
-        metavar="MARK",
-        help="What separates the columns of a text file: , ; tab blank or another mark.",
-    ),
-]
-Decimal = Annotated[
-    str | None, typer.Option("--decimal", metavar="MARK", help="The decimal mark of the file: . or ,")
-]
-TimeFormat = Annotated[
-    str | None,
-    typer.Option(
-        "--time-format",
-        metavar="FORM",
-        help="How dates and times are written, as %d.%m.%Y %H:%M:%S or %Y%m%d%H%M%S.",
     ),
 ]
 Overrides = Annotated[
@@ -198,3 +157,64 @@ Figures = Annotated[
 FigureFormat = Annotated[
     str, one_of(("png", "svg", "pdf"), "The format of the figures; svg and pdf can be scaled")
 ]
+Jobs = Annotated[
+    int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core.")
+]
+ClusterAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Compute on the Dask cluster at this address, tcp://HOST:PORT or tls://HOST:PORT. Without TLS "
+        "anybody who reaches it can run programs there and here (docs/security.md).",
+    ),
+]
+WorkerTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--worker-timeout",
+        metavar="SECONDS",
+        min=0.0,
+        help="Give up when the cluster has been without workers for so long; the default is to wait.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What is changed in a spec, and which files it may name."""
+
+    overrides: Overrides = None
+    confine: Confine = None
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is drawn and printed of a run."""
+
+    figures: Figures = True
+    figure_format: FigureFormat = "png"
+    json_output: Json = False
+    quiet: Quiet = False
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where a command computes: in its own process, in several, or on a cluster."""
+
+    jobs: Jobs = 1
+    cluster: ClusterAddress = None
+    worker_timeout: WorkerTimeout = None
+
+    def executor(self, *, quiet: bool) -> Executor:
+        """Return what computes; an address comes first."""
+        from inputdesign_cli.compute.cluster import Cluster
+        from inputdesign_cli.compute.executor import InProcess
+        from inputdesign_cli.compute.processes import Processes
+
+        if self.cluster is not None:
+            tell = (lambda text: None) if quiet else (lambda text: typer.echo(text, err=True))
+            return Cluster(self.cluster, worker_timeout=self.worker_timeout, tell=tell)
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        count = self.jobs or cores
+        return Processes(count) if count > 1 else InProcess()

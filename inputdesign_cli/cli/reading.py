@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from inputdesign_cli.cli.options import Changes
 from inputdesign_cli.errors import STANDARD_STREAM, bad_spec
 
 if TYPE_CHECKING:
     from inputdesign_cli.specification import Spec
 
 
-def read_spec(
-    file: Path, overrides: Sequence[str] | None, confine: Path | None, *, design: bool | None = True
-) -> Spec:
-    """The spec in a file; `-` is standard input, whose names of files are relative to the current folder.
+def read_spec(file: Path, changes: Changes, *, design: bool | None = True) -> Spec:
+    """Return the spec in a file; in standard input (`-`) names are relative to the current folder.
 
     Args:
         design: whether it must ask for a design, None: if it states anything of one; see `load_spec`.
@@ -26,15 +24,14 @@ def read_spec(
     """
     from inputdesign_cli import specification
 
+    overrides, confine = changes.overrides or (), changes.confine
     if str(file) != STANDARD_STREAM:
-        return specification.load_spec(file, overrides or (), confine=confine, design=design)
-    return specification.parse_spec(
-        standard_input(), "<stdin>", overrides or (), confine=confine, design=design
-    )
+        return specification.load_spec(file, overrides, confine=confine, design=design)
+    return specification.parse_spec(standard_input(), "<stdin>", overrides, confine=confine, design=design)
 
 
 def standard_input() -> str:
-    """The text of a spec on standard input.
+    """Return the text of a spec on standard input.
 
     Raises:
         SpecError: it is closed, too large, or no text.
@@ -50,5 +47,5 @@ def standard_input() -> str:
 
 
 def name_of(file: Path) -> str:
-    """What a spec is called in the names of directories."""
+    """Return the name of a spec in names of directories."""
     return "stdin" if str(file) == STANDARD_STREAM else file.stem

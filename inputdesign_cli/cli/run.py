@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from inputdesign_cli.cli.options import Shown
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.regular_file import read_regular
@@ -48,7 +49,7 @@ class Place:
         return Origin(self.sources, self.asked, self.overwrite, self.judges)
 
     def checked(self, spec: Spec | None) -> Place:
-        """The same for the run of a spec that was read; to be asked for before anything is computed.
+        """Return the place for the run of a spec that was read, before anything is computed.
 
         Raises:
             OutputError: the directory cannot take the run, see `check_place`, and `output-is-the-spec`.
@@ -61,10 +62,10 @@ class Place:
         return place
 
     def spared(self, spec: str) -> str:
-        """The `spec.yaml` of the run: the user's own text where the spec is that of the directory itself.
+        """Return the `spec.yaml` of the run: the user's own text where it is the spec itself.
 
         Args:
-            spec: what it would be otherwise.
+            spec: the text of the run otherwise.
 
         Raises:
             OutputError: `output-is-the-spec`, it would say something else.
@@ -87,17 +88,8 @@ class Place:
         return text
 
 
-def keep(
-    results: Results,
-    place: Place,
-    *,
-    figures: bool,
-    figure_format: str = "png",
-    json_output: bool,
-    quiet: bool,
-    page: bool = False,
-) -> None:
-    """Write a run to its place, with figures or without, and print its result or its summary.
+def keep(results: Results, place: Place, shown: Shown, *, page: bool = False) -> None:
+    """Write a run to its place, and print its result or its summary.
 
     Args:
         page: whether the page about it is written as well.
@@ -106,83 +98,58 @@ def keep(
         OutputError: as `write_run`, and `output-is-the-spec`.
     """
     if place.nowhere:
-        show(results, [], json_output=json_output, quiet=quiet)
+        _show(results, [], shown)
         return
     results = replace(results, resolved_spec=place.spared(results.resolved_spec))
-    renew(
-        results,
-        place.directory,
-        place.origin,
-        figures=figures,
-        figure_format=figure_format,
-        json_output=json_output,
-        quiet=quiet,
-        page=page,
-    )
+    renew(results, place.directory, shown, place.origin, page=page)
 
 
 def renew(
-    results: Results,
-    directory: Path,
-    origin: Origin | None = None,
-    *,
-    figures: bool,
-    figure_format: str = "png",
-    json_output: bool,
-    quiet: bool,
-    page: bool = False,
+    results: Results, directory: Path, shown: Shown, origin: Origin | None = None, *, page: bool = False
 ) -> None:
     """Write a run directory, and print its result or its summary.
 
     Args:
-        origin: what the run is made from; None for one that goes on with what is in the directory.
+        origin: what the run is made from; None for a run that goes on with what is in the directory.
         page: whether the page about it is written as well.
 
     Raises:
         OutputError: as `write_run`.
     """
-    with status(f"{directory}: writing ...", quiet=quiet):
+    with status(f"{directory}: writing ...", quiet=shown.quiet):
         from inputdesign_cli.outcome.origin import has_other_values
-        from inputdesign_cli.outcome.run_directory import write_run
+        from inputdesign_cli.outcome.run_directory import replace_text, write_run
 
         drawings = {}
-        if figures:
+        if shown.figures:
             from inputdesign_cli.figures.plots import draw_all
 
-            drawings = draw_all(results, figure_format)
+            drawings = draw_all(results, shown.figure_format)
         replaced = has_other_values(directory, results.resolved_spec)
         files = write_run(results, directory, drawings, origin=origin)
         if page:
-            files = [_page(directory), *files]
-    show(results, files, replaced=replaced, json_output=json_output, quiet=quiet)
+            from inputdesign_cli.outcome.record import PAGE
+            from inputdesign_cli.report.render import report_text
+
+            replace_text(directory / PAGE, report_text(directory))
+            files = [directory / PAGE, *files]
+    _show(results, files, shown, replaced=replaced)
 
 
-def _page(directory: Path) -> Path:
-    """The page about the run in a directory, written anew."""
-    from inputdesign_cli.outcome.record import PAGE
-    from inputdesign_cli.outcome.run_directory import replace_text
-    from inputdesign_cli.report.render import report_text
-
-    replace_text(directory / PAGE, report_text(directory))
-    return directory / PAGE
-
-
-def show(
-    results: Results, files: Sequence[Path], *, replaced: bool = False, json_output: bool, quiet: bool
-) -> None:
+def _show(results: Results, files: Sequence[Path], shown: Shown, *, replaced: bool = False) -> None:
     """Print the result as it was written, if it was, or its summary.
 
     Args:
         replaced: whether a run with other values stood there before.
     """
-    if json_output and files:
+    if shown.json_output and files:
         typer.echo(read_regular(files[-1]).decode(), nl=False)
-    elif json_output:
+    elif shown.json_output:
         from inputdesign_cli.outcome.run_directory import finished_result
         from inputdesign_cli.outcome.text_formats import json_text
 
         typer.echo(json_text(finished_result(results)), nl=False)
-    elif not quiet:
+    elif not shown.quiet:
         from inputdesign_cli.cli.summary import summary
 
         typer.echo(summary(results.outcome, results.time_unit, files, replaced=replaced))

@@ -3,28 +3,44 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Confine, FigureFormat, Json, Quiet, SpecFile, SweepOutput, one_of
+from inputdesign_cli.cli.options import (
+    Confine,
+    FigureFormat,
+    Json,
+    Quiet,
+    SpecFile,
+    SweepOutput,
+    Workers,
+    one_of,
+)
 from inputdesign_cli.cli.reading import name_of, standard_input
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
-from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.sweeps.running import Listing, SweepSummary
+    from inputdesign_cli.sweeps.running import Listing, Progress, SweepSummary
 
 VERBS = ("solve", "analyse", "simulate")
 
 
-def sweep(
-    spec: SpecFile,
+@dataclass(frozen=True)
+class Asked:
+    """What is swept, and how failures count."""
+
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -34,24 +50,26 @@ def sweep(
             "Repeatable; joins and replaces what the spec has under `sweep`.",
             autocompletion=spec_keys,
         ),
-    ] = None,
+    ] = None
     zipped: Annotated[
         bool, typer.Option("--zip", help="Take the values side by side, not in every combination.")
-    ] = False,
-    confine: Confine = None,
-    output: SweepOutput = None,
+    ] = False
+    confine: Confine = None
+    output: SweepOutput = None
     overwrite: Annotated[
         bool,
         typer.Option(
             "--overwrite", help="Replace the table of a sweep of another spec, other keys or another command."
         ),
-    ] = False,
-    verb: Annotated[
-        str, one_of(("solve", "analyse", "simulate"), "The command to run at every point")
-    ] = "solve",
-    jobs: Jobs = 1,
-    cluster: ClusterAddress = None,
-    worker_timeout: WorkerTimeout = None,
+    ] = False
+    verb: Annotated[str, one_of(VERBS, "The command to run at every point")] = "solve"
+
+
+def sweep(
+    spec: SpecFile,
+    *,
+    asked: Asked,
+    workers: Workers,
     fail_fast: Annotated[
         bool,
         typer.Option(
@@ -80,47 +98,60 @@ def sweep(
     """
     from inputdesign_cli.sweeps import running as batch
 
-    directory = output or Path("runs") / f"{name_of(spec)}-sweep"
-    text = None
-    if str(spec) == STANDARD_STREAM:
-        spec, text = Path("<stdin>"), standard_input()
+    directory = asked.output or Path("runs") / f"{name_of(spec)}-sweep"
+    stdin = str(spec) == STANDARD_STREAM
     common: dict[str, Any] = {
+        "spec": Path("<stdin>") if stdin else spec,
+        "settings": asked.settings or [],
         "directory": directory,
-        "zipped": zipped,
-        "verb": verb,
-        "confine": confine,
-        "text": text,
+        "zipped": asked.zipped,
+        "verb": asked.verb,
+        "confine": asked.confine,
+        "text": standard_input() if stdin else None,
     }
     if dry_run:
-        _list(batch.list_points(spec, settings or [], **common), json_output=json_output)
+        _list(batch.list_points(**common), json_output=json_output)
         return
-    from inputdesign_cli.cli.progress import ProgressLine
-
-    line = ProgressLine(quiet=quiet)
-    try:
+    with _watched(directory, quiet=quiet) as line:
         done = batch.run_sweep(
-            spec,
-            settings or [],
             **common,
-            executor=executor(jobs, cluster, worker_timeout, quiet=quiet),
+            executor=workers.executor(quiet=quiet),
             fail_fast=fail_fast,
             rerun_failed=rerun_failed,
             figures=plots,
             figure_format=figure_format,
-            overwrite=overwrite,
+            overwrite=asked.overwrite,
             watch=line,
         )
-    except (KeyboardInterrupt, SystemExit):  # Ctrl-C, SIGTERM
+    _show(done, json_output=json_output, quiet=quiet)
+
+
+@contextmanager
+def _watched(directory: Path, *, quiet: bool) -> Iterator[ProgressLine]:
+    """Show how far a sweep is; where it is ended by Ctrl-C or SIGTERM, say how to finish it."""
+    line = ProgressLine(quiet=quiet)
+    try:
+        yield line
+    except (KeyboardInterrupt, SystemExit):
         line.close()
         if not quiet:
             typer.echo(f"what is done is in {directory}; the same command finishes the rest", err=True)
         raise
     finally:
         line.close()
+
+
+def _show(done: SweepSummary, *, json_output: bool, quiet: bool) -> None:
+    """Print what a sweep has come to.
+
+    Raises:
+        typer.Exit: a point ended by a mistake in the program, or its worker was lost.
+        IdesignError: the first failure, where no point has a result.
+    """
     for why in () if quiet else done.damaged:
         typer.echo(f"note: {why}; the point was computed again", err=True)
     if json_output:
-        typer.echo(read_regular(directory / "sweep.json").decode(), nl=False)
+        typer.echo(read_regular(done.directory / "sweep.json").decode(), nl=False)
     elif not quiet:
         typer.echo(_summary(done))
     if done.statuses.get("error") or done.statuses.get("lost"):
@@ -134,13 +165,54 @@ def _list(points: Iterable[Listing], *, json_output: bool) -> None:
         content = [point._asdict() for point in points]
         typer.echo(json.dumps(content, indent=1, ensure_ascii=False))
         return
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for point in points:
-        counts[point.status] = counts.get(point.status, 0) + 1
+        counts[point.status] += 1
         settings = "  ".join(f"{key}={text}" for key, text in point.settings.items())
         typer.echo(f"{point.status:8} {point.key}  {settings}")
     listed = ", ".join(f"{n} {status}" for status, n in counts.items())
     typer.echo(f"\n{sum(counts.values())} points: {listed}")
+
+
+class ProgressLine:
+    """Shows progress on stderr, if anybody is looking; call it with each `Progress`, and `close` it."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._started = time.monotonic()
+        self._bar = None
+        if sys.stderr.isatty() and not quiet:
+            from rich import progress
+            from rich.console import Console
+
+            columns = (progress.BarColumn(24), progress.MofNCompleteColumn(), "{task.description}")
+            self._bar = progress.Progress(*columns, console=Console(stderr=True), transient=True)
+            self._task = self._bar.add_task("", total=None)
+            self._bar.start()
+            # A sweep may be killed at any moment, and nobody would bring a hidden cursor back.
+            self._bar.console.show_cursor(True)
+
+    def __call__(self, progress: Progress) -> None:
+        """Tell how far the sweep is."""
+        if self._bar is not None:
+            told = pace(progress, time.monotonic() - self._started)
+            self._bar.update(self._task, completed=progress.passed, total=progress.total, description=told)
+
+    def close(self) -> None:
+        """Clear the line."""
+        if self._bar is not None:
+            self._bar.stop()
+
+
+def pace(progress: Progress, seconds: float) -> str:
+    """The rate, the time left and the failures. Points done before do not count as speed."""
+    told = []
+    if progress.computed and seconds > 0:
+        rate = progress.computed / seconds
+        left = timedelta(seconds=round((progress.total - progress.passed) / rate))
+        told.append(f"{rate:.3g} points/s  {left} left")
+    if progress.failed:
+        told.append(f"{progress.failed} without a result")
+    return "  ".join(told)
 
 
 def _summary(done: SweepSummary) -> str:

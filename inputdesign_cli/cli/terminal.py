@@ -6,22 +6,26 @@ import json
 import os
 import shutil
 import sys
+import time
 import traceback
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from io import StringIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
 from inputdesign_cli.compute.interruptions import bare_interruptions
+from inputdesign_cli.compute.watching import Counted, Round, watching
 from inputdesign_cli.errors import EXIT_INTERRUPTED, Diagnostic, IdesignError, OutputError
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
+_PATIENCE = 2.0  # seconds after which it is told how far a computation is
 _ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
@@ -117,6 +121,24 @@ def status(text: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
 
     with Console(stderr=True).status(Text(text)) as line:
         yield lambda text: line.update(Text(text))
+
+
+@contextmanager
+def computing(about: Path | str, *, quiet: bool, doing: str = "computing") -> Iterator[None]:
+    """Show on stderr, if anybody is looking, what is computed inside, and after a while how far it is.
+
+    Args:
+        about: the file, or what else it is about.
+    """
+    with status(f"{about}: {doing} ...", quiet=quiet) as show:
+        started = time.monotonic()
+
+        def told(done: Round | Counted) -> None:
+            if time.monotonic() - started > _PATIENCE:
+                show(f"{about}: {done} ...")
+
+        with watching(told):
+            yield
 
 
 def aligned(

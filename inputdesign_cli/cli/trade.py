@@ -1,4 +1,4 @@
-"""`idesign solve --trade`: what more or less time and amplitude would buy."""
+"""`idesign solve --trade`: a sweep that shows what more or less time and amplitude would buy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.computing import computing
+from inputdesign_cli.cli.options import Changes, Shown, Workers
+from inputdesign_cli.cli.terminal import aligned, computing
 
 if TYPE_CHECKING:
     from inputdesign_cli.figures.trade import Trade
@@ -37,42 +38,41 @@ TradeWords = Annotated[
 ]
 
 
-def tell_trade(
-    file: Path,
-    spec: Spec,
-    words: Sequence[str],
-    directory: Path,
-    *,
-    overrides: Sequence[str],
-    confine: Path | None,
-    figure_format: str = "png",
-    quiet: bool,
-) -> Trade:
-    """Run the sweep, draw the trade into its directory, and print the table."""
+def show_trade(
+    file: Path, spec: Spec, words: Sequence[str], run: Path, changes: Changes, shown: Shown
+) -> None:
+    """Sweep in a directory next to that of the run, draw the trade, and print its table."""
+    quiet, directory = shown.quiet or shown.json_output, run.with_name(f"{run.name}-trade")
     with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
         from inputdesign_cli.figures.sweep_figures import draw_into
+        from inputdesign_cli.figures.sweep_table import read_sweep
         from inputdesign_cli.figures.trade import draw_trade
-        from inputdesign_cli.sweeps.trade import run_trade
+        from inputdesign_cli.sweeps.running import run_sweep
+        from inputdesign_cli.sweeps.trade import trade_of, trade_settings
 
-        found = run_trade(
-            file, spec, words, directory, overrides=overrides, confine=confine, figure_format=figure_format
+        run_sweep(
+            file,
+            [*(changes.overrides or []), *trade_settings(spec, words)],
+            directory=directory,
+            confine=changes.confine,
+            executor=Workers(jobs=0).executor(quiet=quiet),
+            figure_format=shown.figure_format,
+            overwrite=True,  # the directory belongs to the run, whatever was traded there before
         )
-        drawn = draw_into(directory, "trade", lambda page: draw_trade(found, page), figure_format)
+        found = trade_of(read_sweep(directory), spec)
+        drawn = draw_into(directory, "trade", lambda page: draw_trade(found, page), shown.figure_format)
     if not quiet:
         typer.echo("\n" + trade_table(found))
         if not found.criterion:
             typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")
         typer.echo(f"\nfiles   {directory}: {drawn.name}, sweep.csv, sweep.yaml")
-    return found
 
 
 def trade_table(trade: Trade) -> str:
-    """Lengths across, amplitudes down."""
+    """Return the table with lengths across and amplitudes down."""
     heads = [f"{length:g} {trade.unit}" for length in trade.lengths]
     rows = [["criterion" if trade.criterion else "error / asked", *heads]]
     for text, values in zip(trade.amplitudes, trade.values, strict=True):
         cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
         rows.append([f"amplitude {text}" if text else "best record", *cells])
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
-    return "\n".join(lines)
+    return "\n".join(aligned(rows, right=range(len(heads) + 1)))

@@ -1,10 +1,11 @@
-"""`idesign watch`: a local page that follows a spec, a run, a campaign or a sweep."""
+"""`idesign report` and `idesign watch`: pages about a spec, a run, a campaign or a sweep."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
@@ -12,10 +13,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Overrides, Overwrite
+from inputdesign_cli.cli.options import Changes, Fast, Figures, Output, Overwrite, Quiet, Shown, path_option
+from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.cli.terminal import complain
-from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
+from inputdesign_cli.cli.terminal import complain, status
+from inputdesign_cli.errors import STANDARD_STREAM, IdesignError, OutputError
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
@@ -26,6 +28,42 @@ if TYPE_CHECKING:
 _LOOK = 0.1  # seconds between looks at the file while it is solved
 
 
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run or of a sweep.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The file to write, - for standard output. The default is report.html in RUN.",
+            parser=path_option,
+        ),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a run or a sweep as one HTML page.
+
+    The page tells the question, the answer, its proof, what was assumed and how to reproduce it, with
+    charts. It needs no network and no script, and can be printed.
+    """
+    with status(f"{directory}: writing ...", quiet=quiet):
+        from inputdesign_cli.outcome.record import PAGE
+        from inputdesign_cli.outcome.run_directory import replace_text
+        from inputdesign_cli.report.render import is_page, report_text
+
+        if str(output) == STANDARD_STREAM:
+            typer.echo(report_text(directory))
+            return
+        file = output or directory / PAGE
+        if file.exists() and not is_page(file):
+            hint = "choose another name, or move it away: only a page that idesign wrote is replaced"
+            raise OutputError.because("output-exists", f"{file} exists already, and is no report", hint)
+        replace_text(file, report_text(directory))
+    if not quiet:
+        typer.echo(file)
+
+
 def watch(
     spec: Annotated[
         Path,
@@ -33,8 +71,8 @@ def watch(
             metavar="SPEC|DIR", help="The experiment to design, a YAML file; or a run, campaign or sweep."
         ),
     ],
-    overrides: Overrides = None,
-    confine: Confine = None,
+    *,
+    changes: Changes,
     output: Output = None,
     overwrite: Overwrite = False,
     fast: Fast = False,
@@ -63,22 +101,16 @@ def watch(
         typer.echo(f"follows {spec}; open the address in a browser, Ctrl-C ends it", err=True)
         if spec.is_dir():
             _follow_directory(spec, board)
-        told = [*(overrides or []), *(["solver.any_spectrum=false"] if fast else [])]
+        if fast:
+            changes = replace(changes, overrides=[*(changes.overrides or []), "solver.any_spectrum=false"])
         place = Place(output, spec.stem, [spec], overwrite)
-        _follow_spec(spec, told, confine, place, board, drawing, figures)
+        _follow_spec(spec, changes, place, board, drawing, figures)
 
 
 def _follow_spec(
-    spec: Path,
-    overrides: list[str],
-    confine: Path | None,
-    place: Place,
-    board: Board,
-    drawing: Painters,
-    figures: bool,
+    spec: Path, changes: Changes, place: Place, board: Board, drawing: Painters, figures: bool
 ) -> None:
     """Solve and show, again and again."""
-    from inputdesign_cli.cli.reading import read_spec
     from inputdesign_cli.live.changes import stamp, wait_for_change
     from inputdesign_cli.live.pages import Followed
     from inputdesign_cli.questions.verbs import run_verb
@@ -90,13 +122,13 @@ def _follow_spec(
         board.show(followed.computing().page)
         try:
             with _given_up_when_saved(files, before):
-                files = [spec, *_named_files(spec, overrides)]
+                files = [spec, *_named_files(spec, changes.overrides or [])]
                 before = stamp(files)
-                asked = read_spec(spec, overrides, confine)
+                asked = read_spec(spec, changes)
                 place = place.checked(asked)
                 results = run_verb("solve", asked)
             if stamp(files) == before:
-                keep(results, place, figures=False, json_output=False, quiet=True)
+                keep(results, place, Shown(figures=False, quiet=True))
                 solved = partial(
                     followed.solved, place.directory, time.strftime("%H:%M:%S"), time.monotonic() - started
                 )
@@ -107,7 +139,7 @@ def _follow_spec(
                 typer.echo(followed.told, err=True)
                 drawing.get_ready()
                 if figures and stamp(files) == before:
-                    keep(results, place, figures=True, json_output=False, quiet=True)
+                    keep(results, place, Shown(quiet=True))
         except IdesignError as error:
             followed = followed.failed(error, lines, str(spec))
             complain(error)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.computing import computing
-from inputdesign_cli.cli.options import Overwrite, Quiet
+from inputdesign_cli.cli.options import Changes, Overwrite, Quiet, Shown
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.cli.terminal import complain, status
+from inputdesign_cli.cli.terminal import complain, computing, status
 from inputdesign_cli.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ def wizard(
     At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
     They are asked in the terminal where no option answers them. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import QUESTIONS, Answers, read_answers, told_by_plant
+    from inputdesign_cli.wizard.questions import QUESTIONS, Answers, known_from, read_answers
 
     if output.exists() and not overwrite:
         hint = "choose another name with -o, or overwrite it with --overwrite"
@@ -66,7 +65,7 @@ def wizard(
     said = read_answers(answers, given or [])
     known = said.texts
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
-    there = {*known, *told_by_plant(known)}
+    there = {*known, *known_from(known)}
     unanswered = [one.key for one in QUESTIONS if one.default is None and one.key not in there]
     if unanswered and not known and not terminal:
         _refuse(unanswered)
@@ -84,7 +83,7 @@ def wizard(
         draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
     if not quiet:
-        for sentence in draft.told:
+        for sentence in draft.notes:
             typer.echo(sentence)
         typer.echo(f"{output}: written; every line says why it stands there, and may be changed")
     if solve is None:
@@ -96,13 +95,12 @@ def wizard(
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     with computing(file, quiet=quiet):
         from inputdesign_cli import load_spec, questions
-        from inputdesign_cli.wizard.closing import to_log
-        from inputdesign_cli.wizard.solving import verdict
+        from inputdesign_cli.wizard.solving import to_log, verdict
 
         spec = load_spec(file)
         results = questions.solve(spec)
     place = Place(None, file.stem, [file], overwrite)
-    keep(results, place, figures=True, json_output=False, quiet=True)
+    keep(results, place, Shown(quiet=True))
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
         with computing(file, quiet=quiet, doing="what else would do"):
             found = verdict(spec, results.result, _result, there)
@@ -113,10 +111,9 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
                 )
             )
     if trade:
-        from inputdesign_cli.cli.trade import WORDS, tell_trade
+        from inputdesign_cli.cli.trade import WORDS, show_trade
 
-        beside = place.directory.with_name(f"{place.directory.name}-trade")
-        tell_trade(file, spec, WORDS, beside, overrides=[], confine=None, quiet=quiet)
+        show_trade(file, spec, WORDS, place.directory, Changes(), Shown(quiet=quiet))
 
 
 def _result(spec: Spec) -> Result:
@@ -128,7 +125,7 @@ def _result(spec: Spec) -> Result:
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
     """The draft of somebody at the terminal, who is asked again where an answer cannot be used."""
     with status("thinking ...", quiet=quiet):
-        from inputdesign_cli.wizard.conversation import Conversation
+        from inputdesign_cli.wizard.composing import Conversation
     talk = Conversation(known, output.stem, output.parent)
     while (one := talk.question) is not None:
         typer.echo(f"  {one.allowed}", err=True)

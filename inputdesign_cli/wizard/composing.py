@@ -1,41 +1,53 @@
-"""Answers -> a commented spec."""
+"""A commented spec from answers: all at once, or question by question."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
+from inputdesign_cli.errors import IdesignError, OutputError
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.grammar import seconds, sensible, short
 from inputdesign_cli.wizard.log_noise import log_noise_lines
 from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
-from inputdesign_cli.wizard.phrases import seconds, short, with_plain_numbers
-from inputdesign_cli.wizard.plant_answer import PlantAnswer
 from inputdesign_cli.wizard.plants import understand_plant
-from inputdesign_cli.wizard.questions import bad_answer, complete
+from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, complete, known_from
+from inputdesign_cli.wizard.stated_plants import PlantAnswer
 from inputdesign_cli.wizard.wishes import wished
 
 _MOST, LEAST = 5000, 50  # samples
-_PLANTS, _FRESH = 30, 200
-_REACH = 0.95  # of an ellipsoid, in which the worst plants are sought; of intervals it is all
 _UNUSED = (
-    "how well the plant is known is not used: a Bode plot is designed at the plant as stated, and one that "
-    "is another needs other powers"
+    "how well the plant is known is not used: a Bode plot is designed at the plant as stated, and another "
+    "plant needs other powers"
+)
+_DRAWN = (
+    "  scenarios: 30  # what is asked holds at all of these plants, drawn from that",
+    "  worst_case: 0.95  # and at the worst ones that a search finds there",  # in intervals: everywhere
+    "  fresh: 200",
 )
 _FIRST = "{type: fir, order: 20}"
+# Answers that go with every other, in place of those that are not asked yet.
+_MEANWHILE = {
+    "plant": "heater",
+    "wish": "prediction within 5 % up to 1",
+    "range": "plus/minus 1",
+    "noise": "standard deviation 1",
+}
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A spec in parts, and the files that stand beside it.
+    """A spec in parts, and the files next to it.
 
     Args:
-        heads: what stands before the spectrum, tails behind it.
-        spectrum: as in a spec; None where the accuracy tells it.
+        heads: the lines before the spectrum.
+        tails: the lines behind it.
+        spectrum: as in a spec; None where the accuracy has the lines.
         said: the answers.
         there: seconds that may be taken.
-        told: what is to be known of the plant that was understood, a sentence each.
+        notes: what the user must know of the plant, a sentence each.
         why: the comment on the spectrum.
     """
 
@@ -46,13 +58,8 @@ class Draft:
     folder: Path
     said: Mapping[str, str]
     there: float
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     why: str = "filtered noise"
-
-    @property
-    def chooses(self) -> bool:
-        """Whether the spectrum is to be chosen."""
-        return self.spectrum is not None
 
     @property
     def text(self) -> str:
@@ -60,12 +67,8 @@ class Draft:
         spectrum = () if self.spectrum is None else (f"spectrum: {self.spectrum}  # {self.why}",)
         return "\n".join([*self.heads, *spectrum, *self.tails]) + "\n"
 
-    def with_spectrum(self, spectrum: str, why: str) -> Draft:
-        """The same with another one."""
-        return replace(self, spectrum=spectrum, why=why)
-
     def spec(self) -> Spec:
-        """The spec, checked; the files beside it must have been written.
+        """Return the spec, checked; the files next to it must have been written.
 
         Raises:
             SpecError: the answers make no spec.
@@ -74,7 +77,7 @@ class Draft:
             return parse_spec(self.text, "<answers>", folder=self.folder)
 
     def validate(self) -> None:
-        """Write the files that stand beside the spec, and try whether it is well posed.
+        """Write the files next to the spec, and check that it is well posed.
 
         Raises:
             IdesignError: as `questions.validate` does, or a file cannot be written.
@@ -89,87 +92,124 @@ class Draft:
 
 
 def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAnswer | None = None) -> Draft:
-    """The spec of the answers.
+    """Return the spec of the answers.
 
     Args:
         stem: of the name of the spec.
-        folder: where it is to stand, and what names of files are relative to.
-        plant: what is known of it, where that was understood before.
+        folder: of the spec; names of files are relative to it.
+        plant: what is known of it, if that is understood already.
 
     Raises:
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    said = {key: with_plain_numbers(text, key) for key, text in complete(answers).items()}
+    said = {key: sensible(text, key) for key, text in complete(answers).items()}
     span, there = input_range(said["range"]), seconds(said["time"], "time")
     plant = plant or understand_plant(said["plant"], stem, folder)
     step = plant.sample_time
     if there < LEAST * step:
         why = "a twentieth of the time constant" if plant.sampling is None else plant.why_sampling
-        told = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
-        raise bad_answer("time", told)
+        why = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
+        raise bad_answer("time", why)
     duration = min(there, _MOST * step)
     controller = loop_line(said["loop"], plant)
     asked = wished(said["wish"], plant, controller is not None, duration)
     nonparametric = any("frequency_response" in line for line in asked)
-    if nonparametric:  # its lines are as far apart as one over the time
-        duration = there
+    limits = limit_lines(span, said["limits"], there if nonparametric else duration, step)
+    if duration < there and not nonparametric:  # lines of a response are one over the time apart
+        limits[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
+    known = _uncertain(plant)
     heads = [
         "# Written by `idesign wizard`: every line follows from an answer. Change what you know better.",
         f"title: {_quoted(said['wish'])}",
-        f"sample_time: {short(step)}  # {_why_step(plant)}",
-        "time_unit: s",
-        *plant.lines,
+        *_head(plant),
         *(f"# against this model: {one}" for one in plant.against),
+        *_noise(plant, said, folder),
+        *([f"# {_UNUSED}"] if nonparametric and known else known),
     ]
-    if plant.explored is None:
-        heads += noise_lines(said["noise"], said["drift"], folder, step)
-    else:
-        heads[2:4] = []  # the included file has them
-        heads += log_noise_lines(plant.explored, plant.source, said["noise"], said["drift"], folder)
-    heads += _uncertain(plant, nonparametric)
     if controller is not None:
         heads += ["experiment:", f"  controller: {controller}  # u = r - C y; r is designed"]
-    heads += [*asked, "objective: best_accuracy  # use all that is allowed"]
-    heads += limit_lines(span, said["limits"], duration, step)
-    if duration < there:
-        heads[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
-    notes = tuple(f"against the model of {plant.source}: {one}" for one in plant.against)
-    if nonparametric and (plant.covariance or plant.intervals):
-        notes += (_UNUSED,)
+    heads += [*asked, "objective: best_accuracy  # use all that is allowed", *limits]
+    notes = [f"against the model of {plant.source}: {one}" for one in plant.against]
+    notes += [_UNUSED] if nonparametric and known else []
     tails = signal_lines(said["signals"], said["converter"], span, said["limits"])
-    if nonparametric:
-        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said, there, notes)
-    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said, there, notes)
+    tails += ["  periods: 5"] if nonparametric else []  # equal ones, of which the first is transient
+    spectrum = None if nonparametric else _FIRST
+    return Draft(tuple(heads), tuple(tails), plant.files, spectrum, folder, said, there, tuple(notes))
 
 
-def _why_step(plant: PlantAnswer) -> str:
-    if plant.sampling is not None:
-        return plant.why_sampling
-    return f"a twentieth of the time constant of {short(plant.slow)} s, or a little less"
+def _head(plant: PlantAnswer) -> list[str]:
+    """Return the lines of the clock and the plant; a file that is included has the clock."""
+    if plant.explored is not None:
+        return [*plant.lines]
+    why = plant.why_sampling
+    if plant.sampling is None:
+        why = f"a twentieth of the time constant of {short(plant.slow)} s, or a little less"
+    return [f"sample_time: {short(plant.sample_time)}  # {why}", "time_unit: s", *plant.lines]
 
 
-def _uncertain(plant: PlantAnswer, nonparametric: bool) -> list[str]:
-    """How well the plant is known, where that is said and a design can heed it."""
-    if not (plant.covariance or plant.intervals):
-        return []
-    if nonparametric:
-        return [f"# {_UNUSED}"]
-    drawn = (
-        f"  scenarios: {_PLANTS}  # what is asked holds at so many plants drawn from that",
-        f"  worst_case: {_REACH}  # and at the worst ones that a search finds there",
-        f"  fresh: {_FRESH}",
-    )
+def _noise(plant: PlantAnswer, said: Mapping[str, str], folder: Path) -> list[str]:
+    if plant.explored is None:
+        return noise_lines(said["noise"], said["drift"], folder, plant.sample_time)
+    return log_noise_lines(plant.explored, plant.source, said["noise"], said["drift"], folder)
+
+
+def _uncertain(plant: PlantAnswer) -> list[str]:
+    """Return the lines of `uncertainty`; none where nothing is said of it."""
     if plant.covariance is not None:
-        return ["uncertainty:", f"  covariance: {plant.covariance}", *drawn]
+        return ["uncertainty:", f"  covariance: {plant.covariance}", *_DRAWN]
+    if not plant.intervals:
+        return []
     listed = [f"    {name}: [{short(low)}, {short(high)}]" for name, (low, high) in plant.intervals.items()]
-    return ["uncertainty:  # how well it is known", "  intervals:", *listed, *drawn]
-
-
-def _periodic(tails: list[str]) -> list[str]:
-    """A frequency response takes equal periods, of which the first is left to the transient."""
-    return [*tails, "  periods: 5"]
+    return ["uncertainty:  # how well it is known", "  intervals:", *listed, *_DRAWN]
 
 
 def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+class Conversation:
+    """Questions one by one: an answer that cannot be used is refused at once, and asked for again."""
+
+    def __init__(self, known: Mapping[str, str], stem: str, folder: Path) -> None:
+        """Begin with what is known; stem and folder as of `compose`."""
+        self._answers, self._stem, self._folder = dict(known), stem, folder
+        self._plant: PlantAnswer | None = None
+        self.draft: Draft | None = None  # of all answers, once they are there
+
+    @property
+    def question(self) -> Question | None:
+        """The next one; None where all are answered."""
+        there = {*self._answers, *known_from(self._answers)}
+        return next((one for one in QUESTIONS if one.key not in there), None)
+
+    def answer(self, text: str) -> IdesignError | None:
+        """Answer the question, and return what is wrong: then the question that it is about comes again.
+
+        Raises:
+            OutputError: a file next to the spec cannot be written.
+        """
+        asked = self.question
+        assert asked is not None
+        self._answers[asked.key] = text
+        try:
+            self._understand()
+        except OutputError:
+            raise  # no answer can help
+        except IdesignError as error:
+            key = error.diagnostics[0].key
+            if self._answers.pop(key, None) is None:
+                return None  # it is about what stands in for an answer
+            if key == "plant":
+                self._plant = None
+            return error
+        return None
+
+    def _understand(self) -> None:
+        """Try the answers; the plant, which may be a log to be explored, is understood once."""
+        if self._plant is None and self._answers["plant"].strip():
+            self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
+        draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)
+        if self.question is None:
+            draft.validate()
+            self.draft = draft

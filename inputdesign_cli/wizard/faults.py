@@ -1,4 +1,4 @@
-"""What is wrong with the spec of the answers, said of the answer that it comes from, in its words."""
+"""Errors of the spec of the answers become errors of the answer that caused them, in its words."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ _ANSWERS = {
     "signal.offset": "range",
     "signal": "signals",
 }
+_OPEN = {"unstable-loop": "wish", "infinite-information": "loop"}  # in open loop
 _OF_CODE = {"coarse-converter": "converter", "delay-beyond-record": "time", "too-few-lines": "wish"}
 # What a code says, or how it is mended, where the spec's own words would puzzle.
 _MESSAGES = {
     "unstable-loop": "with these settings the loop is unstable even with the plant as stated",
     "unbounded-error": "the plant integrates, and no experiment bounds its error at the lowest frequencies",
     "delay-beyond-record": "the dead time of the plant is as long as the experiment, or longer",
-    "not-identifiable": "no experiment can tell the parameters of this plant apart",
+    "not-identifiable": "no experiment separates the parameters of this plant",
 }
 _HINTS = {
     "unstable-loop": "take a smaller Kp, of the same sign as the gain of the plant, or a larger Ti",
@@ -59,59 +60,56 @@ _WEAKER = {
 
 @contextmanager
 def in_their_words(said: Mapping[str, str], key: str = "") -> Iterator[None]:
-    """Errors inside are those of an answer.
+    """Turn errors inside into errors of an answer.
 
     Args:
         said: the answers.
-        key: of the question that they are about where they do not tell.
+        key: of the question that an error is about where it has no key.
     """
     try:
         yield
     except OutputError:
         raise
     except IdesignError as error:
-        raise type(error)([_told(one, said, key) for one in error.diagnostics]) from error
+        raise type(error)([_reworded(one, said, key) for one in error.diagnostics]) from error
 
 
-def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
+def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     if one.code == "bad-answer" and one.key in KEYS:
         return one
     asked = question(_question(one, said) or key or "wish")
     if one.message.startswith(f"{asked.asks} ({asked.key}): "):
         return one  # by a block inside
     why = _MESSAGES.get(one.code) or _in_words(one.message)
-    lines = _LINES_THERE.search(one.message)
-    if one.code == "too-few-lines" and lines is not None:
+    lines = _LINES_THERE.search(one.message) if one.code == "too-few-lines" else None
+    if lines is not None:
         why = f"{lines[1]} frequencies between these two repeat within the time, and {lines[2]} are needed"
-    quieter = _QUIETER.search(one.hint)
-    hint = _HINTS.get(one.code, "")
-    if one.code == "infinite-information" and asked.key != "loop":
-        hint = ""  # a controller holds it already
-    if quieter:
-        weaker, such = _WEAKER[quieter[1]]
-        hint = f"ask for {weaker.format(quieter[2])} (the nearer, the longer the experiment), such as "
-        hint += such.format(quieter[3])
-    if one.code == "too-few-lines":
-        enough = _LONG_ENOUGH.search(one.hint)
-        hint = f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
     place = one.location if one.location and not one.location.file.startswith("<") else None
+    hint = "; ".join(filter(None, (_remedy(one, asked.key), f"allowed: {asked.allowed}")))
     return replace(
-        one,
-        message=f"{asked.asks} ({asked.key}): {why}",
-        hint="; ".join(filter(None, (hint, f"allowed: {asked.allowed}"))),
-        key=asked.key,
-        location=place,
+        one, message=f"{asked.asks} ({asked.key}): {why}", hint=hint, key=asked.key, location=place
     )
 
 
+def _remedy(one: Diagnostic, key: str) -> str:
+    if quieter := _QUIETER.search(one.hint):
+        weaker, such = _WEAKER[quieter[1]]
+        asks = f"ask for {weaker.format(quieter[2])} (the nearer, the longer the experiment)"
+        return f"{asks}, for example {such.format(quieter[3])}"
+    if one.code == "too-few-lines":
+        enough = _LONG_ENOUGH.search(one.hint)
+        return f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
+    if one.code == "infinite-information" and key != "loop":
+        return ""  # a controller holds it already
+    return _HINTS.get(one.code, "")
+
+
 def _question(one: Diagnostic, said: Mapping[str, str]) -> str:
-    """The question whose answer an entry of the spec comes from; empty where that is not known."""
+    """Return the question whose answer an entry of the spec comes from; empty where that is not known."""
     # In open loop the only controller is that of the wish, and none holds a plant that integrates.
     held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
-    if one.code == "unstable-loop" and not held:
-        return "wish"
-    if one.code == "infinite-information" and not held:
-        return "loop"
+    if not held and one.code in _OPEN:
+        return _OPEN[one.code]
     if one.code in _OF_CODE:
         return _OF_CODE[one.code]
     found = (name for path, name in _ANSWERS.items() if f"{one.key}.".startswith(f"{path}."))
@@ -119,7 +117,7 @@ def _question(one: Diagnostic, said: Mapping[str, str]) -> str:
 
 
 def _in_words(message: str) -> str:
-    """A message without paths and terms of the spec."""
+    """Return a message without paths and terms of the spec."""
     for term, words in _TERMS.items():
         message = message.replace(term, words)
     return _PATH.sub(lambda path: "the " + path[0].rpartition(".")[2].replace("_", " "), message)

@@ -1,88 +1,34 @@
-"""The plant in the user's words: a template, numbers, a step response, a log, a system in JSON."""
+"""The plant of an answer: stated, estimated from a step response, or explored in a log."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, SpecError
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.json_plants import system_of
-from inputdesign_cli.wizard.phrases import NUMBER, Phrase, needed, short
-from inputdesign_cli.wizard.plant_answer import PlantAnswer
+from inputdesign_cli.wizard.grammar import short
 from inputdesign_cli.wizard.questions import bad_answer, file_of
+from inputdesign_cli.wizard.stated_plants import TEMPLATES, PlantAnswer, plant_of_words, system_of
 
-_QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
 _LEAST_ROWS = 10  # of a step response
 _LONGER = 2.0  # a time constant of so many records is none
 _GAP = 1.5  # sample times from one row to the next: a sample is missing
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
-
-
-def _around(value: float, share: float) -> tuple[float, float]:
-    ends = (value * (1.0 - share), value * (1.0 + share))
-    return min(ends), max(ends)
-
-
-def _template(
-    lines: str, slow: float, late: float, controller: str | None = None, **values: float
-) -> PlantAnswer:
-    return PlantAnswer(
-        tuple(lines.strip("\n").split("\n")),
-        slow,
-        late,
-        {name: _around(value, 0.2) for name, value in values.items()},
-        values,
-        controller,
-        tunable=controller is None and "natural_frequency" not in values and bool(values),
-    )
-
-
-TEMPLATES = {
-    "heater": _template(
-        "plant:  # template heater: degrees over per cent of power\n"
-        "  continuous: {gain: 2.1, time_constant: 180, dead_time: 25}\n  sample: zoh",
-        180.0, 25.0, gain=2.1, time_constant=180.0, dead_time=25.0,
-    ),
-    "tank": _template(
-        "plant:  # template tank: level over valve, it integrates\n"
-        "  parameters: {k: 0.05, L: 5}\n"
-        "  continuous: {numerator: [k], denominator: [1, 0], delay: L}\n  sample: zoh",
-        60.0, 5.0, "{pid: {Kp: 0.8, Ti: 60}}", k=0.05, L=5.0,
-    ),
-    "motor": _template(
-        "plant:  # template motor: speed over voltage\n"
-        "  continuous: {gain: 0.1, time_constant: 0.5, dead_time: 0.02}\n  sample: zoh",
-        0.5, 0.02, gain=0.1, time_constant=0.5, dead_time=0.02,
-    ),
-    "axis": _template(
-        "plant:  # template axis: a flexible axis, its first resonance\n"
-        "  continuous: {gain: 1, damping: 0.1, natural_frequency: 30}\n  sample: zoh",
-        0.2, 0.0, gain=1.0, damping=0.1, natural_frequency=30.0,
-    ),
-    "column": replace(
-        _template(
-            "plant:  # template column: two compositions over reflux and steam, seconds\n"
-            "  continuous:\n"
-            "    gain: [[12.8, -18.9], [6.6, -19.4]]\n"
-            "    time_constant: [[1002, 1260], [654, 864]]\n"
-            "    dead_time: [[60, 180], [420, 180]]\n  sample: zoh",
-            1000.0, 420.0,
-        ),
-        sampling=60.0,
-        channels=2,
-    ),
-}  # fmt: skip
+_REJECTED = (
+    "tests reject a gain, a time constant and a dead time ({}): the plant has another structure, or its "
+    'level drifts, and neither the values nor their errors are to be trusted; "log {}" explores other '
+    "structures"
+)
 
 
 def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
-    """The plant of an answer.
+    """Return the plant of an answer.
 
     Args:
         stem: of the spec, for the names of files beside it.
@@ -102,75 +48,18 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
     if text.endswith(".json"):
         return system_of(file_of("plant", folder / text))
     if re.search(r"\bgain\b", text, re.I):
-        return _of_numbers(text)
+        return plant_of_words(text)
     raise bad_answer("plant", f'"{text}" is none of these')
 
 
-def _of_numbers(text: str) -> PlantAnswer:
-    for words in _QUANTITIES.values():
-        said = re.findall(rf"\b(?:{words})\b[^,;]*?{NUMBER}", text, re.I)
-        if len(said) > 1:
-            what = words.split("|")[0]
-            raise bad_answer("plant", f"it says the {what} more than once: {' and '.join(said)}")
-    phrase = Phrase(text, "plant")
-    own: dict[str, float] = {}
-    values: dict[str, float] = {}
-    for name, words in _QUANTITIES.items():
-        found = phrase.known_within(words, name != "gain")
-        if found is not None:
-            values[name] = found[0]
-            own |= {} if found[1] is None else {name: found[1]}
-    part = phrase.share()
-    phrase.finish("known")
-    if not values.get("gain"):
-        raise bad_answer("plant", "it does not say the gain, or says that it is zero")
-    slow = needed(values.get("time_constant"), "plant", "the time constant")
-    late = values.get("dead_time", 0.0)
-    if late < 0.0:
-        raise bad_answer("plant", "the dead time is negative")
-    values = {name: value for name, value in values.items() if value}
-    if part is None and len(own) == 1 and list(own) == list(values)[-1:]:
-        part, own = own.popitem()[1], {}  # what stands at the end is said of all
-    shares = dict.fromkeys(values, part) | own if part is not None else own
-    if not all(0.0 < share < 0.9 for share in shares.values()):
-        raise bad_answer("plant", "within must be more than 0 and less than 90 %")
-    listed = ", ".join(f"{name}: {short(value)}" for name, value in values.items())
-    lines = (
-        "plant:  # as you said",
-        f"  continuous: {{{listed}}}",
-        "  sample: zoh  # what a converter holds",
-    )
-    around = {name: _around(values[name], share) for name, share in shares.items()}
-    return PlantAnswer(lines, slow, late, around, values, tunable=True)
-
-
 def _stepped(path: Path, stem: str) -> PlantAnswer:
-    """Gain, time constant and dead time estimated from a record that begins at rest."""
+    """Estimate gain, time constant and dead time from a record that begins at rest."""
     from inputdesign_cli import parse_spec, questions
     from inputdesign_cli.questions.building.tables import read_columns
 
     found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
     t, u, y = found["time"], found["u"], found["y"]
-    if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
-        raise bad_answer("plant", f"{path.name} needs {_LEAST_ROWS} rows at least, at times that grow")
-    step, moved = float(np.median(np.diff(t))), u - u[0]
-    if np.any(wide := np.diff(t) > _GAP * step):
-        row, longest = int(np.argmax(wide)) + 3, float(np.max(np.diff(t)))
-        raise bad_answer(
-            "plant",
-            f"the times in {path.name} have a gap before line {row} ({short(longest)} s, where rows are "
-            f"{short(step)} s apart): a step response is one record without gaps; cut it to the part that "
-            "has the step, or fill it in",
-        )
-    begun = int(np.argmax(np.abs(moved) > 0.5 * np.max(np.abs(moved))))
-    if not np.any(moved) or begun + 5 >= t.size:
-        raise bad_answer("plant", f"the input in {path.name} does not step")
-    last = slice(-max(t.size // 20, 1), None)
-    moves, answers = float(np.mean(moved[last])), float(np.mean(y[last]) - y[0])
-    if abs(moves) < 0.5 * np.max(np.abs(moved)):
-        raise bad_answer("plant", f"the input in {path.name} does not stay where it has stepped to")
-    if not answers:
-        raise bad_answer("plant", f"the output in {path.name} does not answer the step")
+    begun, step, moves, answers = _step_in(path.name, t, u, y)
     rise = (y - y[0]) / answers
     slow = max(float(t[int(np.argmax(rise > 0.632))] - t[begun]), step)
     gain = answers / moves
@@ -191,38 +80,53 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
         raise bad_answer(
             "plant",
             f"the output in {path.name} still goes on as an integrator would, {short(lasts)} s after the "
-            "step: no gain and time constant are told; record until it settles, or write a plant that "
+            "step: it shows no gain and no time constant; record until it settles, or write a plant that "
             'integrates as a file such as {"num": [0.05], "den": [1, 0], "delay": 5}',
         )
     listed = ", ".join(f"{label}: {short(value)}" for label, value in values.items())
     return PlantAnswer(
         (f"plant:  # estimated from {path.name}", f"  continuous: {{{listed}}}", "  sample: zoh"),
         values["time_constant"],
-        values["dead_time"],
         values=values,
         files={name: model},
         covariance=name,
         sampling=step,
         tunable=True,
         source=path.name,
-        against=_rejected(path, failed),
+        against=() if not failed else (_REJECTED.format(", ".join(failed).replace("_", " "), path.name),),
     )
 
 
-def _rejected(path: Path, failed: Sequence[str]) -> tuple[str, ...]:
-    """What to say of a step response that a gain, a time constant and a dead time do not explain."""
-    if not failed:
-        return ()
-    tests = ", ".join(name.replace("_", " ") for name in failed)
-    return (
-        f"tests reject a gain, a time constant and a dead time ({tests}): the plant has another structure, "
-        "or its level drifts, and neither the values nor how well they are told to be known are to be "
-        f'trusted; "log {path.name}" explores other structures',
-    )
+def _step_in(name: str, t: Array, u: Array, y: Array) -> tuple[int, float, float, float]:
+    """Return the row of the step, seconds between rows, and how far input and output move in the end.
+
+    Raises:
+        SpecError: `bad-answer`, the record (n,) of the file of that name is no step response.
+    """
+    if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
+        raise bad_answer("plant", f"{name} needs {_LEAST_ROWS} rows at least, at times that grow")
+    step, moved = float(np.median(np.diff(t))), np.abs(u - u[0])
+    if np.any(wide := np.diff(t) > _GAP * step):
+        row, longest = int(np.argmax(wide)) + 3, float(np.max(np.diff(t)))
+        raise bad_answer(
+            "plant",
+            f"the times in {name} have a gap before line {row} ({short(longest)} s, where rows are "
+            f"{short(step)} s apart): a step response is one record without gaps; cut it to the part that "
+            "has the step, or fill it in",
+        )
+    begun, last = int(np.argmax(moved > 0.5 * np.max(moved))), slice(-max(t.size // 20, 1), None)
+    moves, answers = float(np.mean(u[last] - u[0])), float(np.mean(y[last]) - y[0])
+    if not np.any(moved) or begun + 5 >= t.size:
+        raise bad_answer("plant", f"the input in {name} does not step")
+    if abs(moves) < 0.5 * np.max(moved):
+        raise bad_answer("plant", f"the input in {name} does not stay where it has stepped to")
+    if not answers:
+        raise bad_answer("plant", f"the output in {name} does not answer the step")
+    return begun, step, moves, answers
 
 
 def _explored(path: Path, stem: str) -> PlantAnswer:
-    """The model of `idesign explore`, in a file beside the spec."""
+    """Explore a log as `idesign explore` does; the model is a file next to the spec."""
     from inputdesign_cli import parse_spec, questions
 
     found = questions.explore([path])
@@ -244,7 +148,6 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
     return PlantAnswer(
         lines,
         20.0 * step,
-        0.0,
         files={name: _NOISE_BLOCK.sub("", model.decode()).encode()},  # that stands in the spec
         covariance=name if channels == 1 else None,
         sampling=step,
@@ -257,7 +160,7 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
 
 
 def _is_process(spec: Spec) -> bool:
-    """Whether rules of tuning know the plant."""
+    """Return whether rules of tuning know the plant."""
     from inputdesign_cli.questions.building.controllers import process_of
 
     try:
@@ -268,10 +171,7 @@ def _is_process(spec: Spec) -> bool:
 
 
 def _first_order(path: Path, explored: Spec) -> bytes | None:
-    """model.yaml of a gain, a time constant and a dead time, where no test speaks against it.
-
-    The noise may drift.
-    """
+    """Return model.yaml of a gain, a lag and a dead time in noise that may drift; None where tests object."""
     from inputdesign_cli import parse_spec, questions
 
     step = explored.sample_time

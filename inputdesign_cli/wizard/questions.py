@@ -1,4 +1,4 @@
-"""The ten questions of `idesign wizard`, and the answers to them: given one by one, or in a file."""
+"""The ten questions of `idesign wizard`, and their answers, given one by one or in a file."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
-from inputdesign_cli.errors import Diagnostic, IdesignError, Location, SpecError
+from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.wording import unknown_word
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.reader import read
@@ -15,7 +16,7 @@ from inputdesign_cli.specification.yaml.reader import read
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, what is allowed as an answer, and what holds where nothing is answered."""
+    """A question, the answers that it allows, and its default."""
 
     key: str
     asks: str
@@ -54,8 +55,8 @@ QUESTIONS = (
     ),
     Question(
         "drift",
-        "Does the output drift by itself?",
-        '"yes", "no", or "not known": then a log tells, and without one it does not',
+        "Does the output drift?",
+        '"yes", "no", or "not known": then a log decides; without a log it does not',
         "not known",
     ),
     Question(
@@ -70,35 +71,65 @@ QUESTIONS = (
     Question("converter", "Is the input quantised?", '"no", or "12 bits up to 100"', "no"),
 )
 KEYS = tuple(question.key for question in QUESTIONS)
+_ALL = f"the questions are {', '.join(KEYS)}"
 
 
 def question(key: str) -> Question:
-    """The question of a key."""
+    """Return the question of a key."""
     return next(one for one in QUESTIONS if one.key == key)
 
 
 AS_LOG = "as the log"
 
 
-def told_by_plant(answers: Mapping[str, str]) -> dict[str, str]:
-    """What needs no answer since the plant tells it: of a log what the noise is, and whether it drifts."""
+def known_from(answers: Mapping[str, str]) -> dict[str, str]:
+    """Return the answers that the answer `plant` gives: a log shows the noise, and whether it drifts."""
     explored = answers.get("plant", "").strip().lower().startswith("log ")
     return {"noise": AS_LOG, "drift": "not known"} if explored else {}
 
 
 def bad_answer(key: str, why: str) -> SpecError:
-    """The error that names the question and tells what is allowed."""
+    """Return the error that names the question and what is allowed."""
     asked = question(key)
     return SpecError.because("bad-answer", f"{asked.asks} ({key}): {why}", f"allowed: {asked.allowed}", key)
 
 
+Choice = TypeVar("Choice")
+
+
+def chosen(key: str, text: str, choices: Mapping[str, Choice]) -> Choice:
+    """Return what an answer chooses by its words.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    if text.lower() not in choices:
+        raise bad_answer(key, f'"{text}" is none of these')
+    return choices[text.lower()]
+
+
+def file_of(key: str, path: Path) -> Path:
+    """Return the path of the file that an answer names.
+
+    Raises:
+        SpecError: `bad-answer`, there is none.
+    """
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise bad_answer(key, f"{path} is a folder")
+    if path.exists():
+        raise bad_answer(key, f"{path} is a pipe or a device, not a file")
+    raise bad_answer(key, f"there is no file {path}")
+
+
 @dataclass(frozen=True)
 class Answers:
-    """Answers by question, and where those of a file stand.
+    """Answers by question, and the places of answers that stand in a file.
 
     Args:
-        texts: what was answered.
-        places: of the answers in the file; for questions that it leaves open, its beginning.
+        texts: the answers.
+        places: by question; the beginning of the file for questions without an answer in it.
     """
 
     texts: dict[str, str] = field(default_factory=dict)
@@ -106,52 +137,35 @@ class Answers:
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """Errors inside that are about an answer of the file tell where it stands."""
+        """Give errors inside the place of the answer that they are about."""
         try:
             yield
         except IdesignError as error:
-            raise type(error)([self._placed(one) for one in error.diagnostics]) from error
-
-    def _placed(self, one: Diagnostic) -> Diagnostic:
-        return replace(one, location=one.location or self.places.get(one.key))
-
-
-def file_of(key: str, path: Path) -> Path:
-    """The path of a file that an answer names, which is there.
-
-    Raises:
-        SpecError: `bad-answer`.
-    """
-    if path.is_dir():
-        raise bad_answer(key, f"{path} is a folder")
-    if path.exists() and not path.is_file():
-        raise bad_answer(key, f"{path} is a pipe or a device, not a file")
-    if not path.is_file():
-        raise bad_answer(key, f"there is no file {path}")
-    return path
+            placed = [
+                replace(one, location=one.location or self.places.get(one.key)) for one in error.diagnostics
+            ]
+            raise type(error)(placed) from error
 
 
 def read_answers(file: Path | None, given: Sequence[str] = ()) -> Answers:
-    """The answers of a YAML file and of `KEY=TEXT`, which come first.
+    """Read the answers of a YAML file and of `KEY=TEXT`, which come first.
 
     Raises:
-        SpecError: `bad-answer` for a question that there is not, or for what is no text; the file cannot
-            be read.
+        SpecError: `bad-answer` for an unknown question or an answer that is no text; the file cannot be read.
     """
     answers = Answers() if file is None else _of_file(file)
     for text in given:
-        key, equals, value = text.partition("=")
+        key, equals, value = (part.strip() for part in text.partition("="))
         if not equals:
             message = f'"{text}" is no answer'
             raise SpecError.because("bad-answer", message, 'write KEY=TEXT, as in time="1 h"')
-        answers.texts[key.strip()] = value.strip()
-        answers.places.pop(key.strip(), None)
+        answers.texts[key] = value
+        answers.places.pop(key, None)
     for key in answers.texts:
         if key not in KEYS:
             message, hint = unknown_word(key, KEYS)
-            told = message.replace("{key}", "the question")
-            hint = hint or f"the questions are {', '.join(KEYS)}"
-            raise SpecError.because("bad-answer", told, hint, location=answers.places.get(key))
+            message = message.replace("{key}", "the question")
+            raise SpecError.because("bad-answer", message, hint or _ALL, location=answers.places.get(key))
     return answers
 
 
@@ -161,8 +175,8 @@ def _of_file(file: Path) -> Answers:
         raise SpecError(tree.diagnostics)
     begins = tree.places.location(tree.places.mark(())) or Location(str(file), 1, 1)
     if not isinstance(tree.data, dict):
-        message, hint = "answers are a mapping of questions to texts", f"the questions are {', '.join(KEYS)}"
-        raise SpecError.because("bad-answer", message, hint, location=begins)
+        message = "answers are a mapping of questions to texts"
+        raise SpecError.because("bad-answer", message, _ALL, location=begins)
     answers = Answers(places=dict.fromkeys((one.key for one in QUESTIONS if one.default is None), begins))
     for key, value in tree.data.items():
         place = tree.places.location(tree.places.mark((key,)))
@@ -170,29 +184,23 @@ def _of_file(file: Path) -> Answers:
             what = "a mapping" if isinstance(value, dict) else "a list"
             message, hint = f"the answer to {key} is {what}", 'an answer is one text: put it in quotes ("..")'
             raise SpecError.because("bad-answer", message, hint, key, place)
-        answers.texts[key] = _plain(value)
+        # YAML reads yes and no as truth values; 1 and 0 are numbers.
+        plain = {True: "yes", False: "no"}[value] if isinstance(value, bool) else value
+        answers.texts[key] = "" if plain is None else str(plain)
         if place is not None:
             answers.places[key] = place
     return answers
 
 
 def complete(answers: Mapping[str, str]) -> dict[str, str]:
-    """The answers with what holds where nothing is said.
+    """Return the answers, with defaults where none is given.
 
     Raises:
         SpecError: `bad-answer` for questions that need one.
     """
-    found, told = {}, told_by_plant(answers)
-    for one in QUESTIONS:
-        text = answers.get(one.key, told.get(one.key, one.default))
-        if text is None or not text.strip():
-            raise bad_answer(one.key, "there is no answer")
-        found[one.key] = text.strip()
+    given = known_from(answers) | dict(answers)
+    found = {one.key: (given.get(one.key, one.default) or "").strip() for one in QUESTIONS}
+    for key, text in found.items():
+        if not text:
+            raise bad_answer(key, "there is no answer")
     return found
-
-
-def _plain(value: object) -> str:
-    """A value of YAML as it would be typed; 1 and 0 are numbers."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return "" if value is None else str(value)

@@ -11,7 +11,7 @@ import typer
 import inputdesign_cli
 from inputdesign_cli import questions
 from inputdesign_cli.cli import app
-from inputdesign_cli.cli.init import KINDS
+from inputdesign_cli.cli.reference import KINDS
 from inputdesign_cli.error_codes import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.findings import explanations

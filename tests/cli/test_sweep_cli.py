@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from inputdesign_cli.cli.completion import error_codes, spec_keys
-from inputdesign_cli.cli.progress import ProgressLine, pace
+from inputdesign_cli.cli.sweep import ProgressLine, pace
 from inputdesign_cli.compute.threads import ONE_THREAD
 from inputdesign_cli.sweeps.running import Progress
 from tests.support.sweep_files import SPEC

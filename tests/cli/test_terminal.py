@@ -8,9 +8,8 @@ import pytest
 import typer
 
 import inputdesign_cli
-from inputdesign_cli.cli import app, computing as computing_line
-from inputdesign_cli.cli.computing import computing
-from inputdesign_cli.cli.terminal import aligned, colourful, status
+from inputdesign_cli.cli import app, terminal as terminal_module
+from inputdesign_cli.cli.terminal import aligned, colourful, computing, status
 from inputdesign_cli.compute.watching import Counted, tell
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
@@ -41,7 +40,7 @@ def test_a_long_computation_tells_how_far_it_is(monkeypatch):
         time.sleep(0.3)
     assert "log.csv: computing ..." in terminal.text
     assert "3 of 30" not in terminal.text, "there is no need to tell at once"
-    monkeypatch.setattr(computing_line, "_PATIENCE", 0.0)
+    monkeypatch.setattr(terminal_module, "_PATIENCE", 0.0)
     with computing("log.csv", quiet=False):
         tell(Counted("starting points tried", 3, 30))
         time.sleep(0.3)

@@ -33,7 +33,7 @@ TYPED = [
     ("how far the output", ""),
     ("noise of the output", ""),
     ("noise of the output", "resolution 0.1"),
-    ("drift by itself", ""),
+    ("Does the output drift", ""),
     ("open loop, or under", "\x15open"),
     ("hardware apply", ""),
     ("quantised", ""),

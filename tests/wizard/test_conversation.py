@@ -5,8 +5,8 @@ import pytest
 
 from inputdesign_cli import questions
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.wizard import conversation
-from inputdesign_cli.wizard.conversation import Conversation
+from inputdesign_cli.wizard import composing
+from inputdesign_cli.wizard.composing import Conversation
 from inputdesign_cli.wizard.questions import KEYS
 
 GOOD = {
@@ -74,8 +74,8 @@ def test_the_loop_that_a_wish_needs_is_asked_for_by_the_wish(tmp_path):
 def test_a_plant_is_understood_once(tmp_path, monkeypatch):
     """A log takes seconds to be explored."""
     seen = []
-    real = conversation.understand_plant
-    monkeypatch.setattr(conversation, "understand_plant", lambda *a: (seen.append(a[0]), real(*a))[1])
+    real = composing.understand_plant
+    monkeypatch.setattr(composing, "understand_plant", lambda *a: (seen.append(a[0]), real(*a))[1])
     answered(Conversation({}, "x", tmp_path))
     assert seen == [GOOD["plant"]]
 

@@ -248,7 +248,7 @@ def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
 
 @pytest.mark.parametrize(
     ("asked", "named"),
-    [("50 degrees", r"such as ([\d.]+ degrees)"), ("gain margin 20", r"such as (gain margin [\d.]+)")],
+    [("50 degrees", r"example ([\d.]+ degrees)"), ("gain margin 20", r"example (gain margin [\d.]+)")],
 )
 def test_a_weaker_margin_is_named_in_the_unit_of_the_wish(asked, named, tmp_path):
     with pytest.raises(SpecError) as caught:

@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.json_plants import system_of
+from inputdesign_cli.wizard.stated_plants import system_of
 from tests.wizard.test_faults import GOOD
 
 _TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
@@ -20,18 +20,18 @@ _TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
         ('{"num": [2], "den": [0, 0]}', "den of p.json is zero"),
         ('{"num": [0], "den": [1, 1]}', "num of p.json is zero"),
         ('{"num": [1, 2, 3], "den": [1, 1]}', "num of p.json has more entries than den"),
-        ("[1]", "it is no mapping in braces"),
-        ('{"num": [NaN], "den": [1, 1]}', "a number of num is not finite"),
-        ('{"num": [1], "den": [1, Infinity]}', "a number of den is not finite"),
-        ('{"den": [1, 1]}', "it has no num"),
-        ('{"num": [true], "den": [1, 1]}', "true in num is no number"),
-        ('{"num": [1], "den": [1, 1], "delay": "x"}', '"x" in delay is no number'),
-        ('{"num": [[1]], "den": [1, 1]}', "[1] in num is no number"),
-        ('{"num": 3, "den": [1, 1]}', "num is no list of numbers"),
+        ("[1]", "valid dictionary"),
+        ('{"num": [NaN], "den": [1, 1]}', "num.0: "),
+        ('{"num": [1], "den": [1, Infinity]}', "den.1: "),
+        ('{"den": [1, 1]}', "num: Field required"),
+        ('{"num": [true], "den": [1, 1]}', "num.0: "),
+        ('{"num": [1], "den": [1, 1], "delay": "x"}', "delay: "),
+        ('{"num": [[1]], "den": [1, 1]}', "num.0: "),
+        ('{"num": 3, "den": [1, 1]}', "num: Input should be a valid list"),
         ("[" * 100_000, "does not hold"),
-        ('{"num": [1], "den": [1, 1], "dealy": 25}', "it has dealy, too"),
-        ('{"num": [1], "den": [1, 1], "delay": null}', "null in delay is no number"),
-        ('{"num": [1], "den": [1, 1], "delay": NaN}', "a number of delay is not finite"),
+        ('{"num": [1], "den": [1, 1], "dealy": 25}', "dealy: Extra inputs are not permitted"),
+        ('{"num": [1], "den": [1, 1], "delay": null}', "delay: "),
+        ('{"num": [1], "den": [1, 1], "delay": NaN}', "delay: "),
         ('{"num": [2], "den": [180, 1], "delay": 25, "delay": 400}', "it says delay more than once"),
         ('{"num": [2], "den": [1, 0]}', 'write its dead time ("delay": 5), however small, or the lag'),
         ('{"num": [2], "den": [1, 0, 1], "delay": 5}', "has no stable pole"),

@@ -7,11 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.wizard.closing import to_log
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.means import input_range
-from inputdesign_cli.wizard.solving import lasting, verdict
+from inputdesign_cli.wizard.solving import lasting, to_log, verdict
 from tests.wizard.test_wizard import ENGINEER
 
 
@@ -133,7 +132,7 @@ def test_a_record_that_is_just_enough_may_be_called_missed():
 
     said = told(0.95, solve=solve, **robust)
     assert "60 min at plus/minus 5 is enough" in said
-    assert "5 % of such experiments would tell one at which it errs 1.04 times" in said
+    assert "5 % of experiments would give one at which it errs 1.04 times" in said
     assert f"{lasting(5.0 * math.ceil(720 * 1.1 * (0.95 * 1.1) ** 2))} would do" in said
     assert "missed" not in told(0.9, **robust)
 
@@ -199,7 +198,7 @@ def test_what_is_enough_is_said_of_the_plants_that_it_is_enough_for():
 def test_what_is_not_used_for_a_bode_plot_is_said():
     wish = "Bode plot within 5 % from 0.005 to 0.05"
     draft = compose({**ENGINEER, "wish": wish, "time": "8 h"}, "x", Path())
-    assert any("how well the plant is known is not used" in one for one in draft.told)
+    assert any("how well the plant is known is not used" in one for one in draft.notes)
     assert "# how well the plant is known is not used" in draft.text
 
 

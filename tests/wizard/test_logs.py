@@ -82,7 +82,7 @@ def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     draft.validate()
     noise = draft.spec().noise
     assert (noise.variance, noise.drift) == (0.04, drifts)
-    assert "the log tells a variance of 0.08" in draft.text
+    assert "the log has a variance of 0.08" in draft.text
 
 
 def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
@@ -99,8 +99,8 @@ def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
     wish = "prediction within 5 % up to 0.1"
     draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
     draft.validate()
-    assert any("residuals" in one for one in draft.told)
-    for one in draft.told:
+    assert any("residuals" in one for one in draft.notes)
+    for one in draft.notes:
         assert f"# against this model: {one.partition(': ')[2]}\n" in draft.text
 
 

@@ -9,9 +9,9 @@ import pytest
 from inputdesign_cli import parse_spec, questions
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.plants import TEMPLATES
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
 from inputdesign_cli.wizard.solving import lasting, verdict
+from inputdesign_cli.wizard.stated_plants import TEMPLATES
 from tests.support.wishes import ENGINEER
 
 WISHES = {
@@ -76,7 +76,7 @@ def test_templates_are_specs_that_can_be_designed(name):
         ("limits", "rate -2", "positive"),
         ("noise", "little", "resolution"),
         ("noise", "rest nothing.csv", "no file"),
-        ("drift", "perhaps", "yes nor no"),
+        ("drift", "perhaps", "none of these"),
         ("loop", "closed", "Kp"),
         ("signals", "square waves", "none of these"),
         ("converter", "16", "none of these"),

@@ -1,0 +1,169 @@
+"""One grammar of answers: words, a number behind or before them, and its unit. No word may stay unread."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from inputdesign_cli.wizard.questions import bad_answer
+
+# Sizes beyond these would overflow, or vanish, where they are squared.
+LARGEST, SMALLEST = 1e15, 1e-15
+NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+ALONE = r"(?<![\w.])"  # the number that follows is no part of another
+PLUS_MINUS = r"(?:plus/minus|plus or minus|\+/?-|±)"
+# A unit that is not converted: "%", "bar", "degC", "m/s"; not a word of the answers.
+UNIT = r"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)[^\s\d,;|+±-][^\s,;|]*)?"
+_PER_CENT = r"\s*(?:%|per ?cent\b)"
+_OF = r"\s*(?:(?:of|about|is|ca\.?|up to)\b\s*|[:=]\s*)*"
+_MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
+# Kinds of units -> each unit in the one that a spec has.
+_SCALES = {
+    "time": {"ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": _MINUTE, "minutes": _MINUTE, "h": _HOUR,
+             "hour": _HOUR, "hours": _HOUR, "d": _DAY},
+    "frequency": {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "mhz": 2e-3 * math.pi, "hz": 2.0 * math.pi,
+                  "khz": 2e3 * math.pi},
+    "rate": {"s": 1.0, "sec": 1.0, "second": 1.0, "min": 1.0 / _MINUTE, "minute": 1.0 / _MINUTE,
+             "h": 1.0 / _HOUR, "hour": 1.0 / _HOUR},
+}  # fmt: skip
+# A group each, which holds a unit of the kind; the last three convert nothing.
+_UNITS = {kind: rf"(?:\s*({'|'.join(scales)})\b)?" for kind, scales in _SCALES.items()} | {
+    "rate": rf"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?(?:\s*(?:per|/)\s*({'|'.join(_SCALES['rate'])})\b)?",
+    "gain": r"((?:\s*[^\s\d,;|]*/[^\s,;|]+)?)",
+    "any": rf"({UNIT})",
+    "none": "()",
+}
+_FILLING = "a an the of and with in at each all about is for by i want"
+
+
+def sensible(text: str, key: str) -> str:
+    """Return the text of an answer; each of its numbers is of a size that can be meant.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    for found in re.findall(rf"(?<![\w.]){NUMBER}", text):
+        if float(found) and not SMALLEST <= abs(float(found)) <= LARGEST:
+            why = f"{found} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
+            raise bad_answer(key, why)
+    strange = re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I)
+    if strange is not None:
+        raise bad_answer(key, f"{strange[1]} is no number")
+    return text
+
+
+class Phrase:
+    """An answer that is read piece by piece; `finish` refuses what nobody read.
+
+    Every method returns None where the text has no such piece.
+    """
+
+    def __init__(self, text: str, key: str) -> None:
+        """Begin with the whole text of the answer to a question.
+
+        Raises:
+            SpecError: `bad-answer`, a number has a decimal comma.
+        """
+        self.text, self.key, self._left = text, key, text
+        if comma := re.search(r"\d+,\d+", text):
+            raise bad_answer(
+                key, f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
+            )
+
+    def take(self, pattern: str) -> re.Match[str] | None:
+        """Read the first piece that matches."""
+        found = re.search(pattern, self._left, re.I)
+        if found is not None:
+            self._left = f"{self._left[: found.start()]} | {self._left[found.end() :]}"
+        return found
+
+    def number(self, pattern: str) -> float | None:
+        """Read a piece and return the number in its first group."""
+        found = self.take(pattern)
+        return None if found is None else float(found[1])
+
+    def after(self, words: str, kind: str = "any", *, named: bool = False) -> float | None:
+        """Read words (a pattern), a number and its unit, and return the number in units of the spec.
+
+        Args:
+            kind: of the unit: time, frequency, rate, gain, any (which is not converted) or none.
+            named: whether words without a number are refused.
+
+        Raises:
+            SpecError: `bad-answer`.
+        """
+        found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}")
+        if found is not None:
+            return _scaled(found[1], found[2], kind)
+        if named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
+            raise bad_answer(self.key, f'"{alone[0]}" has no number behind it')
+        return None
+
+    def known_within(self, words: str, kind: str) -> tuple[float, float | None] | None:
+        """Read as `after` does, and the share "within 30 %" that may stand behind the unit."""
+        within = rf"(?:\s*(?:within|{PLUS_MINUS})\s*{NUMBER}{_PER_CENT})?"
+        found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}{within}")
+        if found is None:
+            return None
+        return _scaled(found[1], found[2], kind), None if found[3] is None else float(found[3]) / 100.0
+
+    def band(self) -> tuple[float | None, float | None]:
+        """Read from where to where a band reaches, in rad/s; one unit holds for both ends."""
+        frequency = NUMBER + _UNITS["frequency"]
+        found = self.take(rf"\bfrom\b{_OF}{frequency}\s*(?:\bup to\b|\bto\b|-)\s*{frequency}")
+        if found is None:
+            return self.after("from", "frequency"), self.after("up to|to", "frequency")
+        low, high = ((found[1], found[2] or found[4]), (found[3], found[4] or found[2]))
+        return _scaled(*low, "frequency"), _scaled(*high, "frequency")
+
+    def share(self) -> float | None:
+        """Read "within 30 %" and return the fraction."""
+        found = self.number(rf"(?:\b(?:within)\b|{PLUS_MINUS})?\s*{NUMBER}{_PER_CENT}")
+        return None if found is None else found / 100.0
+
+    def finish(self, also: str = "") -> None:
+        """Refuse what was not read, except words without content and `also` (words between blanks).
+
+        Raises:
+            SpecError: `bad-answer`.
+        """
+        known = f"{_FILLING} {also.lower()}".split()
+        for piece in self._left.split("|"):
+            if any(word and word not in known for word in re.split(r"[\s,;.:]+", piece.lower())):
+                raise bad_answer(self.key, f'"{piece.strip(" ,;.:")}" is not understood')
+
+
+def _scaled(number: str, unit: str | None, kind: str) -> float:
+    return float(number) * _SCALES.get(kind, {}).get((unit or "").lower(), 1.0)
+
+
+def seconds(text: str, key: str) -> float:
+    """Return the seconds of an answer that is a time, such as "45 min".
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    found = re.fullmatch(rf"(?:about\s*)?{NUMBER}\s*([a-z]*)", text.strip(), re.I)
+    if found is None or float(found[1]) <= 0.0:
+        raise bad_answer(key, f'"{text}" is no time')
+    if (found[2].lower() or "s") not in _SCALES["time"]:
+        raise bad_answer(key, f'"{found[2]}" is no unit of time: s, min or h')
+    return _scaled(found[1], found[2], "time")
+
+
+def needed(value: float | None, key: str, what: str) -> float:
+    """Return the value, which must be there and positive.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    if value is None:
+        raise bad_answer(key, f"it does not say {what}")
+    if not value > 0.0:
+        raise bad_answer(key, f"{what} must be positive, not {value:g}")
+    return value
+
+
+def short(value: float) -> str:
+    """Write a number with the six digits of a spec."""
+    return f"{value:.6g}"
