@@ -26,6 +26,10 @@ from inputdesign_cli.identification.level_shifts import (
     chance_of_shifts as chance_of_shifts,
 )
 from inputdesign_cli.identification.mattering import Moves as Moves, that_matter as that_matter
+from inputdesign_cli.identification.noise_first import (
+    Noise as Noise,
+    noises_of_residuals as noises_of_residuals,
+)
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (
     ResidualTest as ResidualTest,

@@ -125,13 +125,17 @@ def directed_tests(
     records: Records,
     point: Point,
     white: White,
-    alternatives: Sequence[Alternative],
+    alternatives: Sequence[tuple[Alternative, NDArray[np.float64]]],
     echoes: Echoes | None = None,
 ) -> tuple[Directed, ...]:
-    """The test of every alternative; those that these data cannot tell apart share one."""
+    """Return the test of every alternative; those that these data cannot distinguish share one.
+
+    Args:
+        alternatives: each with its column (N, p).
+    """
     groups: list[list[_Tried]] = []
-    for alternative in alternatives:
-        column = white.columns(alternative.column(records)[None])[:, 0]
+    for alternative, own_column in alternatives:
+        column = white.columns(own_column[None])[:, 0]
         through = None if echoes is None else alternative.echo(records.lengths)
         own = np.array([0.0 if through is None else white.echoes(through)])
         mean = float(white.mean_left(column[:, None], own)[0])
@@ -147,7 +151,7 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
     statistic /= group[0].size ** 2 * white.variance
     larger: Model | None = None
     along = group[0].left[:, None] / group[0].size
-    if white.probability(statistic, along) < _OPEN and records.earlier is None:
+    if white.probability(statistic, along) < _OPEN and records.earlier is None and white.whitening is None:
         ends = [(tried.alternative.estimated(records), tried) for tried in group]
         known = [(end, tried) for end, tried in ends if end is not None]
         if known:
@@ -168,7 +172,7 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
         ScoreTest(name, fault, statistic, 1, white.probability(statistic, along), None),
         alternatives,
         deviation=1.0 / first.size,
-        following=-explained[explained.size - point.theta.size :],
+        following=-explained[white.starts.shape[1] :][: point.theta.size],
         size=float(first.left @ white.residuals - first.mean) / first.size**2,
         larger=larger,
     )

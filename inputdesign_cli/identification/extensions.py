@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.identification.adequacy import Fault
 from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.noise_first import late_echo
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Record, Records, shifted
+from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
-from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import DELAY, Listed
 
 _LAGS = ("a", "f", DELAY)
@@ -113,20 +113,6 @@ def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo 
     if any(np.any(np.abs(np.roots(polynomial)) >= 1.0) for polynomial, _ in below.values()):
         return None
     return late_echo(below, parameter.power, lengths)
-
-
-def late_echo(filters: Mapping[int, tuple[Array, float]], power: int, lengths: Sequence[int]) -> Echo:
-    """Errors `power` samples late, of each listed output by its sign through 1 / polynomial; others not."""
-
-    def echo(errors: Array) -> Array:
-        late = shifted(errors, power, lengths)
-        found = np.zeros_like(errors)
-        for i, (below, sign) in filters.items():
-            pieces = np.split(late[:, i], np.cumsum(lengths)[:-1])
-            found[:, i] = np.concatenate([filtered([sign], below, piece) for piece in pieces])
-        return found
-
-    return echo
 
 
 def new_name(larger: Model, model: Model) -> str:

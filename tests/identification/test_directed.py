@@ -9,10 +9,10 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import identify
-from inputdesign_cli.identification.adequacy import DIRECTED_LEVEL
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.identification.transfer_matrix import TransferKind
+from inputdesign_cli.levels import level
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
@@ -163,7 +163,7 @@ def test_a_dead_time_in_s_is_found(hold):
 def test_a_level_and_a_state_add_unknowns_not_verdicts():
     u, y = (x[0] for x in data("oe", 300, np.random.default_rng(7)))
     found = identify(one_channel([0, 1.0, 0.5], F=[1, -0.7]), u, y + 30.0, rest=False)
-    assert min(one.test.probability for one in found.directed) < DIRECTED_LEVEL
+    assert min(one.test.probability for one in found.directed) < level("one parameter")
 
 
 @pytest.mark.slow
