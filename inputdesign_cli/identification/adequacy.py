@@ -14,7 +14,7 @@ white by filters that are estimated along.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -32,11 +32,12 @@ _LAGS = 25
 _FEW = 4
 _GROWTH = 1.35
 _FARTHEST = 400
+_AHEAD = 20
 _TRENDS, _WAVES = 3, 4
 # Of each residual at most one direction in so many is tried.
 _SAMPLES_A_DIRECTION = 8
 
-Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear"]
+Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feedback"]
 
 
 @dataclass(frozen=True)
@@ -212,6 +213,34 @@ def robust_white(
         return None
     whitening = Whitening.of(white.without(columns).errors, records.lengths)
     return White.of(records, point, whitening=whitening)
+
+
+def future_tests(
+    records: Records, theta: Array, white: White, recent: int, echoes: Echoes | None
+) -> tuple[ScoreTest, ...]:
+    """Return for every input the test whether its future explains prediction errors.
+
+    In open loop no input knows them beforehand. One does that answers the outputs, or that was logged late.
+    Whatever past inputs explain is taken off, since an input is foretold by its own past.
+    """
+    lags = min(
+        _AHEAD,
+        max(records.samples // (_SAMPLES_A_DIRECTION * sum(records.u.shape[1:] + records.y.shape[1:])), 1),
+    )
+    past = [tried.white(white) for tried in caused(records, theta, recent, feedback=False)]
+    white = white.without(np.column_stack(past))
+    turned = records.lengths[::-1]
+    u = records.whitened(theta, records.u)
+    found = []
+    for j in range(u.shape[2]):
+        own = u[:, ::-1, j].T
+        ahead = [shifted(own, lag, turned)[::-1].T for lag in range(1, lags + 1)]
+        tried = Regressors(
+            f"future of u{j + 1}", "feedback", np.stack(ahead, axis=2), tuple(range(1, lags + 1))
+        )
+        test = _tested(records, white, tried, echoes)
+        found += [] if test is None else [replace(test, source=j)]
+    return tuple(found)
 
 
 def caused(records: Records, theta: Array, recent: int, *, feedback: bool) -> list[Regressors]:

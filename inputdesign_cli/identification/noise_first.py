@@ -1,8 +1,8 @@
 """Noise of the residuals: the polynomials that the noise model of a spec lacks.
 
-Tests of a model compare residuals with their own noise. Where the stated model of that noise is refuted, they
-are worth nothing: slow noise looks like a drift, or like a plant that is not linear. So the noise is estimated
-first. Residuals are C/D e, with C and D of small orders that BIC chooses.
+Tests of a model compare residuals with their own noise. Where the stated model of that noise is refuted,
+slow noise looks like a drift, or like a plant that is not linear. So the noise is estimated first. Residuals
+are C/D e, with C and D of small orders that BIC chooses.
 """
 
 from __future__ import annotations

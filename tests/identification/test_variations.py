@@ -141,7 +141,7 @@ def test_of_a_plant_slower_one_way_it_is_the_finite_difference():
     y = one_way(u, 0.0) + 1e-3 * np.random.default_rng(7).standard_normal(u.size)
     found = identify(one_channel([0, 0.2], F=[1, -0.8]), u[:, None], y[:, None], rest=True)
     (way,) = varying(found)["direction of y"].alternatives
-    column = scipy.signal.lfilter([0, 0.2], [1, -0.8], way.signal)
+    column = way.column[:, 0]
     difference = (one_way(u, 1e-4) - one_way(u, -1e-4)) / 2e-4
     through_plant = [scipy.signal.lfilter([0, 0.2], [1, -0.8], x) for x in (np.ones(u.size), u)]
     known = np.column_stack([difference, *through_plant])

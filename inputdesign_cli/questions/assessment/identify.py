@@ -257,7 +257,7 @@ def speaking_against(task: Identification, found: Identified) -> list[Finding]:
         *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
         *shifted_levels(estimate, data, units.time_unit),
         *refutations(found.model, estimate),
-        *([] if found.loop_told else answering(units, estimate, data)),
+        *([] if found.loop_told else answering(units, estimate)),
         *repetitions(estimate, data.files, data.repeated),
     ]
 
