@@ -41,3 +41,4 @@ from inputdesign_cli.identification.spikes import Spikes as Spikes, spikes as sp
 from inputdesign_cli.identification.unknown_start import (
     information_begun_anywhere as information_begun_anywhere,
 )
+from inputdesign_cli.identification.variations import RISING as RISING
