@@ -12,7 +12,7 @@ ROOT = Path(inputdesign_cli.__file__).parent
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
 ORDER = [
     {"arrays", "errors", "finding", "error_codes", "expressions", "version", "regular_file", "compute"},
-    {"diagnostics"},
+    {"diagnostics", "levels"},
     {"specification", "plant"},
     {"spectrum", "information", "accuracy"},
     {"design", "signal", "identification"},

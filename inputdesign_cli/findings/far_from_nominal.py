@@ -13,14 +13,13 @@ from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding, FindingKind, Severity
 from inputdesign_cli.identification import Estimate
+from inputdesign_cli.levels import level
 from inputdesign_cli.outcome import Nominal
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
 
 # Farther apart than this share of the larger of the two, and than so many r_u, G is that of another plant.
 _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
-# A statistic that chance exceeds more often than this contradicts nothing.
-_CHANCE = 1e-3
 # The probability that a normal variable is farther than five standard deviations from its mean.
 _FIVE_DEVIATIONS = 5.733e-7
 _AWAY = 4.0
@@ -148,7 +147,7 @@ def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
         f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
         f"{worst.frequency:.4g} {units.per_time} ({chi_squared}"
     )
-    if found.probability > _CHANCE:
+    if found.probability > level("far from nominal"):
         return [
             UNCERTAIN.found(
                 "the estimate is far from the plant of the spec, but so uncertain that it does not "
@@ -171,7 +170,7 @@ def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
 def of_first_part(distance: Distance) -> list[Finding]:
     """Return the same where an experiment in parts begins: a poor first estimate is why it goes in parts."""
     found = distance.nominal
-    if found.probability > _CHANCE:
+    if found.probability > level("far from nominal"):
         return []
     sign = " and G has the opposite sign at low frequency: check the signs of the record"
     return [

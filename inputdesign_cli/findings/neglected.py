@@ -15,7 +15,7 @@ from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding, FindingKind, Severity
 from inputdesign_cli.findings.refuted_structure import REMEDY
-from inputdesign_cli.identification import Directed, Estimate, Moves, that_matter
+from inputdesign_cli.identification import RISING, Directed, Estimate, Moves, that_matter
 from inputdesign_cli.outcome import Neglected as Entry
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
@@ -36,8 +36,8 @@ RESTS_ON_STRUCTURE = FindingKind(
     "verdict-rests-on-structure",
     Severity.NOTE,
     "the verdict rests on the structure",
-    "The data do not rule out one more parameter that would move G by more than is admitted. With 95 % "
-    "confidence it moves G by no more than the message says.",
+    "The data do not rule out one more parameter, or a gain that changes evenly, which would move G by more "
+    "than is admitted. With 95 % confidence it moves G by no more than the message says.",
     "Excite the frequencies where G would move, if the structure is not known from physics.",
 )
 
@@ -120,10 +120,9 @@ def objections(units: Units, found: Sequence[Neglected], *, met: bool) -> list[F
 
 
 def unseen(units: Units, found: Sequence[Neglected]) -> list[Finding]:
-    """Return a finding where the record leaves more of the structure open than is admitted."""
-    worst = max(
-        (one for one in found if one.directed.of_structure), key=lambda one: one.may_move, default=None
-    )
+    """Return a finding where a parameter more, or a drifting gain, may move G by more than is admitted."""
+    tried = [one for one in found if one.directed.of_structure or one.directed.test.name.endswith(RISING)]
+    worst = max(tried, key=lambda one: one.may_move, default=None)
     if worst is None or worst.may_move <= 1.0:
         return []
     return [

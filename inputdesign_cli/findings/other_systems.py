@@ -8,11 +8,8 @@ import numpy as np
 
 from inputdesign_cli.finding import Finding, FindingKind, Severity
 from inputdesign_cli.identification import Estimate
+from inputdesign_cli.levels import level
 from inputdesign_cli.outcome.shares import chance
-
-# Experiments of one system differ as much with this probability; a prior, which decides along with the data
-# and may hide what they say, and the data with this one, and so seldom do they agree as closely.
-_ONE_SYSTEM, _PRIOR = 1e-3, 1e-2
 
 PRIOR_COUNTS = FindingKind(
     "prior-counts",
@@ -87,7 +84,7 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     """
     if estimate.agreement is None or estimate.likeness is None:
         return []
-    if estimate.agreement * looks < _PRIOR:
+    if estimate.agreement * looks < level("prior"):
         return [
             PRIOR_CONTRADICTED.found(
                 "experiment.prior and these data contradict each other (probability "
@@ -97,7 +94,7 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
                 probability=estimate.agreement,
             )
         ]
-    if estimate.likeness * looks < _PRIOR:
+    if estimate.likeness * looks < level("prior"):
         return [
             PRIOR_REPEATED.found(
                 "experiment.prior and these data agree more closely than others do (probability "
@@ -120,7 +117,7 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
     found = [
         (probability, name)
         for probability, name in zip(estimate.alike, files, strict=False)
-        if probability * len(estimate.alike) * looks < _ONE_SYSTEM
+        if probability * len(estimate.alike) * looks < level("one system")
     ]
     if not found:
         return []

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.explore import answers_output, early_answers
+from inputdesign_cli.explore import early_answers
 from inputdesign_cli.finding import Finding, FindingKind, Severity
-from inputdesign_cli.findings.places import Samples
-from inputdesign_cli.identification import Estimate
+from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driven_by_nothing, like_nothing_elsewhere
 from inputdesign_cli.outcome.shares import chance
@@ -19,6 +16,8 @@ from inputdesign_cli.plant import Model
 
 # G of the spec is ruled out where chance alone makes such an estimate more seldom.
 _OTHERWISE = 1e-6
+# Of the squares of prediction errors: what the future of an input explains if it moves the output.
+_MOSTLY = 0.5
 
 ANSWERING = FindingKind(
     "input-answers-output",
@@ -60,39 +59,50 @@ NOISE_PREVAILS = FindingKind(
 )
 
 
-def answering(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
+def answering(units: Units, estimate: Estimate) -> list[Finding]:
     """Return a finding for each input that answers outputs, or comes after their answer; none in a loop."""
-    if units.closed_loop:
-        return []
-    ends = np.cumsum(data.lengths)[:-1]
-    parts = list(zip(np.split(data.u, ends), np.split(data.y, ends), strict=True))
-    errors = np.split(estimate.errors, ends)
-    answers = [
-        ANSWERING.found(
-            f"prediction errors help to tell {signal_name('u', j, units.inputs)} (probability "
-            f"{chance(probability)}), and no input in open loop answers the noise: it was logged late, "
-            "columns are swapped, or the data come from a loop; mend the columns, or state the loop as "
-            "experiment.controller",
-            where=signal_name("u", j, units.inputs),
-            probability=probability,
-        )
-        for j, probability in answers_output(parts, errors)
+    samples = estimate.errors.size
+    return [
+        _late(units.inputs, units.outputs, test)
+        if test.statistic > _MOSTLY * samples
+        else _answers(units, test)
+        for test in estimate.answering
     ]
-    return answers or late_inputs(parts)
+
+
+def _answers(units: Units, test: ScoreTest) -> Finding:
+    name = signal_name("u", test.source, units.inputs)
+    return ANSWERING.found(
+        f"prediction errors help to predict {name} (probability {chance(test.probability)}), and no input in "
+        "open loop answers the noise: it was logged late, columns are swapped, or the data come from a loop; "
+        "mend the columns, or state the loop as experiment.controller",
+        where=name,
+        probability=test.probability,
+    )
+
+
+def _late(inputs: int, outputs: int, test: ScoreTest) -> Finding:
+    """Return the finding for an input that an output answers some samples before it moves."""
+    name, output = signal_name("u", test.source, inputs), signal_name("y", test.output, outputs)
+    return LATE.found(
+        f"{output} answers {name} up to {test.lag} {'sample' if test.lag == 1 else 'samples'} before that "
+        f"moves (probability {chance(test.probability)} by chance): the input was logged late, columns are "
+        "swapped, or the columns are not of one clock. See when the plant really gets its input, and write "
+        "both at the same times",
+        where=name,
+        samples=test.lag,
+        probability=test.probability,
+    )
 
 
 def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
-    """Return a finding for each input before which an output moves: u (n, r), y (n, p) of an open loop."""
+    """Return a finding for each input before which an output moves: u (n, r), y (n, p) without a model."""
     inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
     return [
-        LATE.found(
-            f"{signal_name('y', one.output, outputs)} answers {signal_name('u', one.input, inputs)} up to "
-            f"{one.samples} {'sample' if one.samples == 1 else 'samples'} before that moves (probability "
-            f"{chance(one.probability)} by chance): the input was logged late, or the columns are not of one "
-            "clock. See when the plant really gets its input, and write both at the same times",
-            where=signal_name("u", one.input, inputs),
-            samples=one.samples,
-            probability=one.probability,
+        _late(
+            inputs,
+            outputs,
+            ScoreTest("", "feedback", 0.0, 1, one.probability, one.samples, one.output, one.input),
         )
         for one in early_answers(parts)
     ]

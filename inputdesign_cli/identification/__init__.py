@@ -26,6 +26,10 @@ from inputdesign_cli.identification.level_shifts import (
     chance_of_shifts as chance_of_shifts,
 )
 from inputdesign_cli.identification.mattering import Moves as Moves, that_matter as that_matter
+from inputdesign_cli.identification.noise_first import (
+    Noise as Noise,
+    noises_of_residuals as noises_of_residuals,
+)
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (
     ResidualTest as ResidualTest,
@@ -37,3 +41,4 @@ from inputdesign_cli.identification.spikes import Spikes as Spikes, spikes as sp
 from inputdesign_cli.identification.unknown_start import (
     information_begun_anywhere as information_begun_anywhere,
 )
+from inputdesign_cli.identification.variations import RISING as RISING

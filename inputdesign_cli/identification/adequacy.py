@@ -1,18 +1,20 @@
-"""Is the model right? Score tests of what a larger model would add ([engle-1984]).
+"""Is the model right? Score tests of regressors that the model does without ([engle-1984]).
 
-Each test regresses the residuals on signals that the model does without: past inputs, past residuals, slow
-trends. What the parameters and unknown starts can explain is taken off these signals first, so that the
+A supplier proposes regressors: past inputs, past residuals, slow trends; `directed.py` has those of one
+parameter more. What the parameters and unknown starts can explain is taken off them first, so that the
 statistic is chi-squared whatever was estimated. Past residuals lack what was estimated as well: where unknown
-starts are many, as those of a record with gaps, that alone correlates residuals, and it is what scores are
+starts are many, as in a record with gaps, that alone correlates residuals, and it is what scores are
 compared with. In a narrow band the noise is known no better than its model there, and a statistic follows F
-instead ([satterthwaite-1946]). Few signals find a fault of a known shape, many one of any; `directed.py` has
-the fewest, one parameter more.
+instead ([satterthwaite-1946]).
+
+All of this holds for the right noise. Where the stated noise is refuted, residuals and regressors are made
+white by filters that are estimated along.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,22 +22,22 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.noise_first import Whitening
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records, shifted
 from inputdesign_cli.identification.white import DEPENDENT, Echoes, White
+from inputdesign_cli.levels import level
 
-# A right model fails some test of many signals, some of one parameter, and that of level shifts, with at most
-# these probabilities.
-LEVEL, DIRECTED_LEVEL, SHIFT_LEVEL = 0.005, 0.015, 0.001
 _LAGS = 25
 _FEW = 4
 _GROWTH = 1.35
 _FARTHEST = 400
+_AHEAD = 20
 _TRENDS, _WAVES = 3, 4
 # Of each residual at most one direction in so many is tried.
 _SAMPLES_A_DIRECTION = 8
 
-Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear"]
+Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feedback"]
 
 
 @dataclass(frozen=True)
@@ -62,14 +64,47 @@ class ScoreTest:
 
 
 @dataclass(frozen=True)
-class _Signals:
-    """What is tried: columns (N, m) for every output, and their lags if they have any."""
+class Regressors:
+    """What a test tries: columns (p, N, m) for every output, and their lags if they have any."""
 
     name: str
     fault: Fault
-    columns: NDArray[np.float64]  # (p, N, m)
+    columns: NDArray[np.float64]
     lags: tuple[int, ...] = ()
     of_residuals: bool = False
+
+    def white(self, white: White) -> Array:
+        """Return columns ((N + M) p, p m), each in one output, in units of the noise."""
+        return white.columns(_of_outputs(self.columns))
+
+
+@dataclass(frozen=True)
+class Score:
+    """What regressors explain of residuals once estimated parameters and starts are taken off.
+
+    Attributes:
+        statistic: chi-squared where the model is right, along orthonormal `directions` ((N + M) p, freedom).
+        sizes: (m,), of each regressor alone, in standard deviations up to a common factor.
+    """
+
+    statistic: float
+    directions: Array
+    sizes: Array
+
+
+def score(white: White, columns: Array, means: Array) -> Score:
+    """Return the score of regressors ((N + M) p, m), whose scores have these means (m,) to begin with."""
+    norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    regressors = white.unexplained(columns / norms)
+    scores = regressors.T @ white.residuals - white.mean_left(columns / norms, means / norms)
+    left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
+    kept = sizes > DEPENDENT
+    along = (right[kept] @ scores) / sizes[kept]
+    return Score(
+        float(np.sum(along**2)) / white.variance,
+        left[:, kept],
+        scores / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT),
+    )
 
 
 def score_tests(
@@ -80,46 +115,47 @@ def score_tests(
     recent: int,
     feedback: bool = False,
     echoes: Echoes | None = None,
+    robust: White | None = None,
 ) -> tuple[ScoreTest, ...]:
-    """The tests of an estimate.
+    """Return the tests of many signals.
 
     Args:
         white: the estimate in the units of its noise.
-        echoes: what past errors add to the gradients of parameters, where they add anything; None where that
-            is not known: then scores are compared with zero.
         recent: the lag up to which the structure looks at the inputs.
         feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
+        echoes: what past errors add to the gradients of parameters, where they add anything; None where that
+            is not known: then scores are compared with zero.
+        robust: the estimate with residuals that were made white, for all but past residuals.
     """
     tests = []
-    for signals in _tried(records, point, recent, int(feedback)):
-        columns = white.columns(_of_outputs(signals.columns))
-        norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        regressors = white.unexplained(columns / norms)
-        own = np.zeros(norms.size)
-        if signals.of_residuals and echoes is not None:
-            own = _mean_scores(records, white, signals.lags)
-        scores = regressors.T @ white.residuals - white.mean_left(columns / norms, own / norms)
-        left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
-        kept = sizes > DEPENDENT
-        freedom = int(np.sum(kept))
-        if not freedom:
-            continue
-        along = (right[kept] @ scores) / sizes[kept]
-        statistic = float(np.sum(along**2)) / white.variance
-        scores = scores / np.maximum(np.linalg.norm(regressors, axis=0), DEPENDENT)
-        output, largest = divmod(int(np.argmax(np.abs(scores))), signals.columns.shape[2])
-        lag = signals.lags[largest] if signals.lags else None
-        # Lag by lag all inputs, or all residuals.
-        source = largest % signals.lags.count(signals.lags[0]) if signals.lags else 0
-        # What past residuals explain has no band of its own.
-        probability = (
-            float(scipy.special.chdtrc(freedom, statistic))
-            if signals.of_residuals
-            else white.probability(statistic, left[:, kept])
-        )
-        found = (signals.name, signals.fault, statistic, freedom, probability, lag, output, source)
-        tests.append(ScoreTest(*found))
+    of_inputs = caused(records, point.theta, recent, feedback=feedback)
+    for tried in [*of_inputs, *past_residuals(records, white), _trend(records, point.theta)]:
+        own = white if robust is None or tried.of_residuals else robust
+        found = _tested(records, own, tried, echoes)
+        tests += [] if found is None else [found]
     return tuple(tests)
+
+
+def _tested(records: Records, white: White, tried: Regressors, echoes: Echoes | None) -> ScoreTest | None:
+    columns = tried.white(white)
+    means = np.zeros(columns.shape[1])
+    if tried.of_residuals and echoes is not None:
+        means = _mean_scores(records, white, tried.lags)
+    found = score(white, columns, means)
+    freedom = found.directions.shape[1]
+    if not freedom:
+        return None
+    output, largest = divmod(int(np.argmax(np.abs(found.sizes))), tried.columns.shape[2])
+    lag = tried.lags[largest] if tried.lags else None
+    # Lag by lag all inputs, or all residuals.
+    source = largest % tried.lags.count(tried.lags[0]) if tried.lags else 0
+    # What past residuals explain has no band of its own.
+    probability = (
+        float(scipy.special.chdtrc(freedom, found.statistic))
+        if tried.of_residuals
+        else white.probability(found.statistic, found.directions)
+    )
+    return ScoreTest(tried.name, tried.fault, found.statistic, freedom, probability, lag, output, source)
 
 
 def failed(
@@ -128,34 +164,116 @@ def failed(
     shifts: Sequence[ScoreTest] = (),
     looks: int = 1,
 ) -> tuple[ScoreTest, ...]:
-    """Those that refute the model, each at its share of the level of its group (Bonferroni).
+    """Return those that refute the model, each at its share of the level of its group (Bonferroni).
 
     Args:
         looks: how often they are asked as data come in; the looks share the level as well.
     """
-    groups = ((directed, DIRECTED_LEVEL / looks), (tests, LEVEL / looks), (shifts, SHIFT_LEVEL / looks))
-    return tuple(test for group, level in groups for test in group if test.probability * len(group) < level)
+    groups = ((directed, "one parameter"), (tests, "many signals"), (shifts, "level shift"))
+    return tuple(
+        test
+        for group, name in groups
+        for test in group
+        if test.probability * len(group) < level(name) / looks
+    )
 
 
-def _tried(records: Records, point: Point, recent: int, first: int) -> list[_Signals]:
-    n, p = point.errors.shape
-    u = records.whitened(point.theta, records.u)
+def robust_white(
+    records: Records,
+    point: Point,
+    white: White,
+    *,
+    less: White,
+    recent: int,
+    feedback: bool,
+    echoes: Echoes | None,
+    more: Sequence[NDArray[np.float64]],
+) -> White | None:
+    """Return the estimate with its residuals made white; None where their stated model is not refuted.
+
+    A plant that is not the model colours residuals as well. So what all regressors explain is taken off
+    before the noise is judged, and what inputs explain before it is estimated.
+
+    Args:
+        less: `white` once level shifts are taken off; the rest as of `score_tests`.
+        more: columns (N, p) of single parameters.
+    """
+
+    def white_enough(judged: White) -> bool:
+        tests = [_tested(records, judged, tried, echoes) for tried in past_residuals(records, judged)]
+        return not failed([test for test in tests if test is not None])
+
+    if white_enough(white):
+        return None
+    of_inputs = caused(records, point.theta, recent, feedback=feedback)
+    single = [white.columns(np.array(more))] if more else []
+    columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
+    trend = _trend(records, point.theta).white(white)
+    if white_enough(less.without(np.column_stack([columns, trend]))):
+        return None
+    whitening = Whitening.of(white.without(columns).errors, records.lengths)
+    return White.of(records, point, whitening=whitening)
+
+
+def future_tests(
+    records: Records, theta: Array, white: White, recent: int, echoes: Echoes | None
+) -> tuple[ScoreTest, ...]:
+    """Return for every input the test whether its future explains prediction errors.
+
+    In open loop no input knows them beforehand. One does that answers the outputs, or that was logged late.
+    Whatever past inputs explain is taken off, since an input is foretold by its own past.
+    """
+    lags = min(
+        _AHEAD,
+        max(records.samples // (_SAMPLES_A_DIRECTION * sum(records.u.shape[1:] + records.y.shape[1:])), 1),
+    )
+    past = [tried.white(white) for tried in caused(records, theta, recent, feedback=False)]
+    white = white.without(np.column_stack(past))
+    turned = records.lengths[::-1]
+    u = records.whitened(theta, records.u)
+    found = []
+    for j in range(u.shape[2]):
+        own = u[:, ::-1, j].T
+        ahead = [shifted(own, lag, turned)[::-1].T for lag in range(1, lags + 1)]
+        tried = Regressors(
+            f"future of u{j + 1}", "feedback", np.stack(ahead, axis=2), tuple(range(1, lags + 1))
+        )
+        test = _tested(records, white, tried, echoes)
+        found += [] if test is None else [replace(test, source=j)]
+    return tuple(found)
+
+
+def caused(records: Records, theta: Array, recent: int, *, feedback: bool) -> list[Regressors]:
+    """Return past inputs at lags of the structure, and sums of them over ever longer runs of lags."""
+    n, first = records.samples, int(feedback)
+    u = records.whitened(theta, records.u)
     most = max(n // _SAMPLES_A_DIRECTION, 2)
     near = tuple(range(first, min(recent + _FEW, most // u.shape[2]) + 1))
     bins = _bins(first, min(n // 6, _FARTHEST), most // u.shape[2])
-    few, many = (tuple(range(1, min(lags, max(most // p, 1)) + 1)) for lags in (_FEW, _LAGS))
-    own = np.repeat(point.errors[None], p, axis=0)
-    found = [
-        _Signals("recent_inputs", "plant", *_lagged(records, u, near)),
-        _Signals("older_inputs", "plant", *_summed(records, u, bins)),
-        _Signals("recent_residuals", "noise", *_lagged(records, own, few), of_residuals=True),
-        _Signals("older_residuals", "noise", *_lagged(records, own, many), of_residuals=True),
+    return [
+        Regressors("recent_inputs", "plant", *_lagged(records, u, near)),
+        Regressors("older_inputs", "plant", *_summed(records, u, bins)),
     ]
+
+
+def past_residuals(records: Records, white: White) -> list[Regressors]:
+    """Return past residuals at few lags and at many."""
+    n, p = records.y.shape
+    most = max(n // _SAMPLES_A_DIRECTION, 2)
+    few, many = (tuple(range(1, min(lags, max(most // p, 1)) + 1)) for lags in (_FEW, _LAGS))
+    own = np.repeat(white.errors[None], p, axis=0)
+    return [
+        Regressors("recent_residuals", "noise", *_lagged(records, own, few), of_residuals=True),
+        Regressors("older_residuals", "noise", *_lagged(records, own, many), of_residuals=True),
+    ]
+
+
+def _trend(records: Records, theta: Array) -> Regressors:
+    """Return powers of time and slow waves."""
     time = np.concatenate([np.linspace(-1.0, 1.0, length) for length in records.lengths])
     slow = [time**power for power in range(_TRENDS)]
     slow += [np.cos(0.5 * np.pi * k * (1.0 + time)) for k in range(1, _WAVES + 1)]
-    trends = np.stack(slow, axis=1)
-    return [*found, _Signals("trend", "drift", records.whitened(point.theta, trends))]
+    return Regressors("trend", "drift", records.whitened(theta, np.stack(slow, axis=1)))
 
 
 def _of_outputs(signals: NDArray[np.float64]) -> NDArray[np.float64]:

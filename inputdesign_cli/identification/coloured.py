@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.extensions import Extension, late_echo
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
+from inputdesign_cli.identification.noise_first import late_echo
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.search import Search

@@ -1,66 +1,60 @@
-"""Is one parameter missing, or a gain not always the same? Score tests, then likelihood ratios.
+"""Is one parameter missing, or a gain not always the same? Score tests of one, and likelihood ratios.
 
 A test of one degree of freedom sees a neglected pole or sample of delay where tests of many lags share
-their power among all ([engle-1984]). It also tells how far G would move, which the residuals need not show: a
+their power among all ([engle-1984]). It also says how far G would move, which the residuals need not show: a
 narrow band of excitation hardly contradicts a model that is wrong at its edge.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.identification.adequacy import Fault, ScoreTest
-from inputdesign_cli.identification.record_problem import Point
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.adequacy import Fault, Score, ScoreTest, score
 from inputdesign_cli.identification.white import Echo, Echoes, White
 from inputdesign_cli.plant import Model
 
-# A score of a larger probability is the last word.
-_OPEN = 0.3
 # A parameter of whose effect the estimate explains all but this share is not tried.
 _EXPLAINED = 1e-6
-# A mean of the score that is less than this, in standard deviations, does not matter.
-_LITTLE = 0.1
+# A score of a larger probability is the last word. A mean of less than so many deviations is none.
+_OPEN, _LITTLE = 0.3, 0.1
 # Directions with a larger cosine are one.
 _SAME = 0.99
 
 
-class Alternative(Protocol):
-    """The model with one parameter more, which is zero in the model."""
+@dataclass(frozen=True)
+class Alternative:
+    """The model with one parameter more, which is zero in the model.
+
+    Attributes:
+        name: of the parameter; `phrase`, what it is, for a sentence.
+        fault: what is wrong where it is missing.
+        column: (N, p), minus the derivative of the prediction errors with respect to it.
+        slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
+            each state that a plant may be in.
+        lag: whether it is a pole or a dead time of the plant.
+        echo: what past errors add to `column`; None where they add nothing.
+        estimated: makes the larger model from the same data, and the statistic of its likelihood ratio; None
+            where there is none.
+    """
+
+    name: str
+    phrase: str
+    fault: Fault
+    column: NDArray[np.float64]
+    slopes: Callable[[Model, ArrayLike], ComplexArray]
+    lag: bool = False
+    echo: Echo | None = None
+    estimated: Callable[[], tuple[Model, float]] | None = None
 
     @property
-    def name(self) -> str:
-        """Of the parameter."""
-
-    @property
-    def phrase(self) -> str:
-        """What it is, for a sentence."""
-
-    @property
-    def fault(self) -> Fault:
-        """What is wrong where it is missing."""
-
-    @property
-    def lag(self) -> bool:
-        """Whether it is a pole or a dead time of the plant."""
-
-    def column(self, records: Records) -> NDArray[np.float64]:
-        """(N, p): minus the derivative of the prediction errors with respect to it."""
-
-    def slopes(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """(states, n, p, r): the derivative of G with respect to it, in each state that a plant may be in."""
-
-    def echo(self, lengths: Sequence[int]) -> Echo | None:
-        """What past errors add to `column` in records of these lengths; None where they add nothing."""
-
-    def estimated(self, records: Records) -> tuple[Model, float, float] | None:
-        """The model with it, estimated, the cost of that and the cost without it; None: not to be had."""
+    def of_structure(self) -> bool:
+        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        return self.fault in ("plant", "noise")
 
 
 @dataclass(frozen=True)
@@ -70,17 +64,17 @@ class Directed:
     Attributes:
         test: whether these data ask for it.
         alternatives: the parameters that act alike on these data where they are small, the likeliest first.
-        deviation: the standard deviation of the first one.
+        size: the first of them, to first order; `deviation`, its standard deviation.
         following: (k,), how the parameters of the model change with it, to first order.
-        size: what it is to first order; `larger`, the estimate of the larger model where there is one.
+        larger: the estimate of the larger model, where it was looked for.
     """
 
     test: ScoreTest
     alternatives: tuple[Alternative, ...]
+    size: float
     deviation: float
     following: Array
-    size: float
-    larger: Model | None
+    larger: Model | None = None
 
     @property
     def of_structure(self) -> bool:
@@ -93,89 +87,80 @@ class Directed:
         return any(alternative.lag for alternative in self.alternatives)
 
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """(states, n, p, r): how G of the estimated `model` changes if the parameter is estimated along."""
+        """Return how G of the estimated `model` changes if the parameter is estimated, (states, n, p, r)."""
         if self.larger is not None:
             return np.asarray(self.larger.plant_at(w) - model.plant_at(w))[None]
         return self.size * self.slope(model, w)
 
     def slope(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """(states, n, p, r): the derivative of G with respect to the parameter, the others following."""
+        """Return the derivative of G by the parameter, the others following: (states, n, p, r)."""
         others = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
         return np.asarray(others + self.alternatives[0].slopes(model, w))
 
 
-@dataclass(frozen=True)
-class _Tried:
-    """An alternative, its gradient (N p,) in white units, what the estimate leaves of it, the mean score."""
-
-    alternative: Alternative
-    column: Array
-    left: Array
-    mean: float
-
-    @property
-    def size(self) -> float:
-        return float(np.linalg.norm(self.left))
-
-    def like(self, other: _Tried) -> bool:
-        return bool(abs(self.left @ other.left) > _SAME * self.size * other.size)
+_Tried = tuple[Alternative, Array, Array]
+"""An alternative, its column ((N + M) p,) in white units, and the direction that is not explained."""
 
 
 def directed_tests(
-    records: Records,
-    point: Point,
-    white: White,
-    alternatives: Sequence[Alternative],
-    echoes: Echoes | None = None,
+    white: White, alternatives: Sequence[Alternative], parameters: int, echoes: Echoes | None = None
 ) -> tuple[Directed, ...]:
-    """The test of every alternative; those that these data cannot tell apart share one."""
+    """Return the test of every alternative; those that these data cannot distinguish share one.
+
+    Args:
+        parameters: k of the model.
+        echoes: what past errors add to the gradients of parameters; None where that is not known.
+    """
     groups: list[list[_Tried]] = []
     for alternative in alternatives:
-        column = white.columns(alternative.column(records)[None])[:, 0]
-        through = None if echoes is None else alternative.echo(records.lengths)
-        own = np.array([0.0 if through is None else white.echoes(through)])
-        mean = float(white.mean_left(column[:, None], own)[0])
-        tried = _Tried(alternative, column, white.unexplained(column), mean)
-        if tried.size > _EXPLAINED * np.linalg.norm(column):
-            alike = next((group for group in groups if tried.like(group[0])), None)
-            groups.append([tried]) if alike is None else alike.append(tried)
-    return tuple(_tested(records, point, white, group) for group in groups)
+        column = white.columns(alternative.column[None])[:, 0]
+        left = white.unexplained(column)
+        size = float(np.linalg.norm(left))
+        if size <= _EXPLAINED * np.linalg.norm(column):
+            continue
+        tried = (alternative, column, left / size)
+        alike = (group for group in groups if abs(group[0][2] @ tried[2]) > _SAME)
+        group = next(alike, None)
+        groups.append([tried]) if group is None else group.append(tried)
+    return tuple(_tested(white, group, parameters, echoes) for group in groups)
 
 
-def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -> Directed:
-    statistic = float(group[0].left @ white.residuals - group[0].mean) ** 2
-    statistic /= group[0].size ** 2 * white.variance
+def _tested(white: White, group: list[_Tried], parameters: int, echoes: Echoes | None) -> Directed:
+    found, mean = _score(white, group[0], echoes)
+    statistic, directions = found.statistic, found.directions
     larger: Model | None = None
-    along = group[0].left[:, None] / group[0].size
-    if white.probability(statistic, along) < _OPEN and records.earlier is None:
-        ends = [(tried.alternative.estimated(records), tried) for tried in group]
-        known = [(end, tried) for end, tried in ends if end is not None]
-        if known:
-            known.sort(key=lambda each: each[0][1])
-            (larger, cost, without), best = known[0]
-            group = [tried for _, tried in known] + [tried for end, tried in ends if end is None]
+    if white.whitening is None and white.probability(statistic, directions) < _OPEN:
+        ends = [(one.estimated(), one) for one, _, _ in group if one.estimated is not None]
+        if ends:
+            ends.sort(key=lambda end: -end[0][1])
+            larger, ratio = ends[0][0]
+            likeliest = [one for _, one in ends]
+            group.sort(key=lambda tried: likeliest.index(tried[0]) if tried[0] in likeliest else len(group))
             # A likelihood ratio has no mean to be compared with.
-            if abs(best.mean) <= _LITTLE * best.size:
-                statistic = max(statistic, _ratio(records, point, without, cost))
-    first = group[0]
+            statistic = max(statistic, ratio) if abs(mean) <= _LITTLE else statistic
+            found, _ = _score(white, group[0], echoes)
+    _, column, along = group[0]
+    size = float(along @ column)
     scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
-    explained = np.linalg.lstsq(white.explained / scale, first.column, rcond=1e-12)[0] / scale
-    alternatives = tuple(tried.alternative for tried in group)
-    name = " or ".join(sorted(alternative.name for alternative in alternatives))
+    explained = np.linalg.lstsq(white.explained / scale, column, rcond=1e-12)[0] / scale
+    alternatives = tuple(alternative for alternative, _, _ in group)
     faults = [alternative.fault for alternative in alternatives]
     fault: Fault = "plant" if "plant" in faults else faults[0]
+    name = " or ".join(sorted(alternative.name for alternative in alternatives))
     return Directed(
-        ScoreTest(name, fault, statistic, 1, white.probability(statistic, along), None),
+        ScoreTest(name, fault, statistic, 1, white.probability(statistic, directions), None),
         alternatives,
-        deviation=1.0 / first.size,
-        following=-explained[explained.size - point.theta.size :],
-        size=float(first.left @ white.residuals - first.mean) / first.size**2,
+        size=float(found.sizes[0]) / size,
+        deviation=1.0 / size,
+        following=-explained[white.starts.shape[1] :][:parameters],
         larger=larger,
     )
 
 
-def _ratio(records: Records, point: Point, cost: float, less: float) -> float:
-    """-2 log of the likelihood ratio of two minima."""
-    if records.weights is not None:
-        return cost - less
-    return float(point.near.freedom * np.log(cost / max(less, 1e-300)))
+def _score(white: White, tried: _Tried, echoes: Echoes | None) -> tuple[Score, float]:
+    """Return the score of a regressor, and the mean of it in its standard deviations."""
+    alternative, column, along = tried
+    own = 0.0 if echoes is None or alternative.echo is None else white.echoes(alternative.echo)
+    mean = np.array([own])
+    expected = float(white.mean_left(column[:, None], mean)[0])
+    return score(white, column[:, None], mean), expected / float(along @ column)

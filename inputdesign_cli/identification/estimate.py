@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
+from inputdesign_cli.identification.adequacy import ScoreTest, failed, future_tests, robust_white, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
 from inputdesign_cli.identification.level_shifts import LevelShift, chance_of_shifts, level_shifts
@@ -26,6 +26,7 @@ from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.white import Echoes, White
 from inputdesign_cli.information.coordinates import triangular_factor
+from inputdesign_cli.levels import level
 
 # Samples that residual tests need.
 _FEWEST_TESTED = 20
@@ -61,6 +62,9 @@ class Estimate:
         tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
         shift: where an output most likely shifts, whatever the inputs do; None in too short records.
         shifts: all that refute the structure; `beside_shifts`, `tests` once they are taken off.
+        coloured: whether the noise has more structure than its model; all tests but those of past residuals
+            are then made with residuals that were made white.
+        future: in open loop, whether the future of each input explains errors.
     """
 
     names: tuple[str, ...]
@@ -86,6 +90,8 @@ class Estimate:
     shift: LevelShift | None
     shifts: tuple[LevelShift, ...]
     beside_shifts: tuple[ScoreTest, ...]
+    coloured: bool
+    future: tuple[ScoreTest, ...]
     alike: tuple[float, ...]
     rivals: tuple[Rival, ...]
     repeated: Repetition | None
@@ -106,6 +112,11 @@ class Estimate:
         """Those of many signals, those of one parameter more, and that of level shifts."""
         shifts = () if self.shift is None else (self.shift.test,)
         return (*self.tests, *(one.test for one in self.directed), *shifts)
+
+    @property
+    def answering(self) -> tuple[ScoreTest, ...]:
+        """Those of inputs that answer the outputs, or that come after their answer."""
+        return tuple(test for test in self.future if test.probability * len(self.future) < level("feedback"))
 
     @property
     def failed(self) -> tuple[ScoreTest, ...]:
@@ -218,10 +229,12 @@ def concluded(
     left, kept = _not_explained(records)
     white = White.of(records, point, echoes)
 
-    def tested(point: Point, white: White) -> tuple[ScoreTest, ...]:
-        return score_tests(records, point, white, recent=recent, feedback=feedback, echoes=echoes)
-
     shift, shifts, less = level_shifts(records, point, white)
+    varying = [one.column for one in alternatives if not one.of_structure]
+    settings = {"recent": recent, "feedback": feedback, "echoes": echoes}
+    robust = robust_white(records, point, white, less=less, more=varying, **settings)
+    if robust is not None:
+        shift, shifts, less = level_shifts(records, point, robust)
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
@@ -246,11 +259,17 @@ def concluded(
         independence=cross_correlations(
             point.errors[left], records.u[left], fitted=in_plant, feedback=feedback, lengths=kept
         ),
-        tests=tested(point, white),
-        directed=directed_tests(records, point, white, alternatives, echoes),
+        tests=score_tests(records, point, white, robust=robust, **settings),
+        directed=directed_tests(
+            robust or white, alternatives, len(names), echoes if robust is None else None
+        ),
         shift=shift,
         shifts=shifts,
-        beside_shifts=tested(*less) if shifts else (),
+        beside_shifts=score_tests(records, point, less if robust is None else white, robust=less, **settings)
+        if shifts
+        else (),
+        coloured=robust is not None,
+        future=() if feedback else future_tests(records, point.theta, robust or white, recent, echoes),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
         repeated=repetition(point.errors, records.u, feedback=feedback),

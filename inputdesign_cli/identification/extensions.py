@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.arrays import Array, ComplexArray, Rows
-from inputdesign_cli.identification.adequacy import Fault
+from inputdesign_cli.arrays import Array, Rows
+from inputdesign_cli.identification.directed import Alternative
 from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.noise_first import late_echo
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Record, Records, shifted
+from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
-from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import DELAY, Listed
 
 _LAGS = ("a", "f", DELAY)
@@ -28,10 +28,10 @@ class Extension:
     Attributes:
         model: the larger model, whose new parameter is zero; of a model in other parameters than its
             coefficients, that of the coefficients.
-        name: of the new parameter; `what` it is, `phrase` in a sentence.
+        name: of the new parameter; `what` it is.
         record: makes the record of samples u (N, r), y (N, p) that the larger structure is to explain.
         nested: whether that structure has no further freedom than the one parameter.
-        through: made for the lengths of records, T of errors (N, p), what they add to `column`; None where
+        through: made for the lengths of records, what past errors (N, p) add to the gradient; None where
             they add nothing.
     """
 
@@ -47,53 +47,37 @@ class Extension:
         """Where the new parameter stands in theta of the larger model."""
         return self.model.names.index(self.name)
 
-    @property
-    def phrase(self) -> str:
-        """It, for a sentence."""
-        return f"one more {self.what} ({self.name})"
-
-    @property
-    def fault(self) -> Fault:
-        """What is wrong where it is missing."""
-        return "plant" if self.model.in_plant[self.index] else "noise"
-
-    @property
-    def lag(self) -> bool:
-        """Whether it is a pole or a dead time of the plant."""
-        return self.model.parameters[self.index].letter in _LAGS
-
-    def slopes(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """(1, n, p, r): the derivative of G with respect to the new parameter."""
-        return self.model.plant_gradient(w)[None, :, self.index]
-
-    def column(self, records: Records) -> NDArray[np.float64]:
-        """(N, p): minus the derivative of the prediction errors with respect to the new parameter."""
-        return self.records(records).gradient(self.model.theta, self.index)
-
-    def echo(self, lengths: Sequence[int]) -> Echo | None:
-        """What past errors add to `column` in records of these lengths; None where they add nothing."""
-        return None if self.through is None else self.through(lengths)
-
-    def estimated(self, records: Records) -> tuple[Model, float, float] | None:
-        """The larger model where a search ends that begins here, its cost, and that without the parameter.
-
-        Both costs are with the unknown starts of the larger structure, which may be more in every record; the
-        second is by one step of Gauss and Newton from here. None where the structure is not nested.
-        """
-        if not self.nested:
-            return None
-        larger, theta = self.records(records), self.model.theta
-        found = minimise(RecordProblem((larger,)), theta[None])
-        point, others = evaluate(larger, theta), np.arange(theta.size) != self.index
-        slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
-        gain = float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
-        return self.model.at(found.theta[0]), float(found.cost[0]), point.cost - gain
-
-    def records(self, records: Records) -> Records:
-        """The same samples against the larger structure."""
+    def against(self, records: Records) -> Alternative:
+        """Return the parameter as a regressor of the prediction errors of records."""
         parts = tuple(self.record(part.u, part.y) for part in records.parts)
         larger = Records(parts, weights=records.weights, ramp=records.ramp)
-        return larger.begun_freely(records.late) if records.free else larger
+        larger = larger.begun_freely(records.late) if records.free else larger
+        return Alternative(
+            self.name,
+            f"one more {self.what} ({self.name})",
+            "plant" if self.model.in_plant[self.index] else "noise",
+            larger.gradient(self.model.theta, self.index),
+            lambda model, w: self.model.plant_gradient(w)[None, :, self.index],
+            lag=self.model.parameters[self.index].letter in _LAGS,
+            echo=None if self.through is None else self.through(records.lengths),
+            estimated=partial(self._estimated, larger) if self.nested and records.earlier is None else None,
+        )
+
+    def _estimated(self, records: Records) -> tuple[Model, float]:
+        """Return the larger model that a search from here finds, and -2 log of the likelihood ratio.
+
+        Both costs are with the unknown starts of the larger structure; that without the parameter is by one
+        step of Gauss and Newton from here.
+        """
+        theta = self.model.theta
+        found = minimise(RecordProblem((records,)), theta[None])
+        point, others = evaluate(records, theta), np.arange(theta.size) != self.index
+        slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
+        cost = point.cost - float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
+        less = float(found.cost[0])
+        known = records.weights is not None
+        ratio = cost - less if known else float(point.near.freedom * np.log(cost / max(less, 1e-300)))
+        return self.model.at(found.theta[0]), ratio
 
 
 def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo | None:
@@ -113,20 +97,6 @@ def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo 
     if any(np.any(np.abs(np.roots(polynomial)) >= 1.0) for polynomial, _ in below.values()):
         return None
     return late_echo(below, parameter.power, lengths)
-
-
-def late_echo(filters: Mapping[int, tuple[Array, float]], power: int, lengths: Sequence[int]) -> Echo:
-    """Errors `power` samples late, of each listed output by its sign through 1 / polynomial; others not."""
-
-    def echo(errors: Array) -> Array:
-        late = shifted(errors, power, lengths)
-        found = np.zeros_like(errors)
-        for i, (below, sign) in filters.items():
-            pieces = np.split(late[:, i], np.cumsum(lengths)[:-1])
-            found[:, i] = np.concatenate([filtered([sign], below, piece) for piece in pieces])
-        return found
-
-    return echo
 
 
 def new_name(larger: Model, model: Model) -> str:

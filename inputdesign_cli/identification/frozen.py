@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.repeated import NORMAL, whitened
+from inputdesign_cli.levels import level
 
 # Fewer equal samples in a row, and fewer samples in all, say nothing.
 _SHORTEST, _FEW = 5, 20
-# Of a record of noise, rounded or not, some run is called frozen with at most this probability.
-_CHANCE = 1e-4
 # The largest density of noise with two-sided exponential tails, by its robust deviation; normal: 0.4.
 _DENSITY = 0.52
 # A filter of two differences passes so much of the mean square of rounding, d^2 / 12.
@@ -73,7 +72,7 @@ def frozen(
                 if not np.any(np.ptp(u[run][:-1], axis=0) > moves):
                     continue
                 by_chance = len(u) * stays ** (length - 1)
-                if by_chance < _CHANCE or np.ptp(simulated[run, output]) > d + _SPAN * size:
+                if by_chance < level("frozen") or np.ptp(simulated[run, output]) > d + _SPAN * size:
                     found.append(Frozen(output, start + first, length))
     return found
 

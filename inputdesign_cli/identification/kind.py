@@ -164,15 +164,8 @@ def identify_records(
         in_plant=int(np.sum(kind.explaining)),
         recent=kind.recent,
         alternatives=(
-            *kind.extensions(best.point.theta, feedback=feedback),
-            *variations(
-                kind.record,
-                best.point.theta,
-                best.records.u,
-                best.records.lengths,
-                moved,
-                best.records.lateness(best.point.theta),
-            ),
+            *(one.against(best.records) for one in kind.extensions(best.point.theta, feedback=feedback)),
+            *variations(best.records, kind.record, best.point.theta, moved),
         ),
         experiments=experiments or (len(y),),
         feedback=feedback,

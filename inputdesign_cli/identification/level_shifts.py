@@ -9,16 +9,17 @@ hardly notices what has happened once; and what the estimate makes of it is anot
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.adequacy import SHIFT_LEVEL, ScoreTest
+from inputdesign_cli.identification.adequacy import ScoreTest
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.white import White
+from inputdesign_cli.levels import level
 
 # Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
 _SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125
@@ -63,7 +64,7 @@ class LevelShift:
     @property
     def refutes(self) -> bool:
         """Whether a model without it is refuted."""
-        return self.alone and self.test.probability < SHIFT_LEVEL
+        return self.alone and self.test.probability < level("level shift")
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,8 @@ class _Scores:
 
 def level_shifts(
     records: Records, point: Point, white: White
-) -> tuple[LevelShift | None, tuple[LevelShift, ...], tuple[Point, White]]:
-    """The likeliest shift, all that refute a model without them, and the estimate with these taken off.
+) -> tuple[LevelShift | None, tuple[LevelShift, ...], White]:
+    """Return the likeliest shift, all that refute a model without them, and the estimate without these.
 
     The first is None in records that are too short for any.
     """
@@ -85,9 +86,9 @@ def level_shifts(
     shift = first
     while shift is not None and shift.refutes and len(found) < _MOST:
         found.append(shift)
-        point, white = _taken_off(records, point, white, shift)
+        white = _taken_off(records, point.theta, white, shift)
         shift = level_shift(records, point, white)
-    return first, tuple(found), (point, white)
+    return first, tuple(found), white
 
 
 def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
@@ -111,7 +112,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     lags = _lags(max(records.lengths))
     steps = np.stack([_smooth(max(records.lengths), lag) for lag in lags], axis=1)
     single = np.eye(1, len(steps))[0]
-    through = _responses(records, point.theta, np.column_stack([steps, single]))
+    through = _responses(records, point.theta, np.column_stack([steps, single]), white)
     for begin, length in _stretches(records):
         inner = slice(_FEWEST, length - _FEWEST)
         for output in range(len(through)):
@@ -139,24 +140,13 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     return LevelShift(output, sample, lag, begins, ends, rises, test, score, looks, alone)
 
 
-def _taken_off(records: Records, point: Point, white: White, shift: LevelShift) -> tuple[Point, White]:
-    """The same with the shift estimated along, as far as errors are concerned."""
+def _taken_off(records: Records, theta: Array, white: White, shift: LevelShift) -> White:
+    """Return the estimate with the shift estimated along, as far as errors are concerned."""
     begin, length = next(one for one in _stretches(records) if shift.sample < sum(one))
     signal = np.zeros((records.samples, 1))
     after = begin + length - shift.sample
     signal[shift.sample : begin + length, 0] = _smooth(after, shift.lag)
-    left = white.unexplained(_column(records, point.theta, white, signal, shift.output))
-    along = left / np.linalg.norm(left)
-    less = replace(
-        white,
-        residuals=white.residuals - along[:, 0] * float(along[:, 0] @ white.residuals),
-        explained=np.column_stack([along, white.explained]),
-        basis=np.column_stack([along, white.basis]),
-    )
-    outputs = len(white.root)
-    errors = less.residuals[: records.samples * outputs].reshape(-1, outputs)
-    near = replace(point.near, errors=errors @ np.linalg.inv(white.root).T)
-    return replace(point, near=near), less
+    return white.without(_column(records, theta, white, signal, shift.output))
 
 
 def _stretches(records: Records) -> Iterator[tuple[int, int]]:
@@ -183,13 +173,17 @@ def _smooth(samples: int, lag: float) -> Array:
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
-def _responses(records: Records, theta: Array, signals: Array) -> Array:
+def _responses(records: Records, theta: Array, signals: Array, white: White) -> Array:
     """(p, n, m): signals (n, m) of the longest record through the inverse noise model of each output."""
     at = int(np.argmax(records.lengths))
     begin = sum(records.lengths[:at])
     every = np.zeros((records.samples, signals.shape[1]))
     every[begin : begin + len(signals)] = signals
-    return records.whitened(theta, every)[:, begin : begin + len(signals)]
+    through = records.whitened(theta, every)
+    if white.whitening is not None:
+        through = np.moveaxis(white.whitening.through(np.moveaxis(through, 0, -1).swapaxes(0, 1)), -1, 0)
+        through = through.swapaxes(1, 2)
+    return through[:, begin : begin + len(signals)]
 
 
 def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:

@@ -17,10 +17,8 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.directed import Directed
+from inputdesign_cli.levels import level
 
-# A gain that is not always the same often has a large effect that the record hardly shows. It matters where
-# it moves G by more than is admitted with a probability below this, shared among all that would (Bonferroni).
-_VARIES = 0.005
 # The odds from which nothing is promised any more.
 _ODDS = 0.7
 # Odds beforehand that something is missing, shared among the parameters that stand for it: what plants mostly
@@ -70,9 +68,11 @@ class Moves:
 
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
     """The numbers of those that speak against a verdict."""
-    # What is not a number is no promise: it is compared so that it speaks against one.
+    # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
+    # G by more than is admitted, at a level that is shared among all that would. What is not a number is no
+    # promise: it is compared so that it speaks against one.
     varying = [i for i, one in enumerate(tried) if not (one.of_structure or moves[i].largest <= 1.0)]
-    found = [i for i in varying if not tried[i].test.probability * len(varying) >= _VARIES]
+    found = [i for i in varying if not tried[i].test.probability * len(varying) >= level("varying gain")]
     structure = [i for i, one in enumerate(tried) if one.of_structure]
     among = Counter(tried[i].lag for i in structure)
     for i in structure:

@@ -14,130 +14,98 @@ the dead time.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import Fault
+from inputdesign_cli.identification.directed import Alternative
 from inputdesign_cli.identification.records import Record, Records
-from inputdesign_cli.identification.white import Echo
 from inputdesign_cli.plant import Model
 
 # A signal that lies on a straight line but for this share is the input itself.
 _STRAIGHT = 1e-6
 _PARTS = {"a quarter": 0.25, "half": 0.5, "three quarters": 0.75}
 
-_Tried = tuple[str, str, Fault, Array, tuple[float, ...]]
-"""Name, phrase, fault, f and its slopes in each state, of an input of size one."""
+RISING = "rising"
+"""The last word of the name of a gain that changes evenly."""
 
 
-@dataclass(frozen=True)
-class Variation:
-    """A gain of one input that is not always the same; an `Alternative`.
+class _Tried(NamedTuple):
+    """A signal f (N,) that is made of an input of size one.
 
     Attributes:
-        channel: of the input.
-        signal: f (N,), of the samples of all records one after the other, in the unit of the input.
         gains: df/du, one for each state of the plant.
         moves: of f that depends on how much the output changes from sample to sample, what a change adds to f
             in each state; zero of others. It acts `early` by so many samples.
-        record: makes the record of samples u (N, r), y (N, p) that the structure is to explain.
-        theta: (k,), the estimate.
     """
 
     name: str
     phrase: str
     fault: Fault
-    channel: int
-    signal: Array
+    f: Array
     gains: tuple[float, ...]
-    moves: tuple[float, ...]
-    early: int
-    record: Callable[[Array, Array], Record]
-    theta: Array
-
-    @property
-    def lag(self) -> bool:
-        """No."""
-        return False
-
-    def column(self, records: Records) -> NDArray[np.float64]:
-        """(N, p): minus the derivative of the prediction errors with respect to x."""
-        only = np.zeros_like(records.u)
-        only[:, self.channel] = self.signal
-        pieces = np.split(only, np.cumsum(records.lengths)[:-1])
-        outputs = records.y.shape[1]
-        parts = (self.record(piece, np.zeros((len(piece), outputs))) for piece in pieces)
-        return -np.concatenate([part.errors_and_gradient(self.theta)[0] for part in parts])
-
-    def slopes(self, model: Model, w: ArrayLike) -> NDArray[np.complex128]:
-        """(states, n, p, r): the derivative of G with respect to x in each state."""
-        G = model.plant_at(w)
-        own, moving = np.zeros_like(G), np.zeros_like(G)
-        own[..., self.channel] = G[..., self.channel]
-        turned = np.exp(1j * np.asarray(w, dtype=float))
-        change = (1.0 - 1.0 / turned) * turned**self.early
-        moving[..., self.channel] = change[:, None] * G[..., self.channel] ** 2
-        return np.asarray(
-            np.multiply.outer(np.array(self.gains), own) + np.multiply.outer(np.array(self.moves), moving)
-        )
-
-    def echo(self, lengths: Sequence[int]) -> Echo | None:
-        """None: f is made of inputs."""
-        return None
-
-    def estimated(self, records: Records) -> None:
-        """None: no model of a linear plant has x."""
-        return
+    moves: tuple[float, ...] = (0.0,)
+    early: int = 0
 
 
 def variations(
-    record: Callable[[Array, Array], Record],
-    theta: Array,
-    u: Array,
-    lengths: Sequence[int],
-    simulated: Array | None,
-    late: int,
-) -> tuple[Variation, ...]:
-    """What is tried of each input, and of the speed of a plant with one input and output.
+    records: Records, record: Callable[[Array, Array], Record], theta: Array, simulated: Array | None
+) -> tuple[Alternative, ...]:
+    """Return what is tried of each input, and of the speed of a plant with one input and output.
 
     Of an input with two values powers and sign are the input itself about a level: they say nothing.
 
     Args:
         record: makes the record of samples (N, r), (N, p) that the structure is to explain.
         theta: (k,), the estimate.
-        u: (N, r), of all records one after the other.
-        lengths: of the records.
         simulated: (N, p), what the inputs cause; None where that cannot be simulated, or frequencies are not
             in rad/sample.
-        late: samples by which the plant answers later than a lag behind a hold does.
     """
-    found = []
+    found, u, lengths = [], records.u, records.lengths
     for channel, samples in enumerate(u.T):
         name, size = "u" if u.shape[1] == 1 else f"u{channel + 1}", float(np.std(samples))
         x = (samples - np.mean(samples)) / max(size, 1e-300)
-        found += [
-            Variation(of, phrase, fault, channel, size * f, gains, (0.0,) * len(gains), 0, record, theta)
-            for of, phrase, fault, f, gains in (*_changes(name, x), *_curves(name, x, lengths))
-        ]
+        tried = [*_changes(name, x), *_curves(name, x, lengths)]
         if simulated is not None and u.shape[1] == simulated.shape[1] == 1:
-            found += _one_way(x, size, simulated[:, 0], late, lengths, record, theta)
+            tried += _one_way(x, simulated[:, 0], records.lateness(theta) + 1, lengths)
+        for one in tried:
+            column = _caused(records, record, theta, channel, size * one.f)
+            found.append(Alternative(one.name, one.phrase, one.fault, column, _slopes(channel, size, one)))
     return tuple(found)
 
 
-def _one_way(
-    x: Array,
-    size: float,
-    simulated: Array,
-    late: int,
-    lengths: Sequence[int],
-    record: Callable[[Array, Array], Record],
-    theta: Array,
-) -> Iterator[Variation]:
-    """A plant of input samples size x (N,) that is slower where its output (N,) rises than where it falls."""
-    early = late + 1
+def _caused(
+    records: Records, record: Callable[[Array, Array], Record], theta: Array, channel: int, signal: Array
+) -> NDArray[np.float64]:
+    """Return what a signal (N,) beside an input adds to the outputs, as minus prediction errors (N, p)."""
+    only, outputs = np.zeros_like(records.u), records.y.shape[1]
+    only[:, channel] = signal
+    pieces = np.split(only, np.cumsum(records.lengths)[:-1])
+    parts = (record(piece, np.zeros((len(piece), outputs))) for piece in pieces)
+    return -np.concatenate([part.errors_and_gradient(theta)[0] for part in parts])
+
+
+def _slopes(channel: int, size: float, tried: _Tried) -> Callable[[Model, ArrayLike], NDArray[np.complex128]]:
+    """Return the derivative of G by x, (states, n, p, r), as a function of model and frequency."""
+
+    def slopes(model: Model, w: ArrayLike) -> NDArray[np.complex128]:
+        G = model.plant_at(w)
+        own, moving = np.zeros_like(G), np.zeros_like(G)
+        own[..., channel] = G[..., channel]
+        turned = np.exp(1j * np.asarray(w, dtype=float))
+        change = size * (1.0 - 1.0 / turned) * turned**tried.early
+        moving[..., channel] = change[:, None] * G[..., channel] ** 2
+        moves = np.resize(tried.moves, len(tried.gains))
+        return np.asarray(np.multiply.outer(np.array(tried.gains), own) + np.multiply.outer(moves, moving))
+
+    return slopes
+
+
+def _one_way(x: Array, simulated: Array, early: int, lengths: Sequence[int]) -> Iterator[_Tried]:
+    """Yield a plant of inputs x (N,) that is slower where its output (N,) rises than where it falls."""
     changes = np.concatenate(
         [
             np.append(np.diff(own, prepend=own[:1]), np.zeros(early))[early:]
@@ -149,28 +117,19 @@ def _one_way(
         return
     bent, slope = _bent(np.abs(changes) / scale, x, lengths)
     if np.linalg.norm(bent) > _STRAIGHT * np.sqrt(len(x)):
-        yield Variation(
-            "direction of y",
-            "a plant that is slower where y rises than where it falls, or the other way round",
-            "nonlinear",
-            0,
-            size * bent,
-            (-slope, -slope),
-            (-size / scale, size / scale),
-            early,
-            record,
-            theta,
-        )
+        phrase = "a plant that is slower where y rises than where it falls, or the other way round"
+        states = (-slope, -slope), (-1.0 / scale, 1.0 / scale)
+        yield _Tried("direction of y", phrase, "nonlinear", bent, *states, early)
 
 
 def _changes(name: str, x: Array) -> Iterator[_Tried]:
     """Yield a gain of samples x (N,) that rises evenly, and gains that jump during the record."""
     time = np.arange(x.size) / x.size
     phrase = f"a gain of {name} that rises or falls evenly during the record"
-    yield f"{name} rising", phrase, "change", (time - 0.5) * x, (-0.5, 0.5)
+    yield _Tried(f"{name} {RISING}", phrase, "change", (time - 0.5) * x, (-0.5, 0.5))
     for part, share in _PARTS.items():
         phrase = f"another gain of {name} after {part} of the record"
-        yield f"{name} after {part}", phrase, "change", np.where(time >= share, x, 0.0), (0.0, 1.0)
+        yield _Tried(f"{name} after {part}", phrase, "change", np.where(time >= share, x, 0.0), (0.0, 1.0))
 
 
 def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
@@ -185,7 +144,7 @@ def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
     ):
         bent, slope = _bent(f, x, lengths)
         if np.linalg.norm(bent) > _STRAIGHT * np.linalg.norm(f):
-            yield of, phrase, "nonlinear", bent, tuple(gain - slope for gain in gains)
+            yield _Tried(of, phrase, "nonlinear", bent, tuple(gain - slope for gain in gains))
 
 
 def _bent(f: Array, x: Array, lengths: Sequence[int]) -> tuple[Array, float]:

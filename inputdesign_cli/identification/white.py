@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.noise_first import Whitening
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 
@@ -40,6 +41,7 @@ class White:
         explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
         means: (k,), of the scores of the parameters, see `echoes`.
         known: what past errors add to the gradients of parameters of the noise.
+        whitening: filters of residuals that are not white; their coefficients come after the k parameters.
     """
 
     root: Array
@@ -51,24 +53,44 @@ class White:
     basis: Array
     means: Array
     known: Echoes
+    whitening: Whitening | None = None
 
     @classmethod
-    def of(cls, records: Records, point: Point, echoes: Echoes | None = None) -> White:
-        """That of a point of the search; a parameter that stands at its limit explains nothing."""
-        near, none = point.near, np.zeros(point.theta.size)
+    def of(
+        cls, records: Records, point: Point, echoes: Echoes | None = None, whitening: Whitening | None = None
+    ) -> White:
+        """Return that of a point of the search; a parameter that stands at its limit explains nothing.
+
+        Args:
+            whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
+                estimated along; of the parameters of that noise model nothing is known then.
+        """
+        near = point.near
         errors, psi = near.all_errors, np.where(_held(records, point)[:, None, None], 0.0, near.all_psi)
-        root = np.linalg.inv(np.linalg.cholesky(errors.T @ errors / len(near.errors)))
-        explained = np.column_stack([near.directions, (psi @ root.T).reshape(len(psi), -1).T])
+        starts = near.directions
+        if whitening is not None:
+            root = _root(errors, len(near.errors))
+            free = starts.T.reshape(-1, *errors.shape) @ np.linalg.inv(root).T
+            own = np.pad(whitening.slopes(near.errors), ((0, 0), (0, len(near.past)), (0, 0)))
+            errors, free, psi = (whitening.through(x) for x in (errors, free, psi))
+            psi = np.concatenate([psi, own])
+        root = _root(errors, len(near.errors))
+        if whitening is not None:
+            starts = _orthonormal(_scaled((free @ root.T).reshape(len(free), errors.size).T))
+            echoes = [(point.theta.size + k, echo) for k, echo in enumerate(whitening.echoes())]
+        explained = np.column_stack([starts, (psi @ root.T).reshape(len(psi), -1).T])
+        none = np.zeros(len(psi))
         found = cls(
             root,
             len(near.errors),
             (errors @ root.T).ravel(),
             near.errors.size / max(near.freedom, 1),
-            near.directions,
+            starts,
             explained,
             _orthonormal(_scaled(explained)),
             none,
             echoes or (),
+            whitening,
         )
         for index, through in echoes or ():
             none[index] = found.echoes(through)
@@ -76,6 +98,8 @@ class White:
 
     def columns(self, signals: NDArray[np.float64]) -> Array:
         """((N + M) p, m): signals (m, N, p) in units of the residuals, zero before the records."""
+        if self.whitening is not None:
+            signals = self.whitening.through(signals)
         found = np.zeros((self.residuals.size, len(signals)))
         found[: signals[0].size] = (signals @ self.root.T).reshape(len(signals), -1).T
         return found
@@ -134,6 +158,26 @@ class White:
         shares = np.linalg.lstsq(self.explained / scale, columns, rcond=1e-12)[0] / scale[:, None]
         return np.asarray(means - self.means @ shares[-self.means.size :])
 
+    @property
+    def errors(self) -> Array:
+        """(N, p): the residuals in their own units."""
+        outputs = len(self.root)
+        return self.residuals[: self.samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
+
+    def without(self, columns: Array) -> White:
+        """Return the same where columns ((N + M) p, m) of unknown sizes explain residuals as starts do."""
+        left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
+        left = left[:, sizes > DEPENDENT]
+        freedom = self.residuals.size / self.variance
+        return replace(
+            self,
+            residuals=self.residuals - left @ (left.T @ self.residuals),
+            variance=self.residuals.size / max(freedom - left.shape[1], 1.0),
+            starts=np.column_stack([self.starts, left]),
+            explained=np.column_stack([left, self.explained]),
+            basis=np.column_stack([self.basis, left]),
+        )
+
     def unexplained(self, columns: Array) -> Array:
         """What the estimate leaves of columns (N p, m)."""
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
@@ -155,6 +199,11 @@ def _held(records: Records, point: Point) -> NDArray[np.bool_]:
         moved = records.stabilised(point.theta + step)[j] - point.theta[j]
         held[j] = abs(moved) < 0.5 * abs(step[j])
     return held
+
+
+def _root(errors: Array, samples: int) -> Array:
+    """R (p, p) that makes errors (n, p) of so many samples white in space."""
+    return np.linalg.inv(np.linalg.cholesky(errors.T @ errors / samples))
 
 
 def _scaled(columns: Array) -> Array:

@@ -9,8 +9,9 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import identify
-from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, failed
+from inputdesign_cli.identification.adequacy import ScoreTest, failed
 from inputdesign_cli.identification.white import White
+from inputdesign_cli.levels import level
 from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx, two_by_two
@@ -49,7 +50,7 @@ def test_of_arx_it_is_the_auxiliary_regression():
 def test_the_level_is_shared_by_all_tests():
     five = [ScoreTest(str(i), "plant", 1.0, 1, p, 1) for i, p in enumerate((0.21, 0.19, 1.0, 0.5, 0.3))]
     assert failed(five) == ()
-    one = ScoreTest("x", "noise", 1.0, 1, 0.19 * LEVEL, 1)
+    one = ScoreTest("x", "noise", 1.0, 1, 0.19 * level("many signals"), 1)
     assert failed([*five[1:], one]) == (one,)
 
 

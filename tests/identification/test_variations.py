@@ -6,7 +6,7 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import Moves, identify, that_matter
-from inputdesign_cli.identification.adequacy import DIRECTED_LEVEL, LEVEL, SHIFT_LEVEL
+from inputdesign_cli.levels import level
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
 from tests.support.records import shifted, simulated
@@ -141,7 +141,7 @@ def test_of_a_plant_slower_one_way_it_is_the_finite_difference():
     y = one_way(u, 0.0) + 1e-3 * np.random.default_rng(7).standard_normal(u.size)
     found = identify(one_channel([0, 0.2], F=[1, -0.8]), u[:, None], y[:, None], rest=True)
     (way,) = varying(found)["direction of y"].alternatives
-    column = scipy.signal.lfilter([0, 0.2], [1, -0.8], way.signal)
+    column = way.column[:, 0]
     difference = (one_way(u, 1e-4) - one_way(u, -1e-4)) / 2e-4
     through_plant = [scipy.signal.lfilter([0, 0.2], [1, -0.8], x) for x in (np.ones(u.size), u)]
     known = np.column_stack([difference, *through_plant])
@@ -216,14 +216,19 @@ def test_what_matters_shares_a_level_among_its_like():
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "runs"), [("arx", 600), ("bj", 150)])
 def test_right_models_fail_no_more_often_than_the_level_allows(name, runs):
-    """All single parameters share DIRECTED_LEVEL, and all tests together the sum of the levels."""
+    """All single parameters share a level, and all tests together the sum of the levels."""
     rng = np.random.default_rng(11)
     model = SYSTEMS[name]
     u, y = data(name, 300, rng, runs=runs)
     found = [identify(model, u[i], y[i], start=model.theta, rest=True) for i in range(runs)]
     directed = sum(any(one.test in f.failed for one in f.directed) for f in found)
     every = sum(bool(f.failed) for f in found)
-    assert scipy.stats.binomtest(directed, runs, DIRECTED_LEVEL, "greater").pvalue > 1e-2
-    assert scipy.stats.binomtest(every, runs, DIRECTED_LEVEL + LEVEL + SHIFT_LEVEL, "greater").pvalue > 1e-2
+    assert scipy.stats.binomtest(directed, runs, level("one parameter"), "greater").pvalue > 1e-2
+    assert (
+        scipy.stats.binomtest(
+            every, runs, sum(map(level, ("one parameter", "many signals", "level shift"))), "greater"
+        ).pvalue
+        > 1e-2
+    )
     rising = [varying(f)["u rising"].test.probability for f in found]
     assert scipy.stats.kstest(rising, "uniform").pvalue > 1e-3

@@ -76,7 +76,7 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     """
     check_assessable(task)
     began = time.perf_counter()
-    found = identified(task, paths, preparation)
+    task, found = identified(task, paths, preparation)
     assessment = judge(task, found, began)
     if assessment.verdict != "missed" or found.question is None or found.question.top_up is None:
         return assessment

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +10,10 @@ import numpy as np
 from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.identification import Earlier
+from inputdesign_cli.identification import Earlier, Noise
+from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.identify import Identification, ModelQuestion
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.header import build_header
@@ -70,7 +72,26 @@ def build_identification(spec: Spec) -> Identification:
         knowledge=build_knowledge(spec),
         foreseen=build_foreseen(spec, nominal),
         at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
+        with_noise=lambda model, more: build_identification(_with_noise(spec, model, more)),
     )
+
+
+def _with_noise(spec: Spec, model: Model, more: Sequence[Noise]) -> Spec:
+    """Return the spec with the noise of a model, and of every output C and D more.
+
+    Raises:
+        SpecError: `noise` cannot be that, as of a plant that is not sampled.
+    """
+    stated = blocks_of(model)["noise"]
+    if "known" in stated:
+        raise bad_spec("not-supported", "noise.known fixes the noise", hint="leave it out", key="noise.known")
+    changes: dict[str, object] = {}
+    for letter, factors in zip("CD", zip(*more, strict=True), strict=True):
+        own = stated.get(letter, [1.0])
+        rows = own if isinstance(own[0], list) else [own] * len(factors)
+        longer = [np.convolve(row, factor).tolist() for row, factor in zip(rows, factors, strict=True)]
+        changes[f"noise.{letter}"] = longer if len(longer) > 1 else longer[0]
+    return spec.revised(changes, file="noise", design=False)
 
 
 def operating_point(spec: Spec) -> dict[str, float]:

@@ -18,13 +18,21 @@ from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, Location
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.estimates import band_limited, near_zero, on_the_circle, started, unasked
 from inputdesign_cli.findings.faults import faults, loop_faults
+from inputdesign_cli.findings.larger_noise import larger_noise, noise_probability
 from inputdesign_cli.findings.level_shifts import shifted_levels
 from inputdesign_cli.findings.other_systems import differences, prior_notes, repetitions
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.rivals import other_minima, ruled_out
 from inputdesign_cli.findings.search import stopped_at_ends, unsettled
 from inputdesign_cli.findings.unrelated_inputs import answering, hardly_explained, idle
-from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
+from inputdesign_cli.identification import (
+    Earlier,
+    Estimate,
+    Noise,
+    Rival,
+    identify as estimate_model,
+    noises_of_residuals,
+)
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.results import Results
@@ -88,6 +96,8 @@ class Identification:
         foreseen: the plants that the design was made for; None where it was made for the plant of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
+        with_noise: the same, where the noise of every output has C and D more than a model; None where no
+            other noise is tried.
     """
 
     header: Header
@@ -101,6 +111,7 @@ class Identification:
     knowledge: Knowledge | None
     foreseen: Foreseen | None
     at: Callable[[Model, int, Array, str], ModelQuestion]
+    with_noise: Callable[[Model, Sequence[Noise]], Identification] | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +119,8 @@ class Identified:
     """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate.
 
     `ruled_out` are other minima, which knowledge of the plant rules out; `loop_told` is whether a note says
-    already that inputs answer the outputs.
+    already that inputs answer the outputs; `noise_refuted` is the probability of the residuals with the noise
+    of the spec, where a larger one was estimated in its place.
     """
 
     estimate: Estimate
@@ -119,25 +131,57 @@ class Identified:
     unasked: str = ""
     ruled_out: tuple[Rival, ...] = ()
     loop_told: bool = False
+    noise_refuted: float | None = None
 
 
-def identified(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Identified:
-    """The estimate from the data in `paths`, jointly; the nominal parameters are one of the starts.
+def identified(
+    task: Identification, paths: Sequence[Path], preparation: Preparation
+) -> tuple[Identification, Identified]:
+    """Return the estimate from the data in `paths`, jointly, and the question that it answers.
+
+    The nominal parameters are one of the starts. Where the residuals refute the noise of the spec, a larger
+    one is estimated along.
 
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
     """
     known = {**task.operating_point, **preparation.operating_point}
     taken = replace(preparation, operating_point=known)
-    return estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
+    found = estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
+    return _with_larger_noise(task, found, paths[0])
 
 
-def estimated(task: Identification, data: Record, first: Path, taken: Preparation) -> Identified:
-    """The same from data that have been read.
+def _with_larger_noise(
+    task: Identification, found: Identified, first: Path
+) -> tuple[Identification, Identified]:
+    """Return the estimate with C and D of small orders more, if the noise of the spec is refuted without."""
+    estimate = found.estimate
+    if task.with_noise is None or not estimate.coloured:
+        return task, found
+    plant = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
+    for more in noises_of_residuals(estimate.errors, estimate.lengths):
+        try:
+            larger = replace(task.with_noise(found.model, more), header=task.header)
+            start = larger.nominal.theta.copy()
+            for k in np.flatnonzero(larger.nominal.in_plant):
+                start[k] = plant[larger.nominal.names[k]]
+            other = estimated(larger, found.data, first, found.preparation, start=start)
+        except IdesignError:  # this noise cannot be stated of such a plant, or not estimated
+            continue
+        if other.estimate.converged and not other.estimate.coloured:
+            return larger, replace(other, noise_refuted=noise_probability(estimate))
+    return task, found
+
+
+def estimated(
+    task: Identification, data: Record, first: Path, taken: Preparation, *, start: Array | None = None
+) -> Identified:
+    """Return the same from data that have been read.
 
     Args:
         first: the file that an objection to the data names.
         taken: how they were prepared.
+        start: an estimate (k,) of these data with another noise; None: there is none.
 
     Raises:
         DataError: the data do not determine the parameters.
@@ -160,7 +204,7 @@ def estimated(task: Identification, data: Record, first: Path, taken: Preparatio
         )
 
     with blaming_columns(first, data):
-        likeliest = from_start(nominal.theta, False)
+        likeliest = from_start(nominal.theta if start is None else start, start is not None)
         estimate, ruled_out = that_agrees(task.knowledge, likeliest, partial(from_start, near=True))
     if task.earlier is not None and task.earlier.is_of_these_data(estimate.theta, estimate.factor):
         raise DataError.because(
@@ -190,6 +234,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         rivals = other_minima(units, model, estimate, question.asked, question.entries, question.information)
     return [
         *unsettled(model, estimate),
+        *larger_noise(model, found.noise_refuted),
         *started(estimate),
         *on_the_circle(model, estimate),
         *speaking_against(task, found),
@@ -212,7 +257,7 @@ def speaking_against(task: Identification, found: Identified) -> list[Finding]:
         *([] if stopped_at_ends(found.model, estimate) else idle(units, task.nominal, found.model, estimate)),
         *shifted_levels(estimate, data, units.time_unit),
         *refutations(found.model, estimate),
-        *([] if found.loop_told else answering(units, estimate, data)),
+        *([] if found.loop_told else answering(units, estimate)),
         *repetitions(estimate, data.files, data.repeated),
     ]
 
@@ -262,7 +307,7 @@ def identify(task: Identification, paths: Sequence[Path], preparation: Preparati
         DataError: see `identified`.
     """
     began = time.perf_counter()
-    return identification_results(task, identified(task, paths, preparation), began)
+    return identification_results(*identified(task, paths, preparation), began)
 
 
 @contextmanager
