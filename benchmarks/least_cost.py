@@ -66,8 +66,8 @@ def prepared(bound: str, order: int) -> tuple[Problem, float]:
         ROOT / "specs" / "flexible_transmission.yaml", [*BOUNDS[bound], f"spectrum.order={order}"]
     )
     task = build_task(spec)
-    power = white_power(task.question)
-    problem = whitened_problem(task.question, power)
+    power = white_power(task.asked.question)
+    problem = whitened_problem(task.asked.question, power)
     # Caches only of what both start from. Those of the requirement are left to be timed.
     _ = problem.information_map, problem.price, problem.gradients.grid, problem.baseline_information
     return problem, power

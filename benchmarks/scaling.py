@@ -113,7 +113,9 @@ def ours(spec: Spec) -> tuple[Design, Row]:
     task = build_task(parse_spec(json.dumps(spec)))
     built = time.process_time()
     design = solve_design(
-        task.question, tolerance=task.tolerance, any_spectrum_tolerance=task.any_spectrum_tolerance
+        task.asked.question,
+        tolerance=task.method.tolerance,
+        any_spectrum_tolerance=task.method.any_spectrum_tolerance,
     )
     found, free = design.result, design.any_spectrum
     return design, {

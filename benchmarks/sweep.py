@@ -48,7 +48,7 @@ AGREEMENT = 1e-3
 def plain_program(samples: int) -> float:
     """The least cost on a grid of frequencies, from the spec to the optimum."""
     task = build_task(load_spec(SPEC, [f"experiment.samples={samples}"]))
-    return textbook(whitened_problem(task.question, white_power(task.question)), GRID)
+    return textbook(whitened_problem(task.asked.question, white_power(task.asked.question)), GRID)
 
 
 def against_textbook(folder: Path, *, timed: int) -> dict[str, float]:

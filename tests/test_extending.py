@@ -118,7 +118,8 @@ def test_a_new_family_of_spectra_is_designed_and_proved():
     edges, target = np.array([0.0, 0.5, 1.4, np.pi]), [[60, 35, 5], [35, 60, 35], [5, 35, 60]]
     made = run_block("spectrum/pieces.py", {"__name__": "pieces"})["PiecesBasis"](1, tuple(edges))
     task = build_task(spec_of(f"{{information: {target}}}"))
-    found = replace(task, question=replace(task.question, basis=made)).solve().result
+    asked = replace(task.asked, question=replace(task.asked.question, basis=made))
+    found = replace(task, asked=asked).solve().result
 
     powers = cp.Variable(3, nonneg=True)
     lags = np.arange(3)[:, None]

@@ -36,7 +36,7 @@ def spec(text, confidence=ASYMPTOTIC, *overrides):
 
 def errors_of(text):
     task = build_task(spec(text, "0.95"))
-    return [make(task.experiment) for make in task.question.requirements]
+    return [make(task.simulation.nominal) for make in task.asked.question.requirements]
 
 
 def test_of_one_parameter_it_is_the_normal_quantile():

@@ -28,7 +28,7 @@ def test_sixteen_parameters(seed):
         "spectrum": {"type": "fir", "order": 40},
     }
     task = build_task(parse_spec(json.dumps(spec)))
-    design = solve_design(task.question, tolerance=1e-6, any_spectrum_tolerance=1e-3)
+    design = solve_design(task.asked.question, tolerance=1e-6, any_spectrum_tolerance=1e-3)
     assert design.result.gap <= 1e-6
     assert design.any_spectrum.gap <= 1e-3
     assert design.problem.demands.worst_ratio(design.result.informations).ratio <= 1.0 + 1e-9
