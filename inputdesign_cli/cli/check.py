@@ -26,8 +26,8 @@ def check(
         list[Path] | None,
         typer.Argument(
             metavar="[GOLDEN]...",
-            help="Golden files, or names of those of the package; the default is golden/*.yaml, or else all "
-            "of the package.",
+            help="Golden files, or names of the package's golden files; the default is golden/*.yaml, or "
+            "else all of the package.",
         ),
     ] = None,
     junit: Annotated[
@@ -106,7 +106,7 @@ def _found(path: Path) -> Path:
 
 
 def _default_files() -> list[Path]:
-    """Those of the current folder, or else those that come with the package."""
+    """Return the golden files of the current folder, or else of the package."""
     found = sorted(Path("golden").glob("*.yaml")) or sorted((shipped() / "golden").glob("*.yaml"))
     if not found:
         message = "there is no golden/*.yaml in the current folder, and this installation has none"

@@ -83,7 +83,7 @@ def identify(
 ) -> None:
     """Estimate the plant and the noise from recorded experiments.
 
-    Orders and delay are those of the spec's plant and noise; it need not ask for a design. Writes
+    Orders and delay are as in the spec's plant and noise; it need not ask for a design. Writes
     model.yaml, the estimate as blocks to paste into a spec, with figures of the fit, the residuals and the
     model error; prints a summary. In closed loop the direct method is used, from u and y alone.
     """
@@ -123,7 +123,7 @@ def assess(
     rows: Rows,
     shown: Shown,
 ) -> None:
-    """Tell whether the data of a real experiment meet the target.
+    """Show whether the data of a real experiment meet the target.
 
     Identifies the model, from all records jointly, and compares the accuracy that the data give with what
     the spec asks for. Exits with 0 if it is met. If not, exits with 1 and writes the cheapest experiment

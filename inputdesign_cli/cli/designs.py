@@ -81,7 +81,7 @@ def analyse(
     no_output: NoOutput = False,
     shown: Shown,
 ) -> None:
-    """Tell what accuracy a given excitation buys.
+    """Show what accuracy a given excitation buys.
 
     Nothing is optimised: the excitation stands in the spec under `spectrum.given`. Writes a run
     directory and prints a summary.

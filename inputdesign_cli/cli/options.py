@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def unfolded(command: Callable[..., None]) -> Callable[..., None]:
     """Return the command with an option for each field of its parameters that are dataclasses."""
     hints = get_type_hints(command, include_extras=True)
-    groups = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
     parameters: list[Parameter] = []
     for parameter in signature(command).parameters.values():
         if parameter.name not in groups:
@@ -54,7 +54,7 @@ def unfolded(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def one_of(words: Sequence[str], help_text: str) -> Any:
-    """The option that takes one of these words, the first if it is absent."""
+    """Return the option that takes one of these words, the first if it is absent."""
 
     def check(value: str) -> str:
         if value not in words:
@@ -86,26 +86,17 @@ Confine = Annotated[
         help="Refuse a spec that names files outside DIR (links followed).",
     ),
 ]
-Overrides = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Override one entry of the spec, such as spectrum.order=10 (the value is YAML). Repeatable.",
-        autocompletion=spec_keys,
-    ),
-]
 
 
 def path_option(text: str) -> Path:
-    """The path that an option gives; an empty text (of a variable that is not set) is none."""
+    """Return the path that an option gives; an empty text (of a variable that is not set) is none."""
     if not text.strip():
         raise typer.BadParameter("the name is empty")
     return Path(text)
 
 
 def run_path(text: str) -> Path:
-    """The directory that a run is to be written into."""
+    """Return the directory that a run is to be written into."""
     path = path_option(text)
     if path.absolute() == Path(path.absolute().anchor) or os.path.realpath(path) == os.path.abspath(os.sep):
         raise typer.BadParameter("the root of the file system is no directory for a run")
@@ -113,8 +104,8 @@ def run_path(text: str) -> Path:
 
 
 def _into(default: str) -> Any:
-    told = f"Directory to write. The default is {default}."
-    return typer.Option("--output", "-o", metavar="DIR", help=told, parser=run_path)
+    text = f"Directory to write. The default is {default}."
+    return typer.Option("--output", "-o", metavar="DIR", help=text, parser=run_path)
 
 
 Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]
@@ -157,34 +148,21 @@ Figures = Annotated[
 FigureFormat = Annotated[
     str, one_of(("png", "svg", "pdf"), "The format of the figures; svg and pdf can be scaled")
 ]
-Jobs = Annotated[
-    int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core.")
-]
-ClusterAddress = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster",
-        metavar="ADDRESS",
-        help="Compute on the Dask cluster at this address, tcp://HOST:PORT or tls://HOST:PORT. Without TLS "
-        "anybody who reaches it can run programs there and here (docs/security.md).",
-    ),
-]
-WorkerTimeout = Annotated[
-    float | None,
-    typer.Option(
-        "--worker-timeout",
-        metavar="SECONDS",
-        min=0.0,
-        help="Give up when the cluster has been without workers for so long; the default is to wait.",
-    ),
-]
 
 
 @dataclass(frozen=True)
 class Changes:
     """What is changed in a spec, and which files it may name."""
 
-    overrides: Overrides = None
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Override one entry of the spec, as in spectrum.order=10 (the value is YAML). Repeatable.",
+            autocompletion=spec_keys,
+        ),
+    ] = None
     confine: Confine = None
 
 
@@ -202,9 +180,28 @@ class Shown:
 class Workers:
     """Where a command computes: in its own process, in several, or on a cluster."""
 
-    jobs: Jobs = 1
-    cluster: ClusterAddress = None
-    worker_timeout: WorkerTimeout = None
+    jobs: Annotated[
+        int,
+        typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core."),
+    ] = 1
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            "--cluster",
+            metavar="ADDRESS",
+            help="Compute on the Dask cluster at this address, tcp://HOST:PORT or tls://HOST:PORT. Without "
+            "TLS anybody who reaches it can run programs there and here (docs/security.md).",
+        ),
+    ] = None
+    worker_timeout: Annotated[
+        float | None,
+        typer.Option(
+            "--worker-timeout",
+            metavar="SECONDS",
+            min=0.0,
+            help="Give up when the cluster has been without workers for so long; the default is to wait.",
+        ),
+    ] = None
 
     def executor(self, *, quiet: bool) -> Executor:
         """Return what computes; an address comes first."""

@@ -32,12 +32,9 @@ OperatingPoint = Annotated[
     typer.Option(
         "--operating-point",
         metavar="u1=..,y1=..",
-        help="What channels vary about, such as u1=40,y1=52.3; it is subtracted. For inputs the default is "
+        help="What channels vary about, as in u1=40,y1=52.3; it is subtracted. For inputs the default is "
         "signal.offset.",
     ),
-]
-Means = Annotated[
-    bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")
 ]
 Columns = Annotated[
     str,
@@ -47,41 +44,8 @@ Columns = Annotated[
         help="Which column holds which channel, by name or number: u1=Heater 1,y1=4,time=1.",
     ),
 ]
-SampleTime = Annotated[
-    float | None,
-    typer.Option("--sample-time", metavar="T", help="Time between rows, where the file does not tell it."),
-]
-TimeUnit = Annotated[
-    str | None,
-    typer.Option("--time-unit", metavar="UNIT", help="Of the times in the file: s, ms, us, min, h or d."),
-]
-Resample = Annotated[
-    bool,
-    typer.Option(
-        "--resample",
-        help="Even out times that jitter by more than 25 % of the sample time, too; join columns that were "
-        "written at different times.",
-    ),
-]
-DetrendWord = Annotated[
-    str,
-    one_of(("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"),
-]
-Skip = Annotated[
-    int, typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of data of every file.")
-]
-Span = Annotated[
-    str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
-]
-Without = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--without",
-        metavar="ROWS",
-        help="Leave out these rows, as notes number them, such as 183-240,310; the record is cut there. Of "
-        "several files: log1.csv:183-240. Repeatable.",
-    ),
-]
+
+
 Separator = Annotated[
     str | None,
     typer.Option(
@@ -107,7 +71,9 @@ TimeFormat = Annotated[
 class Levels:
     """What the channels of a record vary about."""
 
-    remove_means: Means = False
+    remove_means: Annotated[
+        bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")
+    ] = False
     operating_point: OperatingPoint = ""
 
     @property
@@ -155,13 +121,46 @@ class Written:
 class Rows(Written):
     """How the rows of data files become samples."""
 
-    sample_time: SampleTime = None
-    time_unit: TimeUnit = None
-    resample: Resample = False
-    detrend: DetrendWord = "none"
-    skip: Skip = 0
-    span: Span = ""
-    without: Without = None
+    sample_time: Annotated[
+        float | None,
+        typer.Option(
+            "--sample-time", metavar="T", help="Time between rows, where the file does not have it."
+        ),
+    ] = None
+    time_unit: Annotated[
+        str | None,
+        typer.Option("--time-unit", metavar="UNIT", help="Of the times in the file: s, ms, us, min, h or d."),
+    ] = None
+    resample: Annotated[
+        bool,
+        typer.Option(
+            "--resample",
+            help="Even out times that jitter by more than 25 % of the sample time, too; join columns that "
+            "were written at different times.",
+        ),
+    ] = False
+    detrend: Annotated[
+        str,
+        one_of(
+            ("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"
+        ),
+    ] = "none"
+    skip: Annotated[
+        int,
+        typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of data of every file."),
+    ] = 0
+    span: Annotated[
+        str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
+    ] = ""
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--without",
+            metavar="ROWS",
+            help="Leave out these rows, as notes number them, as in 183-240,310; the record is cut there. Of "
+            "several files: log1.csv:183-240. Repeatable.",
+        ),
+    ] = None
 
     def of(self, data: Sequence[Path]) -> Preparation:
         """Return what the options say about data files.

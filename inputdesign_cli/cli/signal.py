@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,98 +24,128 @@ _SMALLEST, _LARGEST = 1e-15, 1e15
 _TIME_UNITS = ("s", "ms", "us", "min", "h", "d")
 
 
-def signal(
+@dataclass(frozen=True)
+class Kinds:
+    """The kinds of signals, of which one is made."""
+
     prbs: Annotated[
         int | None,
         typer.Option(
             "--prbs", metavar="BITS", min=2, max=32, help="Pseudo-random binary: period 2^BITS - 1 values."
         ),
-    ] = None,
+    ] = None
     multisine: Annotated[
         int | None,
         typer.Option(
             "--multisine", metavar="LINES", min=1, help="Equal sinusoids in --band, of a low crest factor."
         ),
-    ] = None,
+    ] = None
     chirp: Annotated[
         str,
         typer.Option("--chirp", metavar="LOW:HIGH", help="A sinusoid whose frequency rises over the band."),
-    ] = "",
+    ] = ""
     steps: Annotated[
         int | None,
         typer.Option("--steps", metavar="N", min=2, help="N levels over the range, in random order."),
-    ] = None,
+    ] = None
+
+    def chosen(self) -> str:
+        """Return the kind that is asked for.
+
+        Raises:
+            typer.BadParameter: There is none, or more than one.
+        """
+        kinds = {name: value for name, value in vars(self).items() if value not in (None, "")}
+        if len(kinds) != 1:
+            said = " and ".join(f"--{name}" for name in kinds) or "none of them"
+            raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
+        return next(iter(kinds))
+
+
+@dataclass(frozen=True)
+class Form:
+    """How long a signal is, how far it reaches, and what holds for some kinds only."""
+
     samples: Annotated[
         int | None, typer.Option(min=3, help="Length. The default is one period of a prbs, or 1000.")
-    ] = None,
+    ] = None
     span: Annotated[
         str,
         typer.Option("--range", metavar="LOW:HIGH", help="Least and largest value; several inputs: 0:5,2:3."),
-    ] = "-1:1",
-    inputs: Annotated[int, typer.Option(min=1, max=20, help="Channels that can be told apart.")] = 1,
+    ] = "-1:1"
+    inputs: Annotated[int, typer.Option(min=1, max=20, help="Channels with signals of their own.")] = 1
     band: Annotated[
         str, typer.Option(metavar="LOW:HIGH", help="Of a multisine, in rad per time unit (default: all).")
-    ] = "",
-    odd: Annotated[bool, typer.Option("--odd", help="Of a multisine, odd harmonics only.")] = False,
-    hold: Annotated[int, typer.Option(min=1, help="Samples for which each value of a prbs stands.")] = 1,
-    periods: Annotated[int, typer.Option(min=1, help="Equal periods of a multisine in the record.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random numbers.")] = 0,
-    sample_time: Annotated[float, typer.Option(metavar="T", help="Time between samples.")] = 1.0,
-    time_unit: Annotated[str, typer.Option(metavar="UNIT", help="s, ms, us, min, h or d.")] = "s",
+    ] = ""
+    odd: Annotated[bool, typer.Option("--odd", help="Of a multisine, odd harmonics only.")] = False
+    hold: Annotated[int, typer.Option(min=1, help="Samples for which each value of a prbs stands.")] = 1
+    periods: Annotated[int, typer.Option(min=1, help="Equal periods of a multisine in the record.")] = 1
+    seed: Annotated[int, typer.Option(min=0, help="Of the random numbers.")] = 0
+    sample_time: Annotated[float, typer.Option(metavar="T", help="Time between samples.")] = 1.0
+    time_unit: Annotated[str, typer.Option(metavar="UNIT", help="s, ms, us, min, h or d.")] = "s"
+
+    def check(self, kind: str) -> None:
+        """Check that every option means something to this kind.
+
+        Raises:
+            typer.BadParameter: An option does not, or cannot be used.
+        """
+        others = {"--band": (bool(self.band), "multisine"), "--odd": (self.odd, "multisine")}
+        others |= {"--periods": (self.periods > 1, "multisine"), "--hold": (self.hold > 1, "prbs")}
+        for option, (stated, owner) in others.items():
+            if stated and kind != owner:
+                message = f"it is of --{owner}, and does nothing to --{kind}: leave it out"
+                raise typer.BadParameter(message, param_hint=option)
+        if not _SMALLEST <= self.sample_time <= _LARGEST:
+            message = f"it is a positive number, from {_SMALLEST:g} to {_LARGEST:g}"
+            raise typer.BadParameter(message, param_hint="--sample-time")
+        if self.time_unit not in _TIME_UNITS:
+            raise typer.BadParameter(f"it is one of {', '.join(_TIME_UNITS)}", param_hint="--time-unit")
+
+
+def signal(
+    *,
+    kinds: Kinds,
+    form: Form,
     output: Annotated[
         list[str] | None,
         typer.Option(
             "--output",
             "-o",
             metavar="FILE",
-            help="Repeatable. The ending tells the kind: .csv, .mat (MATLAB), .npz (numpy), .h (C), .png.",
+            help="Repeatable. The ending names the kind: .csv, .mat (MATLAB), .npz (numpy), .h (C), .png.",
         ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")] = False,
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make a signal without a spec, and tell what it excites.
+    """Make a signal without a spec, and show what it excites.
 
     Give one of --prbs, --multisine, --chirp and --steps. Prints the peak, the crest factor, the order of
     persistent excitation and the band of each channel; -o writes the samples, a C header for hardware among
     the kinds. With several inputs a prbs is shifted, a multisine has a period for each input.
     """
-    kinds = {"prbs": prbs, "multisine": multisine, "chirp": chirp or None, "steps": steps}
-    chosen = [name for name, value in kinds.items() if value is not None]
-    if len(chosen) != 1:
-        said = "none of them" if not chosen else " and ".join(f"--{name}" for name in chosen)
-        raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
-    (kind,) = chosen
+    kind = kinds.chosen()
     files = _files(output or [], overwrite)
-    others = {"--band": (bool(band), "multisine"), "--odd": (odd, "multisine")}
-    others |= {"--periods": (periods > 1, "multisine"), "--hold": (hold > 1, "prbs")}
-    for option, (stated, owner) in others.items():
-        if stated and kind != owner:
-            message = f"it is of --{owner}, and does nothing to --{kind}: leave it out"
-            raise typer.BadParameter(message, param_hint=option)
-    if not _SMALLEST <= sample_time <= _LARGEST:
-        message = f"it is a positive number, from {_SMALLEST:g} to {_LARGEST:g}"
-        raise typer.BadParameter(message, param_hint="--sample-time")
-    if time_unit not in _TIME_UNITS:
-        raise typer.BadParameter(f"it is one of {', '.join(_TIME_UNITS)}", param_hint="--time-unit")
+    form.check(kind)
     from inputdesign_cli.questions.ready_made import ReadyMade, make_signal
 
-    swept = _pair(chirp, "--chirp") if chirp else None
+    band, option = (kinds.chirp, "--chirp") if kinds.chirp else (form.band, "--band")
     results = make_signal(
         ReadyMade(
             kind,
-            bits=prbs,
-            number=multisine or steps,
-            band=swept or (_pair(band, "--band") if band else None),
-            samples=samples,
-            levels=_levels(span, inputs),
-            hold=hold,
-            periods=periods,
-            odd=odd,
-            seed=seed,
-            sample_time=sample_time,
-            time_unit=time_unit,
+            bits=kinds.prbs,
+            number=kinds.multisine or kinds.steps,
+            band=_pair(band, option) if band else None,
+            samples=form.samples,
+            levels=_levels(form.span, form.inputs),
+            hold=form.hold,
+            periods=form.periods,
+            odd=form.odd,
+            seed=form.seed,
+            sample_time=form.sample_time,
+            time_unit=form.time_unit,
         )
     )
     for file in files:
@@ -124,11 +155,11 @@ def signal(
 
         typer.echo(json_text(results.result), nl=False)
     elif not quiet:
-        typer.echo(_told(results, files))
+        typer.echo(_summary(results, files))
 
 
 def _files(names: Sequence[str], overwrite: bool) -> list[Path]:
-    """Where to write; every name is looked at before anything is computed.
+    """Return where to write; every name is checked before anything is computed.
 
     Raises:
         typer.BadParameter: An ending that stands for no kind of file.
@@ -146,7 +177,7 @@ def _files(names: Sequence[str], overwrite: bool) -> list[Path]:
 
 
 def _pair(text: str, option: str) -> tuple[float, float]:
-    """Two numbers, the second larger.
+    """Return two numbers, the second larger.
 
     Raises:
         typer.BadParameter: The text is something else.
@@ -183,7 +214,7 @@ def _levels(text: str, inputs: int) -> tuple[tuple[float, float], ...]:
 
 
 def _write(file: Path, results: Results) -> None:
-    """One file of the kind that its ending tells."""
+    """Write one file of the kind that its ending names."""
     from inputdesign_cli.outcome.run_directory import write_bytes
     from inputdesign_cli.outcome.signal_files import WRITERS
     from inputdesign_cli.outcome.text_formats import csv_text
@@ -202,8 +233,8 @@ def _write(file: Path, results: Results) -> None:
     write_bytes(file, WRITERS[ending](table.columns, results.result["signal"]["sample_time"]))
 
 
-def _told(results: Results, files: Sequence[Path]) -> str:
-    """What was made and what it excites, a line a fact."""
+def _summary(results: Results, files: Sequence[Path]) -> str:
+    """Return what was made and what it excites, a line a fact."""
     entry = results.result["signal"]
     unit, step = entry["time_unit"], entry["sample_time"]
     whole = f"{entry['samples']} samples every {step:g} {unit}"

@@ -19,7 +19,7 @@ EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
 
 
 class _Errors(io.TextIOWrapper):
-    """Standard error: what cannot be written there is lost, for there is nobody to tell."""
+    """Standard error: what cannot be written there is lost."""
 
     def __init__(self, stream: BinaryIO, encoding: str, *, by_line: bool) -> None:
         super().__init__(stream, encoding, errors="backslashreplace", line_buffering=by_line)

@@ -192,7 +192,7 @@ class ProgressLine:
             self._bar.console.show_cursor(True)
 
     def __call__(self, progress: Progress) -> None:
-        """Tell how far the sweep is."""
+        """Show how far the sweep is."""
         if self._bar is not None:
             told = pace(progress, time.monotonic() - self._started)
             self._bar.update(self._task, completed=progress.passed, total=progress.total, description=told)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
-_PATIENCE = 2.0  # seconds after which it is told how far a computation is
+_PATIENCE = 2.0  # seconds until a computation says how far it is
 _ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
@@ -44,14 +44,14 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
         except IdesignError as error:
-            raise typer.Exit(_told(error, as_data=kwargs.get("json_output", False))) from None
+            raise typer.Exit(_printed(error, as_data=kwargs.get("json_output", False))) from None
         except KeyboardInterrupt:
             typer.echo("interrupted", err=True)
             raise typer.Exit(EXIT_INTERRUPTED) from None
         except (OSError, MemoryError) as error:
             _trace()
             refused = OutputError(_refusal(error))
-            raise typer.Exit(_told(refused, as_data=kwargs.get("json_output", False))) from None
+            raise typer.Exit(_printed(refused, as_data=kwargs.get("json_output", False))) from None
         except Exception as error:
             _trace()
             typer.echo(
@@ -66,8 +66,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def _told(error: IdesignError, *, as_data: bool) -> int:
-    """Tell an error, on stdout too if that is to be data; its exit code."""
+def _printed(error: IdesignError, *, as_data: bool) -> int:
+    """Print an error, on stdout too if that is to be data, and return its exit code."""
     from inputdesign_cli.diagnostics import as_json
 
     if as_data:
@@ -77,7 +77,7 @@ def _told(error: IdesignError, *, as_data: bool) -> int:
 
 
 def complain(error: IdesignError) -> None:
-    """Tell an error on stderr; the command may go on."""
+    """Print an error on stderr; the command may go on."""
     from inputdesign_cli.diagnostics import render
 
     typer.echo(render(error, color=colourful(sys.stderr)).rstrip("\n"), err=True)
@@ -133,11 +133,11 @@ def computing(about: Path | str, *, quiet: bool, doing: str = "computing") -> It
     with status(f"{about}: {doing} ...", quiet=quiet) as show:
         started = time.monotonic()
 
-        def told(done: Round | Counted) -> None:
+        def say(done: Round | Counted) -> None:
             if time.monotonic() - started > _PATIENCE:
                 show(f"{about}: {done} ...")
 
-        with watching(told):
+        with watching(say):
             yield
 
 

@@ -21,9 +21,9 @@ from inputdesign_cli.errors import STANDARD_STREAM, IdesignError, OutputError
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.live.board import Board
-    from inputdesign_cli.live.changes import Stamp
+    from inputdesign_cli.live.pages import Stamp
     from inputdesign_cli.live.painters import Painters
+    from inputdesign_cli.live.server import Board
 
 _LOOK = 0.1  # seconds between looks at the file while it is solved
 
@@ -44,7 +44,7 @@ def report(
 ) -> None:
     """Write a run or a sweep as one HTML page.
 
-    The page tells the question, the answer, its proof, what was assumed and how to reproduce it, with
+    The page has the question, the answer, its proof, what was assumed and how to reproduce it, with
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
@@ -87,10 +87,9 @@ def watch(
     the last good design. The run directory is that of `solve`. Of a directory it shows the run, the campaign
     or the sweep in it, and follows that. It is served to this machine only, until Ctrl-C.
     """
-    from inputdesign_cli.live.board import Board
     from inputdesign_cli.live.pages import message_page
     from inputdesign_cli.live.painters import painters
-    from inputdesign_cli.live.server import serving
+    from inputdesign_cli.live.server import Board, serving
 
     if str(spec) == STANDARD_STREAM:
         raise typer.BadParameter("standard input cannot be followed: name a file", param_hint="SPEC")
@@ -111,8 +110,7 @@ def _follow_spec(
     spec: Path, changes: Changes, place: Place, board: Board, drawing: Painters, figures: bool
 ) -> None:
     """Solve and show, again and again."""
-    from inputdesign_cli.live.changes import stamp, wait_for_change
-    from inputdesign_cli.live.pages import Followed
+    from inputdesign_cli.live.pages import Followed, stamp, wait_for_change
     from inputdesign_cli.questions.verbs import run_verb
 
     followed, files = Followed(spec.name), [spec]
@@ -163,7 +161,7 @@ def _named_files(spec: Path, overrides: list[str]) -> list[Path]:
 def _given_up_when_saved(files: list[Path], before: Stamp) -> Iterator[None]:
     """What is computed inside ends at the next round once a file is saved."""
     from inputdesign_cli.compute.time_limit import stoppable
-    from inputdesign_cli.live.changes import stamp
+    from inputdesign_cli.live.pages import stamp
 
     done = Event()
     with stoppable() as stop:
@@ -183,8 +181,7 @@ def _given_up_when_saved(files: list[Path], before: Stamp) -> Iterator[None]:
 
 def _follow_directory(directory: Path, board: Board) -> None:
     """Show the run, the campaign or the sweep in a directory, and how many points a sweep has so far."""
-    from inputdesign_cli.live.changes import stamp, wait_for_change
-    from inputdesign_cli.live.pages import followed_page, message_page
+    from inputdesign_cli.live.pages import followed_page, message_page, stamp, wait_for_change
     from inputdesign_cli.report.render import report_text
 
     records = [directory / name for name in ("result.json", "sweep.csv", "sweep.json", "points", "failures")]

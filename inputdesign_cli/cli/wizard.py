@@ -56,12 +56,7 @@ def wizard(
     """
     from inputdesign_cli.wizard.questions import QUESTIONS, Answers, known_from, read_answers
 
-    if output.exists() and not overwrite:
-        hint = "choose another name with -o, or overwrite it with --overwrite"
-        raise OutputError.because("output-exists", f"{output} exists already", hint)
-    if answers is not None and output.exists() and output.samefile(answers):
-        hint = "choose another name for the spec with -o"
-        raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
+    _check_place(output, answers, overwrite)
     said = read_answers(answers, given or [])
     known = said.texts
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
@@ -90,6 +85,20 @@ def wizard(
         solve = terminal and typer.confirm("Design the experiment now?", default=True)
     if solve:
         _solve(output, draft.there, trade=trade, overwrite=overwrite, quiet=quiet)
+
+
+def _check_place(output: Path, answers: Path | None, overwrite: bool) -> None:
+    """Check that the spec may be written.
+
+    Raises:
+        OutputError: `output-exists`.
+    """
+    if output.exists() and not overwrite:
+        hint = "choose another name with -o, or overwrite it with --overwrite"
+        raise OutputError.because("output-exists", f"{output} exists already", hint)
+    if answers is not None and output.exists() and output.samefile(answers):
+        hint = "choose another name for the spec with -o"
+        raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
 
 
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:

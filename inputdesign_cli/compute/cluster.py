@@ -62,7 +62,7 @@ class Cluster:
                     future.release()
 
     def _finished(self, client: Any, futures: list[Any]) -> Iterable[Any]:
-        """Those that are finished, one at least; while there are no workers it says so, and waits."""
+        """Return the finished ones, one at least; while there are no workers, say so and wait."""
         from distributed import wait
 
         alone_since = None
@@ -98,7 +98,7 @@ class Cluster:
         try:
             encrypts = Security().get_connection_args("client").get("ssl_context") is not None
             if self.address.startswith("tls:") and not encrypts:
-                raise ValueError("TLS asks for certificates, which docs/security.md tells how to name")
+                raise ValueError("TLS asks for certificates: see docs/security.md")
             client = Client(self.address, timeout=self.patience, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise _unreachable(self.address, str(error).splitlines()[0] if str(error) else "") from None

@@ -1,4 +1,4 @@
-"""Interruptions as they are: Python and compiled modules make other errors of them, or lose them."""
+"""Interruptions reach the caller unchanged, although compiled modules lose them or make other errors."""
 
 from __future__ import annotations
 

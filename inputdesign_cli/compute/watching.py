@@ -1,4 +1,4 @@
-"""What a long computation tells on its way, to whoever wants to know."""
+"""How far a long computation is, for a watcher."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
 
 @contextmanager
 def watching(watcher: Watcher) -> Iterator[None]:
-    """What is computed inside tells how far it is."""
+    """Let what is computed inside report how far it is."""
     token = _watcher.set(watcher)
     try:
         yield
@@ -49,7 +49,7 @@ def watching(watcher: Watcher) -> Iterator[None]:
 
 
 def tell(done: Round | Counted) -> None:
-    """Tell whoever watches, if anybody does."""
+    """Report to the watcher, if there is one."""
     watcher = _watcher.get()
     if watcher is not None:
         watcher(done)

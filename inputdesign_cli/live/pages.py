@@ -1,7 +1,12 @@
-"""The pages that follow a spec: the new design beside the last good one, and what is wrong, at its line."""
+"""The pages that follow a spec, and the files whose changes they follow.
+
+A page shows the new design beside the last good one, and what is wrong, at its line.
+"""
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +16,39 @@ from inputdesign_cli.errors import Diagnostic, IdesignError, Location
 from inputdesign_cli.report.render import filled
 from inputdesign_cli.report.run_page import run_page
 
+_EVERY = 0.05  # seconds between looks at files
 _AROUND = 2  # lines shown before and after one that is wrong
+Stamp = tuple[tuple[int, int, int] | None, ...]
+
+
+def stamp(paths: Sequence[Path]) -> Stamp:
+    """Return times, sizes and numbers of inodes of files, which change with their content."""
+    return tuple(map(_of, paths))
+
+
+def wait_for_change(paths: Sequence[Path], before: Stamp) -> Stamp:
+    """Return once some file differs from `before`, and has stopped to: the new stamp."""
+    while (now := stamp(paths)) == before:
+        time.sleep(_EVERY)
+    # An editor may write in pieces, or take the file away for a moment.
+    while (later := _later(paths)) != now or None in later:
+        if None in later and _later(paths) == later:
+            break
+        now = later
+    return later
+
+
+def _later(paths: Sequence[Path]) -> Stamp:
+    time.sleep(_EVERY)
+    return stamp(paths)
+
+
+def _of(path: Path) -> tuple[int, int, int] | None:
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
 
 
 @dataclass(frozen=True)
@@ -46,7 +83,7 @@ class Followed:
         return replace(self, state="done", told=told, designs=(made, *self.designs[:1]), errors=())
 
     def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:
-        """With what is wrong; `lines` are those of `file`, the spec as it was read."""
+        """Return the page with what is wrong; `lines` are the lines of `file`, the spec as it was read."""
         listed = tuple(_placed(diagnostic, lines, file) for diagnostic in error.diagnostics)
         number = f"{len(listed)} errors" if len(listed) > 1 else "One error"
         return replace(self, state="failed", told=f"{number}: the last good design stays.", errors=listed)
@@ -77,7 +114,7 @@ def followed_page(report: str) -> str:
 
 
 def message_page(name: str, told: str, awaits: str = "computes whenever it is saved") -> str:
-    """A page that only says something; `awaits` tells what happens next."""
+    """Return a page with a message; `awaits` says what happens next."""
     return Followed(name, "waiting", told, awaits=awaits).page
 
 

@@ -14,12 +14,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Thread
+from threading import Condition, Thread
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.live.board import Board
 from inputdesign_cli.report.hover import SOURCE
 
 HOST = "127.0.0.1"
@@ -58,6 +57,33 @@ SCRIPT = """\
   }
 })();
 """
+
+
+class Board:
+    """One page, and a number that grows whenever it changes."""
+
+    def __init__(self) -> None:
+        self._changed = Condition()
+        self._page, self._version = "", 0
+
+    def show(self, page: str) -> None:
+        """Put up another page, a whole HTML document."""
+        with self._changed:
+            if page != self._page:
+                self._page, self._version = page, self._version + 1
+                self._changed.notify_all()
+
+    @property
+    def page(self) -> tuple[str, int]:
+        """The page, and its number."""
+        with self._changed:
+            return self._page, self._version
+
+    def newer_than(self, version: int, patience: float) -> int:
+        """Return the number of the page once it differs from `version`, or after `patience` seconds."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._version != version, patience)
+            return self._version
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from inputdesign_cli.plant.transfer import product_of
 
 
 def error_filters(plant: MatrixPlant, desired: DesiredLoop, A: Array, B: Array) -> tuple[Array, Array]:
-    """Numerators (runs, n, n, l) and denominators (runs, m) of what follows `prefilter` in each run.
+    """Return numerators (runs, n, n, l) and denominators (runs, m) of the filter behind `prefilter`.
 
     The loop of an estimate is (I + E) T' (I + E T')^-1 with E = G G_hat^-1 - I and T' = b' F, where b' =
     det / m keeps the zeros of the estimate. With E = E' / (rho det), F = F_n / d and P = rho m d I + E' F_n,

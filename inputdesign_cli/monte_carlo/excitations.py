@@ -1,4 +1,4 @@
-"""The excitations of a Monte Carlo study: a record for each run, and what it tells in theory."""
+"""The excitations of a Monte Carlo study: a record for each run, and its information in theory."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Excitation(Protocol):
         """Records (runs, samples, r), each a realisation of its own."""
 
     def information(self, experiment: Experiment) -> Array:
-        """What it tells in theory, (k, k) in raw parameters, prior information included."""
+        """Return its information in theory, (k, k) in raw parameters, prior information included."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Reapplied:
         return self.excitation.name
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Its records, one after the other so many times."""
+        """Return its records, one after the other, repeated."""
         records = self.excitation.draw(-(-runs // self.times), samples, rng)
         return np.repeat(records, self.times, axis=0)[:runs]
 

@@ -65,7 +65,7 @@ def study_response(
 
 
 def _sums(trial: _Trial, runs: int, rng: np.random.Generator) -> tuple[ComplexArray, NDArray[np.float64]]:
-    """(L, p, r): sums over the runs of what noise adds to the estimates, and of its squared moduli."""
+    """Return sums (L, p, r) over the runs of the errors by noise, and of their squared moduli."""
     model, samples = trial.model, len(trial.u)
     e = rng.standard_normal((runs, samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
     noise = model.simulate(np.zeros((1, 1, model.inputs)), e, 1.0)[1]

@@ -36,7 +36,7 @@ class TrialJob:
 def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
     """Simulate a batch of experiments from rest on the true system and identify each of them.
 
-    The noise is drawn first, so that it is the same for every excitation. Runs where the search does not
+    The noise is drawn first, so that every excitation meets the same. Runs where the search does not
     settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
     with an error of its own in each run.
     """

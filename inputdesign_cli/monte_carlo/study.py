@@ -38,7 +38,7 @@ class Tried:
     """The runs of one excitation on one system.
 
     Attributes:
-        information: (k, k) in theory; None where the true system has other parameters than the model.
+        information: (k, k) in theory, or None if the true system has other parameters than the model.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Tried:
 
 
 def tried_on_truth(study: Study, excitation: Excitation, executor: Executor | None = None) -> Tried:
-    """An excitation tried on the true system.
+    """Try an excitation on the true system.
 
     Args:
         executor: where the batches of runs are computed (default: in this process); the result does not
@@ -57,7 +57,7 @@ def tried_on_truth(study: Study, excitation: Excitation, executor: Executor | No
 
 
 def tried_on_model(study: Study, excitation: Excitation, executor: Executor | None = None) -> Tried | None:
-    """The same on the design model; None where that is the true system."""
+    """Try the excitation on the design model; return None if that is the true system."""
     return None if study.true is study.nominal else _tried(study, study.nominal, excitation, executor)
 
 

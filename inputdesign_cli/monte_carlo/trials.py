@@ -38,7 +38,7 @@ class Trials:
         true: the experiment on the true system.
         model: of which the structure was estimated.
         theta: (runs, k) estimates; `converged` (runs,).
-        power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
+        power: mean squares that the excitation causes, channel by channel: input, output, excitation.
         total_power: mean squares of inputs and outputs, noise included.
         first: (samples, r), the excitation of the first run.
     """

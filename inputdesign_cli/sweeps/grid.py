@@ -110,7 +110,7 @@ def parse_settings(settings: Settings) -> tuple[list[str], list[Axis]]:
 
 
 def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Grid:
-    """The grid of the spec's `sweep` block; axes of the command line replace those of the block or join them.
+    """Return the grid of the spec's `sweep` block; axes of the command line replace or join them.
 
     Raises:
         SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`.

@@ -32,7 +32,7 @@ def sweep(
 ) -> DataFrame | SweepTable:
     """Run a verb at every point of a grid and return the table: one row a point, failures included.
 
-    The columns are those of sweep.csv: the keys that are varied, `status`, and the numbers of the results
+    The columns are as in sweep.csv: the keys that are varied, `status`, and the numbers of the results
     under their paths in `result.json`.
 
     Args:

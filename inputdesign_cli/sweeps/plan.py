@@ -33,7 +33,7 @@ class Plan:
     _keys: list[str] = field(default_factory=list, repr=False)
 
     def key(self, index: int) -> str:
-        """The key of a point: the same for the same spec, files, verb and version of this package."""
+        """Return the key of a point, which the spec, its files, the verb and the version determine."""
         while len(self._keys) <= index:
             overrides = self.grid.overrides(self.grid[len(self._keys)])
             try:
@@ -57,7 +57,7 @@ class Plan:
         return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
 
     def resolved(self, index: int) -> str | None:
-        """The `spec.yaml` of a point; None where it is no valid spec."""
+        """Return the `spec.yaml` of a point, or None for an invalid spec."""
         try:
             return self.draft.spec(self.grid.overrides(self.grid[index])).to_yaml()
         except SpecError:

@@ -29,9 +29,8 @@ from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification.yaml.plain import to_yaml
-from inputdesign_cli.sweeps.earlier import check_same_sweep
 from inputdesign_cli.sweeps.grid import Settings
-from inputdesign_cli.sweeps.kept import flaw
+from inputdesign_cli.sweeps.kept import check_same_sweep, flaw
 from inputdesign_cli.sweeps.layout import SPEC, SUMMARY, TABLE, Layout, opened
 from inputdesign_cli.sweeps.plan import Plan, build_plan
 from inputdesign_cli.sweeps.point import (
@@ -80,7 +79,7 @@ class Progress:
 class SweepSummary:
     """What a sweep has come to: how many points have which status, and the first failure, if any.
 
-    `damaged` tells of points that were computed again what was wrong with what an earlier call left.
+    `damaged` says why points of an earlier call were computed again.
     """
 
     directory: Path
@@ -149,7 +148,7 @@ def run_sweep(
         figures: draw the figures of every point too.
         figure_format: of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
-        watch: is told after every point how far the sweep is.
+        watch: is called after every point.
 
     Raises:
         SpecError, OutputError: before anything is computed; later OutputError only.
@@ -247,12 +246,12 @@ class _Run:
                 self._note_failure(index, self.layout.read(key) or {})
             self.seen.add(key)
             if known:
-                self._tell()
+                self._report()
             else:
                 yield self.plan.job(index, root, figures=self.figures, with_files=not here)
 
     def _discard_damaged(self, index: int, key: str) -> None:
-        """What does not hold is no result: the point is computed again, and that is told."""
+        """Remove what does not hold, so that the point is computed again."""
         if why := flaw(self.layout, key, self.plan.resolved(index)):
             self.damaged.append(why)
             self.layout.discard(key)
@@ -281,7 +280,7 @@ class _Run:
             self.layout.failure(job.key).unlink(missing_ok=True)
         if end.status in FAILURES:
             self._note_failure(job.index, self.lost.get(job.key) or self.layout.read(job.key) or {})
-        self._tell()
+        self._report()
 
     def _note_failure(self, index: int, content: dict[str, Json]) -> None:
         self.failed += 1
@@ -293,7 +292,7 @@ class _Run:
             diagnostic = Diagnostic(content.get("code", ""), message, content.get("hint", ""))
             self.first_failure = kind(replace(diagnostic, key=content.get("key", "")))
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         self.passed += 1
         if self.watch:
             self.watch(Progress(len(self.plan.grid), self.passed, self.computed, self.failed))

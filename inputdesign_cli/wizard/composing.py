@@ -44,7 +44,7 @@ class Draft:
     Args:
         heads: the lines before the spectrum.
         tails: the lines behind it.
-        spectrum: as in a spec; None where the accuracy has the lines.
+        spectrum: as in a spec; None if the accuracy has the lines.
         said: the answers.
         there: seconds that may be taken.
         notes: what the user must know of the plant, a sentence each.
@@ -155,7 +155,7 @@ def _noise(plant: PlantAnswer, said: Mapping[str, str], folder: Path) -> list[st
 
 
 def _uncertain(plant: PlantAnswer) -> list[str]:
-    """Return the lines of `uncertainty`; none where nothing is said of it."""
+    """Return the lines of `uncertainty`, if something is said of it."""
     if plant.covariance is not None:
         return ["uncertainty:", f"  covariance: {plant.covariance}", *_DRAWN]
     if not plant.intervals:
@@ -179,7 +179,7 @@ class Conversation:
 
     @property
     def question(self) -> Question | None:
-        """The next one; None where all are answered."""
+        """The next question, or None."""
         there = {*self._answers, *known_from(self._answers)}
         return next((one for one in QUESTIONS if one.key not in there), None)
 

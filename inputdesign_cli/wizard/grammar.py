@@ -55,7 +55,7 @@ def sensible(text: str, key: str) -> str:
 class Phrase:
     """An answer that is read piece by piece; `finish` refuses what nobody read.
 
-    Every method returns None where the text has no such piece.
+    Every method returns None if the text has no piece of its kind.
     """
 
     def __init__(self, text: str, key: str) -> None:
@@ -138,7 +138,7 @@ def _scaled(number: str, unit: str | None, kind: str) -> float:
 
 
 def seconds(text: str, key: str) -> float:
-    """Return the seconds of an answer that is a time, such as "45 min".
+    """Return the seconds of an answer that is a time, as in "45 min".
 
     Raises:
         SpecError: `bad-answer`.

@@ -66,7 +66,8 @@ def log_noise_lines(explored: Spec, source: str, text: str, drift: str, folder: 
     elif colour:
         lines.append(f"  D: [1, {short(-colour)}]")
     # 1/A stands before C: with the factor A in C, the noise of y is that without A.
-    shaped = [np.convolve(DRIFTING if wanted else (1.0,), row).tolist() for row in ([A] if _flat(A) else A)]
+    own_poles: list[Json] = [A] if _flat(A) else list(A)
+    shaped = [np.convolve(DRIFTING if wanted else (1.0,), row).tolist() for row in own_poles]
     return lines if shaped == [[1.0]] else [*lines, f"  C: {json.dumps(shaped[0] if _flat(A) else shaped)}"]
 
 

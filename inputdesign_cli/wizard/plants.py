@@ -31,7 +31,7 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
     """Return the plant of an answer.
 
     Args:
-        stem: of the spec, for the names of files beside it.
+        stem: of the spec, for the names of files next to it.
         folder: what the names of files are relative to.
 
     Raises:
@@ -81,7 +81,7 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
             "plant",
             f"the output in {path.name} still goes on as an integrator would, {short(lasts)} s after the "
             "step: it shows no gain and no time constant; record until it settles, or write a plant that "
-            'integrates as a file such as {"num": [0.05], "den": [1, 0], "delay": 5}',
+            'integrates as a file, {"num": [0.05], "den": [1, 0], "delay": 5}',
         )
     listed = ", ".join(f"{label}: {short(value)}" for label, value in values.items())
     return PlantAnswer(
@@ -171,7 +171,7 @@ def _is_process(spec: Spec) -> bool:
 
 
 def _first_order(path: Path, explored: Spec) -> bytes | None:
-    """Return model.yaml of a gain, a lag and a dead time in noise that may drift; None where tests object."""
+    """Return model.yaml of a gain, a lag and a dead time in noise that may drift, if no test objects."""
     from inputdesign_cli import parse_spec, questions
 
     step = explored.sample_time

@@ -223,7 +223,7 @@ def _scatter(result: Result) -> float:
 
 
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
-    """Return the samples of a record that was designed and meets what is asked; None where none was found.
+    """Return the samples of a record that was designed and meets what is asked, or None.
 
     Args:
         ratio: of errors, at estimates too; one is enough.

@@ -31,7 +31,7 @@ class PlantAnswer:
     Args:
         lines: of the spec, with comments.
         slow: its slowest time constant, in seconds.
-        intervals: of the parameters, by name; none where nothing is said of their errors.
+        intervals: of the parameters whose errors are stated, by name.
         values: of the parameters, by name.
         controller: of its usual operation, as YAML.
         files: to be written next to the spec, by name.
@@ -208,8 +208,8 @@ def system_of(path: Path) -> PlantAnswer:
 
 _NO_TIME = {
     True: 'the system of {file} integrates and has no other pole and no delay, which would show how fast it '
-    'is to be sampled: write its dead time ("delay": 5), however small, or the lag of what moves it into '
-    'den, such as "den": [10, 1, 0]',
+    'is to be sampled: write its dead time ("delay": 5), however small, or the lag of its actuator into '
+    'den, as in "den": [10, 1, 0]',
     False: "the system of {file} has no stable pole: its time constant is not known",
 }  # fmt: skip
 

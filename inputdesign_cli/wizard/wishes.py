@@ -155,7 +155,7 @@ def _margin(said: Phrase) -> str:
 
 
 def pid(said: Phrase, *, stated: bool) -> str | None:
-    """Return the settings "Kp 1, Ti 60, Td 5" as YAML; None where the text has none.
+    """Return the settings "Kp 1, Ti 60, Td 5" as YAML, or None without settings.
 
     Args:
         stated: whether there must be settings.

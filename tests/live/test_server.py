@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.live.board import Board
-from inputdesign_cli.live.server import serving
+from inputdesign_cli.live.server import Board, serving
 
 PAGE = '<!DOCTYPE html>\n<html lang="en"><body><main>one</main></body></html>'
 
