@@ -120,10 +120,12 @@ def objections(units: Units, found: Sequence[Neglected], *, met: bool) -> list[F
 
 
 def unseen(units: Units, found: Sequence[Neglected]) -> list[Finding]:
-    """Return a finding where a parameter more, or a drifting gain, may move G by more than is admitted."""
-    tried = [one for one in found if one.directed.of_structure or one.directed.test.name.endswith(RISING)]
-    worst = max(tried, key=lambda one: one.may_move, default=None)
-    if worst is None or worst.may_move <= 1.0:
+    """Return a finding where a parameter more, or else a gain that drifts, may move G too far."""
+    structure = [one for one in found if one.directed.of_structure]
+    rising = [one for one in found if one.directed.test.name.endswith(RISING)]
+    largest = (max(those, key=lambda one: one.may_move) for those in (structure, rising) if those)
+    worst = next((one for one in largest if one.may_move > 1.0), None)
+    if worst is None:
         return []
     return [
         RESTS_ON_STRUCTURE.found(

@@ -231,8 +231,15 @@ def concluded(
 
     shift, shifts, less = level_shifts(records, point, white)
     varying = [one.column for one in alternatives if not one.of_structure]
-    settings = {"recent": recent, "feedback": feedback, "echoes": echoes}
-    robust = robust_white(records, point, white, less=less, more=varying, **settings)
+    robust = robust_white(
+        records, point, white, less=less, recent=recent, feedback=feedback, echoes=echoes, more=varying
+    )
+
+    def tested(stated: White, judged: White | None) -> tuple[ScoreTest, ...]:
+        return score_tests(
+            records, point, stated, recent=recent, feedback=feedback, echoes=echoes, robust=judged
+        )
+
     if robust is not None:
         shift, shifts, less = level_shifts(records, point, robust)
     return Estimate(
@@ -259,15 +266,13 @@ def concluded(
         independence=cross_correlations(
             point.errors[left], records.u[left], fitted=in_plant, feedback=feedback, lengths=kept
         ),
-        tests=score_tests(records, point, white, robust=robust, **settings),
+        tests=tested(white, robust),
         directed=directed_tests(
             robust or white, alternatives, len(names), echoes if robust is None else None
         ),
         shift=shift,
         shifts=shifts,
-        beside_shifts=score_tests(records, point, less if robust is None else white, robust=less, **settings)
-        if shifts
-        else (),
+        beside_shifts=tested(less if robust is None else white, less) if shifts else (),
         coloured=robust is not None,
         future=() if feedback else future_tests(records, point.theta, robust or white, recent, echoes),
         alike=of_one_system(point, noise, experiments),

@@ -119,7 +119,7 @@ def _autoregression(v: Array, lengths: Sequence[int]) -> Array:
     most = max(min(_MOST, v.size // _SAMPLES_A_COEFFICIENT), 1)
     past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
     # Squares of orders that nest, from one triangle.
-    triangle = np.linalg.qr(np.column_stack([past, v]), mode="r")
+    triangle = np.linalg.qr(np.column_stack([past, v]))[1]
     left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
     orders = np.arange(most + 1)
     order = int(np.argmin(v.size * np.log(left[: most + 1]) + orders * np.log(v.size)))
