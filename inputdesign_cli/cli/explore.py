@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -32,12 +33,28 @@ from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.errors import EXIT_MISSED
 
 
+class Structure(StrEnum):
+    """A structure that `explore` can be bound to."""
+
+    FOPDT = "fopdt"
+    SOPDT = "sopdt"
+    ARX = "arx"
+    OE = "oe"
+    ARMAX = "armax"
+    BJ = "bj"
+    INTEGRATOR = "integrator"
+
+
 def explore(
     data: DataFiles,
     columns: Columns = "",
     validate: Annotated[
         Path | None,
         typer.Option("--validate", metavar="MODEL", help="Judge this model by the data; look for no other."),
+    ] = None,
+    structure: Annotated[
+        Structure | None,
+        typer.Option("--structure", help="Take this structure; try no other. Lag with dead time: fopdt."),
     ] = None,
     sample_time: SampleTime = None,
     time_unit: TimeUnit = None,
@@ -69,7 +86,9 @@ def explore(
         prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span, without, data)
         model = None if validate is None else read_spec(validate, None, None, design=False)
         place = place.checked(model)
-        found = questions.explore(data, prepared, model=model)
+        found = questions.explore(
+            data, prepared, model=model, structure=structure.value if structure else None
+        )
     keep(
         found.results,
         place,
