@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -25,6 +24,7 @@ from inputdesign_cli.cli.options import (
     SampleTime,
     Skip,
     Span,
+    StructureWord,
     TimeUnit,
     Without,
 )
@@ -32,17 +32,8 @@ from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.errors import EXIT_MISSED
 
-
-class Structure(StrEnum):
-    """A structure that `explore` can be bound to."""
-
-    FOPDT = "fopdt"
-    SOPDT = "sopdt"
-    ARX = "arx"
-    OE = "oe"
-    ARMAX = "armax"
-    BJ = "bj"
-    INTEGRATOR = "integrator"
+if TYPE_CHECKING:
+    from inputdesign_cli.explore import Family
 
 
 def explore(
@@ -52,10 +43,7 @@ def explore(
         Path | None,
         typer.Option("--validate", metavar="MODEL", help="Judge this model by the data; look for no other."),
     ] = None,
-    structure: Annotated[
-        Structure | None,
-        typer.Option("--structure", help="Take this structure; try no other. Lag with dead time: fopdt."),
-    ] = None,
+    structure: StructureWord = "any",
     sample_time: SampleTime = None,
     time_unit: TimeUnit = None,
     resample: Resample = False,
@@ -74,8 +62,9 @@ def explore(
     """Find a model in a log, and write a spec for the next experiment.
 
     Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
-    judged on the other. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and
-    report.html; prints a summary. Exits with 1, and says why, where no model deserves trust.
+    judged on the other; of those that explain it as well the simplest is taken. Writes model.yaml, a
+    commented spec.yaml for `idesign solve`, figures and report.html; prints a summary. Exits with 1, and
+    says why, where no model deserves trust.
     """
     ending = "explored" if validate is None else "validated"
     sources = [*([validate] if validate is not None else []), *data]
@@ -87,7 +76,7 @@ def explore(
         model = None if validate is None else read_spec(validate, None, None, design=False)
         place = place.checked(model)
         found = questions.explore(
-            data, prepared, model=model, structure=structure.value if structure else None
+            data, prepared, model=model, structure=None if structure == "any" else cast("Family", structure)
         )
     keep(
         found.results,

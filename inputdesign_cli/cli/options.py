@@ -93,6 +93,13 @@ DetrendWord = Annotated[
     str,
     one_of(("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"),
 ]
+StructureWord = Annotated[
+    str,
+    one_of(
+        ("any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"),
+        "The structure of the model (fopdt: a lag with dead time)",
+    ),
+]
 Skip = Annotated[
     int, typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of data of every file.")
 ]

@@ -61,7 +61,8 @@ def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
     assert orders >= 95
 
 
-@pytest.mark.parametrize("pole", [0.0, *(pytest.param(p, marks=pytest.mark.slow) for p in (0.9, 0.95))])
+@pytest.mark.slow
+@pytest.mark.parametrize("pole", [0.0, 0.9, 0.95])
 def test_a_lag_with_dead_time_wins_where_it_explains_as_well(pole):
     """Of six records in noise of another colour each, five at least; no more than one would be chance."""
     families = [
@@ -82,7 +83,7 @@ def test_a_second_order_is_not_taken_for_a_first():
     np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], truth, rtol=0.1)
 
 
-@pytest.mark.parametrize(("hold", "delay"), [(1, 0), (8, 2)])
+@pytest.mark.parametrize(("hold", "delay"), [(1, 0), pytest.param(8, 2, marks=pytest.mark.slow)])
 def test_a_static_gain_has_no_pole(delay, hold):
     rng = np.random.default_rng(1)
     u = held(rng, 1000, hold)
@@ -95,12 +96,17 @@ def test_a_static_gain_has_no_pole(delay, hold):
 @pytest.mark.parametrize(
     ("only", "names"),
     [
-        ("sopdt", ("K", "T", "zeta", "L")),
         ("integrator", ("K", "L")),
-        ("oe", ("b", "f")),
         ("arx", ("a", "b")),
-        ("bj", ("b", "c", "d", "f")),
-        ("armax", ("a", "b", "c")),
+        *(
+            pytest.param(*pair, marks=pytest.mark.slow)
+            for pair in (
+                ("sopdt", ("K", "T", "zeta", "L")),
+                ("oe", ("b", "f")),
+                ("bj", ("b", "c", "d", "f")),
+                ("armax", ("a", "b", "c")),
+            )
+        ),
     ],
 )
 def test_a_structure_that_is_asked_for_is_taken(only, names):
@@ -165,6 +171,7 @@ def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
     np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], expected, rtol=0.15)
 
 
+@pytest.mark.slow
 def test_two_inputs_and_outputs_are_one_model():
     rng = np.random.default_rng(8)
     u = np.stack([held(rng, 600, 8), held(rng, 600, 13)], axis=1)
@@ -196,7 +203,7 @@ def test_too_short_a_record_is_refused():
         explore_records([(rng.standard_normal((20, 1)), rng.standard_normal((20, 1)))])
 
 
-@pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), (110, 0.02)])
+@pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), pytest.param(110, 0.02, marks=pytest.mark.slow)])
 def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
     """A lag of ten samples, gain one; a part of it says nothing, also where u flickers."""
     rng = np.random.default_rng(1)
@@ -209,7 +216,7 @@ def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
     assert corner == pytest.approx(abs(0.1 / (1 - 0.9 * np.exp(-0.1j))), rel=0.1)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_a_dead_time_of_a_quarter_of_the_record_is_found(seed):
     rng = np.random.default_rng(seed)
     late = int(rng.integers(60, 100))
