@@ -171,7 +171,7 @@ def compared(name: str) -> None:
         parts = [[(log.u, log.y)] for log in logs]
         validation = found.results.result["validation"]
         if name == "column":
-            parts = divided(parts[0])[:2]
+            parts = list(divided(parts[0])[:2])
         else:
             model = Path(folder) / "model.yaml"
             model.write_bytes(found.results.files["model.yaml"])

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.signal
 
 from inputdesign_cli.explore import explore_records
-from inputdesign_cli.questions.exploration.beside_shifts import explored_beside_shifts
+from inputdesign_cli.questions.exploration.explore import explored_beside_shifts
 from inputdesign_cli.records import Preparation, read_log
 
 _BANDWIDTH = 0.7  # of the static gain

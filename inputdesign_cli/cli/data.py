@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -16,12 +16,16 @@ from inputdesign_cli.cli.options import (
     Shown,
     SpecFile,
     VerdictOutput,
+    one_of,
 )
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.rows import DataFiles, Levels, Rows
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
+
+if TYPE_CHECKING:
+    from inputdesign_cli.explore import Family
 
 _EXIT = {"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
 
@@ -34,6 +38,13 @@ def explore(
         Path | None,
         typer.Option("--validate", metavar="MODEL", help="Judge this model by the data; look for no other."),
     ] = None,
+    structure: Annotated[
+        str,
+        one_of(
+            ("any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"),
+            "The structure of the model (fopdt: a lag with dead time)",
+        ),
+    ] = "any",
     output: ExplorationOutput = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
@@ -42,8 +53,9 @@ def explore(
     """Find a model in a log, and write a spec for the next experiment.
 
     Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
-    judged on the other. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and
-    report.html; prints a summary. Exits with 1, and says why, where no model deserves trust.
+    judged on the other; of those that explain it as well the simplest is taken. Writes model.yaml, a
+    commented spec.yaml for `idesign solve`, figures and report.html; prints a summary. Exits with 1, and
+    says why, where no model deserves trust.
     """
     ending = "explored" if validate is None else "validated"
     sources = [*([validate] if validate is not None else []), *data]
@@ -53,7 +65,8 @@ def explore(
 
         model = None if validate is None else read_spec(validate, Changes(), design=False)
         place = place.checked(model)
-        found = questions.explore(data, rows.of(data), model=model)
+        only = None if structure == "any" else cast("Family", structure)
+        found = questions.explore(data, rows.of(data), model=model, structure=only)
     keep(found.results, place, shown, page=validate is None)
     if found.reasons:
         raise typer.Exit(EXIT_MISSED)

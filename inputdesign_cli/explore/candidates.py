@@ -1,28 +1,35 @@
-"""Structures that were estimated for one output, and which of them to take.
+"""Hold the structures that were estimated for one output, and choose one of them.
 
-Of models that simulate about equally well, one is taken that the tests of its residuals do not refute, with
-few parameters. Where they refute all, the noise of the simplest is filtered if that predicts better.
+Structures that simulate unseen data about as well count alike. Of these the criterion takes one, in which
+every parameter must lower the variance of the prediction errors by a share. A structure with a parameter
+that deviates by more than half its value comes last.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
 from inputdesign_cli.explore.orders import Orders
 from inputdesign_cli.explore.processes import Process
-from inputdesign_cli.explore.regression import delay_ranges
+from inputdesign_cli.explore.sweep import Sweep, delay_ranges
 from inputdesign_cli.plant import Model
 
-# An error of simulation that is larger by less than this share, and by no more points, is as good.
-_AS_GOOD, _POINTS = 1.2, 2.0
-# Of a preference, what comes before the number of parameters.
-_CONDITIONS = 4
+# An error of simulation that is larger by less than this share, or by so many points, is as good, if it
+# explains almost as much of the variance of the output.
+_AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
+# The largest deviation of a parameter of the plant, in shares of its value.
+_UNCERTAIN = 0.5
+# What a parameter must take off the variance of prediction errors, however long the record is.
+_WORTH = 0.01
 
 Ranges = tuple[tuple[int, int | None], ...]
-"""Delays from the one to the other; None: no upper limit is told."""
+"""Delays from the one to the other; None: the record sets no upper limit."""
 
 Shape = Orders | Process
 """A structure for one output."""
@@ -34,62 +41,40 @@ class Candidate:
 
     Attributes:
         orders: the structure; `model` is it, estimated on the first part.
+        deviations: (k,) of the parameters of the plant.
         estimation, validation: per cent that the simulation explains of the two parts.
         prediction: per cent one step ahead, on the second part.
-        criterion: log of the variance + k log(N) / N (BIC) on the first part; in a loop
-            + 2 k log(log(N)) / N [hannan-quinn-1979].
-        failed: tests of the residuals that refute it.
-        steady: whether its plant is stable, as far as the record tells, and within what it shows.
-        ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
-        latest: samples beyond which a dead time has run off to where nothing answers.
-        by_prediction: whether prediction errors rank it: in a loop, and where the noise integrates.
+        criterion: log of the variance of the prediction errors, and the price of the parameters.
+        steady: whether its plant is stable, as far as the record shows.
+        certain: whether no parameter of the plant deviates by more than half its value.
+        by_prediction: whether prediction errors alone rank it, as in a loop.
     """
 
     orders: Shape
     model: Model
+    deviations: Array
     estimation: float
     validation: float
     prediction: float
     criterion: float
-    failed: tuple[str, ...]
     converged: bool
     steady: bool
-    ranges: tuple[tuple[int, int], ...]
-    latest: int
+    certain: bool
     by_prediction: bool
 
-    @property
-    def theta(self) -> Array:
-        """(k,)."""
-        return self.model.theta
 
-    @property
-    def settled(self) -> bool:
-        """Whether the search ended, as far as a quick one tells: kinks at dead times stop it early."""
-        return self.converged or self.orders.physical
+def price(unknowns: int, samples: int) -> float:
+    """Return the price of parameters in the log of a variance: that of BIC, and a share at least."""
+    return unknowns * max(float(np.log(samples)) / samples, _WORTH)
 
-    @property
-    def biased(self) -> bool:
-        """Whether failed tests speak against its plant.
 
-        A wrong noise model biases an A that plant and noise share, not the plant of OE and BJ
-        ([ljung-1999], Section 8.4); in a loop it biases them all (Section 13.4).
-        """
-        return (self.orders.shared or self.by_prediction) and bool(self.failed)
+def certain(theta: Array, deviations: Array, dead_times: NDArray[np.bool_], step: float) -> bool:
+    """Return whether no parameter (k,) deviates by more than half its value.
 
-    def estimated(self, theta: Array, noise: Array) -> Candidate:
-        """The same from other data.
-
-        Raises:
-            ArithmeticError: a dead time has run off.
-        """
-        settled_at(self.orders, theta, self.latest)
-        return replace(self, model=self.model.at(theta, noise))
-
-    @property
-    def unknowns(self) -> int:
-        """Parameters, delays that were searched for included."""
-        return self.orders.size + (0 if self.orders.physical else len(self.orders.delays))
+    A dead time may deviate by up to a sample, `step`: it may be zero.
+    """
+    most = np.maximum(_UNCERTAIN * np.abs(theta), np.where(dead_times, step, 0.0))
+    return bool(np.all(deviations <= most))
 
 
 @dataclass(frozen=True)
@@ -97,130 +82,63 @@ class Chosen:
     """What was found for one output.
 
     Attributes:
-        candidates: the best first.
-        by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
-        finalists: those that may be taken, the best first.
-        estimated: the records of the first part.
-        least, most: the delays that were looked for, of each input from the one to the other.
+        candidates: those to take come first; the `good` explain the record about as well as any.
+        estimated: the records of the first part, `swept` its regressions, `least` their shortest delay.
         dropped: families of which no structure could be estimated.
     """
 
     candidates: tuple[Candidate, ...]
-    by_order: dict[int, float]
-    finalists: tuple[Candidate, ...]
+    good: tuple[Candidate, ...]
     estimated: Parts
-    least: tuple[int, ...]
-    most: int
+    swept: Sweep
+    least: int
     dropped: tuple[str, ...]
 
     @property
     def best(self) -> Candidate:
-        """The one to take."""
+        """Return the one to take."""
         return self.candidates[0]
 
     @property
-    def ranked(self) -> list[Candidate]:
-        """Those that may be taken, then the others, the best first.
+    def most(self) -> int:
+        """Return the longest delay that was tried."""
+        return self.swept.most
 
-        After them the biased ones, and those on the edge of stability last. A static gain that is no
-        finalist is none of them: it would hide what the plant does.
-        """
-        others = [
-            c for c in self.candidates if c.orders.order and all(c is not one for one in self.finalists)
-        ]
-        return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
+    @property
+    def by_order(self) -> dict[int, float]:
+        """Return the errors (rms) of the regressions on the first part, by order."""
+        return {n: float(np.sqrt(one.loss)) for n, one in self.swept.by_order.items()}
 
     def ranges(self, candidate: Candidate) -> Ranges:
-        """Of each input, the delays that 95 % of confidence leaves a candidate."""
-        order = min(max(candidate.orders.order, 1), max(self.by_order))
-        delays = candidate.orders.delays
-        found = candidate.ranges or delay_ranges(self.estimated, order, delays, self.least, self.most)
+        """Return the 95 % interval of each delay of a candidate."""
+        orders, model = candidate.orders, candidate.model
+        found = orders.ranges(model.theta[model.in_plant], candidate.deviations)
+        if not found:
+            near = self.swept.near(orders.order)
+            found = delay_ranges(self.estimated, near, least=self.least, most=self.most)
+            own = zip(found, orders.delays, strict=True)
+            found = tuple((min(low, delay), max(high, delay)) for (low, high), delay in own)
         # A Gaussian estimate of a dead time may be wider than the record that it is made from.
         longest = max(len(y) for _, y in self.estimated)
         return tuple((low, high if high <= longest else None) for low, high in found)
 
-    def best_of(self, *, physical: bool) -> Candidate | None:
-        """The best with parameters of that kind among those that are about as good as any."""
-        return next((c for c in self.finalists if c.orders.physical == physical), None)
 
-    def with_filtered_noise(self, plain: Candidate, order: int) -> Candidate:
-        """The candidate with the plant of one whose noise is white, and a filter of that order; or itself."""
-        if plain.orders.coloured:
-            return plain
-        shape = plain.orders.with_coloured_noise()[order]
-        same = (c for c in self.candidates if replace(c.orders, delays=shape.delays) == shape)
-        return next(same, plain)
+def ranked(usable: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+    """Return candidates, the one to take first, and those that simulate about as well as any.
 
-
-def settled_at(orders: Shape, theta: Array, latest: int) -> Shape:
-    """The structure with the delays that parameters (k,) tell.
-
-    Raises:
-        ArithmeticError: a dead time has run off beyond the `latest` sample at which anything answers.
-    """
-    settled = orders.at(theta)
-    if max(settled.delays) > latest:
-        raise ArithmeticError("a dead time has run off to where nothing answers")
-    return settled
-
-
-def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
-    """The plant that simulates best with filtered noise, and simpler ones that do so about as well.
-
-    In a loop, or beside noise that integrates, all of them: a plant with the wrong noise is none.
-    """
-    if plain[0].by_prediction:
-        return [shape for c in plain for shape in c.orders.with_coloured_noise()]
-    best, most = max(plain, key=lambda c: c.validation), _most_error(plain)
-    near = [c for c in plain if 100.0 - c.validation <= most and c.unknowns < best.unknowns]
-    return [*best.orders.with_coloured_noise(), *(c.orders.with_coloured_noise()[0] for c in near)]
-
-
-def about_as_good(usable: Sequence[Candidate]) -> list[Candidate]:
-    """Those that simulate about as well as any, the one to take first; by prediction, the likeliest first."""
-    if usable[0].by_prediction:
-        return sorted(usable, key=lambda c: (not c.settled, not c.steady, bool(c.failed), c.criterion))
-    most = _most_error(usable)
-    return sorted((c for c in usable if 100.0 - c.validation <= most), key=_preference)
-
-
-def likeliest(c: Candidate) -> float:
-    """By this they are ordered: the error of the simulation of unseen data, in a loop the criterion.
-
-    An input that answers the noise tells of it, so that in a loop a wrong plant may simulate the output
+    An input that answers the noise carries it, so that in a loop a wrong plant may simulate the output
     better than the right one. Prediction errors do not err ([ljung-1999], Section 13.4).
     """
-    return c.criterion if c.by_prediction else -c.validation
-
-
-def noise_first(good: Sequence[Candidate], filtered: Sequence[Candidate]) -> list[Candidate]:
-    """Those that are as good, before them the first one's plant with filtered noise where that is better.
-
-    A wrong noise model leaves the plant of OE and of processes as it is, but not its covariance, nor what an
-    experiment must do for it ([ljung-1999], Section 8.4).
-
-    Args:
-        filtered: the plant of the first with filtered noise.
-    """
-    most, plain = _most_error(good), good[0]
-    better = [
-        c
-        for c in filtered
-        if 100.0 - c.validation <= most
-        and c.criterion < plain.criterion
-        and c.prediction > plain.prediction
-        and _preference(c)[:_CONDITIONS] <= _preference(plain)[:_CONDITIONS]
-    ]
-    shapes = {c.orders for c in better}
-    first = sorted(better, key=lambda c: (len(c.failed), c.criterion))
-    return [*first, *(c for c in good if c.orders not in shapes)]
-
-
-def _most_error(usable: Sequence[Candidate]) -> float:
     error = min(100.0 - c.validation for c in usable)
-    return min(_AS_GOOD * error, error + _POINTS)
+    most, explained = max(_AS_GOOD * error, error + _POINTS), 1e4 - error**2
 
+    def is_good(c: Candidate) -> bool:
+        own = 100.0 - c.validation
+        return c.by_prediction or (own <= most and 1e4 - own**2 >= _EXPLAINED * explained)
 
-def _preference(c: Candidate) -> tuple[float, ...]:
-    conditions = (not c.settled, c.biased, not c.steady, bool(c.failed))
-    return (*conditions, c.unknowns, not c.orders.physical, -c.validation)
+    def preference(c: Candidate) -> tuple[float, ...]:
+        by = c.criterion if is_good(c) else -c.validation
+        return not is_good(c), not c.steady, not c.certain, not c.converged, by
+
+    every = tuple(sorted(usable, key=preference))
+    return every, tuple(c for c in every if is_good(c))

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
-from inputdesign_cli.explore.regression import LONG
 
 Cut = Literal[
     "the first 60 % and the rest",
@@ -35,31 +35,18 @@ _STILL = 0.2
 
 
 class Division(NamedTuple):
-    """The records that estimate, those that judge, and how they were parted.
-
-    Attributes:
-        before: of each record that judges what was recorded right before it, which may be nothing.
-    """
+    """The records that estimate, the records that judge, and how they were parted."""
 
     first: Parts
     second: Parts
     split: Split
-    before: Parts = ()
-
-
-def known_before(second: Parts, before: Parts, late: int) -> Parts:
-    """`before`, what was recorded right before those that judge, where delays would leave out much of these.
-
-    The inputs that are answered so late are known there.
-    """
-    return before if late * LONG > max(len(y) for _, y in second) else ()
 
 
 def divided(parts: Parts) -> Division:
-    """What estimates and what judges: beginning and end of the records.
+    """Return the part of the records that estimates and the part that judges, beginning and end as a rule.
 
-    Blocks in turn where an input rests in one of these wherever they are parted; the whole twice where it
-    does so in any blocks.
+    Where an input rests in one of the two, blocks take turns. Where it rests in any blocks as well, the whole
+    record does both.
     """
     for division in _divisions(parts):
         if _moves(division.first, parts) and _moves(division.second, parts):
@@ -83,13 +70,12 @@ def _divisions(parts: Parts) -> Iterator[Division]:
             [(parts[k][0][begin : begin + length], parts[k][1][begin : begin + length]) for k, begin in some]
             for some in (blocks[::2], blocks[1::2])
         )
-        before = [(parts[k][0][:begin], parts[k][1][:begin]) for k, begin in blocks[1::2]]
-        yield Division(first, second, "blocks in turn", before)
+        yield Division(first, second, "blocks in turn")
 
 
 def _cut(parts: Parts, left: int, cut: Cut) -> Division:
-    """The first samples of the records, so many in all, and the others."""
-    first, second, before = (list[tuple[Array, Array]]() for _ in range(3))
+    """Return the first samples of the records, `left` in all, and the others."""
+    first, second = list[tuple[Array, Array]](), list[tuple[Array, Array]]()
     for u, y in parts:
         at = min(max(left, 0), len(y))
         left -= len(y)
@@ -97,15 +83,29 @@ def _cut(parts: Parts, left: int, cut: Cut) -> Division:
             first.append((u[:at], y[:at]))
         if at < len(y):
             second.append((u[at:], y[at:]))
-            before.append((u[:at], y[:at]))
-    return Division(first, second, cut, before)
+    return Division(first, second, cut)
 
 
 def _moves(some: Parts, whole: Parts) -> bool:
-    """Whether all inputs move in a part, as they do in the whole, beside its level in every record."""
+    """Return whether all inputs move in a part as they do in the whole, about their levels."""
     if not some:
         return False
     spread, of_all = (
         np.concatenate([u - u.mean(axis=0) for u, _ in records]).std(axis=0) for records in (some, whole)
     )
     return bool(np.all(spread > _STILL * of_all))
+
+
+def busiest(parts: Parts, most: int) -> list[tuple[Array, Array]]:
+    """Return at most so many samples: of long records the stretch in which the inputs move most."""
+    share = most // len(parts)
+    return [(u[at], y[at]) for u, y in parts for at in [_window(u, share if len(parts) > 1 else most)]]
+
+
+def _window(u: NDArray[np.float64], length: int) -> slice:
+    if len(u) <= length:
+        return slice(0, len(u))
+    moves = np.sum((np.diff(u, axis=0) / np.maximum(u.std(axis=0), 1e-300)) ** 2, axis=1)
+    total = np.concatenate([[0.0], np.cumsum(moves)])
+    begin = int(np.argmax(total[length - 1 :] - total[: len(total) - length + 1]))
+    return slice(begin, begin + length)

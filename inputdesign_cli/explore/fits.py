@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
-from itertools import zip_longest
 
 import numpy as np
 import scipy
@@ -48,43 +47,28 @@ class Fits:
     counted: NDArray[np.bool_]
 
 
-def fits(model: Model, parts: Parts, late: int | None = None, before: Parts = ()) -> Fits:
-    """The fits of a sampled model to records u (n, r), y (n, p).
+def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
+    """Return the fits of a sampled model to records u (n, r), y (n, p).
 
     Args:
         late: of each record so many samples are left out. What delays of the model hold back beyond that
             counts as not explained, so that models can be compared. None: what its own delays hold back.
-        before: of each record what was recorded right before it, and is left out first; empty: nothing.
 
     Raises:
         TypeError: see `output_error_form`.
     """
-    begun = [_begun_before(model, part, past, late) for part, past in zip_longest(parts, before)]
-    simulation, simulated, counted, varying, unexplained = _simulated(model, begun, late)
-    own = np.concatenate([np.arange(len(y)) >= earlier for _, y, earlier in begun])
+    simulation, simulated, counted, varying, unexplained = _simulated(model, parts, late)
     kind = estimator(model, 1.0).kind
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-        records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y, _ in begun]
+        records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
         free = [record.begun_freely(record.lateness(model.theta)) for record in records]
         errors = np.concatenate([record.at(model.theta).errors for record in free])
         errors[unexplained] = varying[unexplained[counted]]
-    return Fits(simulation, percent(errors[counted], varying), simulated[own], errors[own], counted[own])
-
-
-def _begun_before(
-    model: Model, part: tuple[Array, Array], past: tuple[Array, Array] | None, late: int | None
-) -> tuple[Array, Array, int]:
-    """A record, begun by so many samples earlier as are left out of it, if it can be; how many these are."""
-    if past is None:
-        return *part, 0
-    needed = _lateness(model, *part) if late is None else late
-    earlier = min(needed, len(past[1]))
-    u, y = (np.concatenate([x[len(x) - earlier :], own]) for x, own in zip(past, part, strict=True))
-    return u, y, earlier
+    return Fits(simulation, percent(errors[counted], varying), simulated, errors, counted)
 
 
 def beside(found: Sequence[Fits]) -> Fits:
-    """The fits of models of one output each, to the same records, as those of all outputs."""
+    """Return the fits of models of one output each to the same records as the fits of all outputs."""
     return Fits(
         tuple(fit for one in found for fit in one.simulation),
         tuple(fit for one in found for fit in one.prediction),
@@ -94,20 +78,17 @@ def beside(found: Sequence[Fits]) -> Fits:
     )
 
 
-def simulation_fit(
-    model: Model, parts: Parts, late: int | None = None, before: Parts = ()
-) -> tuple[float, ...]:
-    """The first of them alone."""
-    begun = [_begun_before(model, part, past, late) for part, past in zip_longest(parts, before)]
-    return _simulated(model, begun, late)[0]
+def simulation_fit(model: Model, parts: Parts, late: int | None = None) -> tuple[float, ...]:
+    """Return the fits of the simulation alone."""
+    return _simulated(model, parts, late)[0]
 
 
 def _simulated(
-    model: Model, begun: Sequence[tuple[Array, Array, int]], late: int | None
+    model: Model, parts: Parts, late: int | None
 ) -> tuple[tuple[float, ...], Array, NDArray[np.bool_], Array, NDArray[np.bool_]]:
-    """The fits, the simulations (N, p), samples (N,) that count, what varies there, and what delays miss."""
+    """Return fits, simulations (N, p), counted samples (N,), what varies there, and what delays miss."""
     simulated, left, counted, varying, unexplained = [], [], [], [], []
-    for u, y, _ in begun:
+    for u, y in parts:
         own, delay = simulate_free(model, u - u.mean(axis=0), y)
         samples = np.arange(len(y))
         kept = samples >= (delay if late is None else late)
@@ -124,7 +105,7 @@ def _simulated(
 
 
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
-    """Per cent that the best of `tried` simulations explains of white noise, with 5 % of probability at most.
+    """Return the per cent of white noise that the best of `tried` simulations explains in 5 % of cases.
 
     Levels, starts and an agreement by chance take a chi-squared share of its power; the probabilities of
     the structures that were tried add up at most (Bonferroni). Of no samples it explains all.
@@ -136,7 +117,7 @@ def by_chance(samples: int, unknowns: int, tried: int) -> float:
 
 
 def percent(errors: Array, varying: Array) -> tuple[float, ...]:
-    """Of the rms of what varies (N, p) the share that errors (N, p) do not leave; -inf of no samples."""
+    """Return the share of the rms of what varies (N, p) that errors (N, p) lack; -inf of no samples."""
     if not len(errors):
         return (-np.inf,) * errors.shape[1]
     with np.errstate(over="ignore"):
@@ -145,7 +126,7 @@ def percent(errors: Array, varying: Array) -> tuple[float, ...]:
 
 
 def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
-    """(n, p): the simulation from u (n, r), its level and start such that it is nearest to y (n, p).
+    """Return the simulation (n, p) from u (n, r), with the level and start that bring it nearest to y (n, p).
 
     With it the number of samples on which inputs from before act through a delay: these are made up.
     """
@@ -160,14 +141,8 @@ def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
     return caused, late
 
 
-def _lateness(model: Model, u: Array, y: Array) -> int:
-    """The number of samples on which inputs from before a record act through a delay."""
-    error_form = output_error_form(model)
-    return estimator(error_form, 1.0).kind.record(u, y).lateness(error_form.theta)
-
-
 def begun(responses: NDArray[np.float64], left: Array) -> Array:
-    """The combination of responses (m, n) that is nearest to what is left (n,); infinite where they are."""
+    """Return the combination of responses (m, n) nearest to what is left (n,); infinite where they are."""
     if not (np.all(np.isfinite(responses)) and np.all(np.isfinite(left))):
         return np.full(left.shape, np.inf)
     columns = responses.T / np.maximum(np.linalg.norm(responses, axis=1), 1e-300)
@@ -175,13 +150,13 @@ def begun(responses: NDArray[np.float64], left: Array) -> Array:
 
 
 def is_steady(model: Model, samples: int) -> bool:
-    """Whether a plant is stable, and its slowest mode tells so in a record of so many samples."""
+    """Return whether a plant is stable, its slowest mode fading within a record of so many samples."""
     return output_error_form(model).radius < 1.0 - _LEAST_DECAY / samples
 
 
 @singledispatch
 def output_error_form(model: Model) -> Model:
-    """The plant of a model, its A multiplied into every F, with white noise on the output.
+    """Return the plant of a model, its A multiplied into every F, with white noise on the output.
 
     Raises:
         TypeError: models of this kind have none here: those that are not sampled, and state space.

@@ -1,164 +1,136 @@
-"""Which structure explains an output: estimated on one part of the record, judged by simulation on another.
+"""Find the structure that explains an output: estimated on one part of the record, judged on another.
 
-Delays and the order come from quick output-error estimates; ARX models of all orders up to eight are
-judged beside them. The best few of every family are then estimated by prediction errors, and `candidates`
-says which one to take.
+A sweep of regressions gives delays and orders. An autoregression of what it leaves whitens the noise, and a
+second sweep of the whitened records gives starts. About a dozen structures are then estimated by output
+errors of the whitened records, which are prediction errors for that noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from typing import Literal
 
 import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.explore.busiest import busiest
-from inputdesign_cli.explore.candidates import (
-    Candidate,
-    Chosen,
-    Shape,
-    about_as_good,
-    likeliest,
-    noise_first,
-    settled_at,
-    with_noise,
+from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.explore.candidates import Candidate, Chosen, Shape, certain, price, ranked
+from inputdesign_cli.explore.division import busiest
+from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady, simulation_fit
+from inputdesign_cli.explore.orders import Orders
+from inputdesign_cli.explore.processes import Process
+from inputdesign_cli.explore.sweep import (
+    Sweep,
+    arx_models,
+    lingering,
+    noise_model,
+    output_error,
+    output_errors,
+    sweep,
+    whitened,
+    whitening,
 )
-from inputdesign_cli.explore.delays import criterion, delays_of
-from inputdesign_cli.explore.division import known_before
-from inputdesign_cli.explore.fits import (
-    NOT_COMPUTED,
-    Parts,
-    fits,
-    is_steady,
-    output_error_form,
-    simulation_fit,
-)
-from inputdesign_cli.explore.integrated import differenced, integrating
-from inputdesign_cli.explore.orders import Orders, arx, plant_order, static_gain
-from inputdesign_cli.explore.processes import processes
-from inputdesign_cli.explore.regression import SharedDenominator, arx_grid, best_delays, from_rest, whitened
-from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
-from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import Model
 
+Family = Literal["fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"]
+"""A structure that a user may fix."""
+
 _MOST_SAMPLES = 4000
-_HIGHEST, _HIGHEST_ARX = 5, 8
-# So far beyond the longest delay that was looked for a dead time may settle.
-_RUN_OFF = 2
-# Plants up to this order are always tried.
-_ALWAYS = 3
-_ARX_KEPT = 2
-# Of each family so many are estimated once more, levels and starts along with them.
-_FINALISTS = 2
-# Samples to a parameter, at least; steps of the search for a candidate, by whether it is physical, and times
-# as many for a finalist.
-_PER_PARAMETER = 5
-_STEPS, _AGAIN = {False: 100, True: 30}, 4
+_HIGHEST, _HIGHEST_ARX, _ARX_KEPT = 5, 8, 2
+# Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
+_PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
+# A dead time may settle so many samples beyond those of the sweep, and at so many times the longest one.
+_SETTLES, _RUN_OFF = 5, 2
 
 
 @dataclass(frozen=True)
-class _Parts:
-    """What structures are estimated from, `first`, and judged by: `levels`, the same, and `judging`.
+class _Records:
+    """What estimates structures and what judges them.
 
-    Of each record that judges the first `late` samples are left out, those recorded `before` it among them.
-    Plants whose dead time has run off beyond `latest` samples are left out as well.
+    Attributes:
+        first, judging: records of one output; of each that judges the first `late` samples are left out.
+        white: the first part through the autoregression of its noise; `swept` its regressions.
+        C, D: the noise beside a plant.
+        feedback: whether inputs answer the outputs; `wanders`, whether the noise does not fade.
+        step: the sample time.
     """
 
     first: Parts
-    levels: Parts
     judging: Parts
-    before: Parts
+    white: Parts
+    swept: Sweep
+    late: int
+    C: Array
+    D: Array
     feedback: bool
     wanders: bool
-    quick: dict[int, SharedDenominator]
-    resting: Mapping[int, Parts]
-    late: int
-    latest: int
+    step: float
 
     @property
     def samples(self) -> int:
+        """Return the number of samples that estimate."""
         return sum(len(y) for _, y in self.first)
 
-    @property
-    def _price(self) -> float:
-        """Of a parameter: that of BIC; in a loop, where a plant that is too simple is biased, less.
-
-        The least that is consistent ([hannan-quinn-1979]).
-        """
-        logarithm = float(np.log(self.samples))
-        return 2.0 * float(np.log(logarithm)) if self.feedback else logarithm
-
     def candidate(self, orders: Shape) -> Candidate | None:
-        """A structure, quickly estimated from records that begin at rest, and judged; None: it cannot be."""
-        n = min(max(orders.order, 1), max(self.quick))
-        resting = self.resting[n]
+        """Return a structure, estimated and judged; None if that fails."""
         try:
-            points = orders.starts(resting, self.quick[n], max(n, 2))
-            return self._searched(orders, orders.model(), resting, points, free=False)
+            return self._searched(orders)
         except NOT_COMPUTED:
             return None
 
-    def refined(self, candidate: Candidate) -> Candidate | None:
-        """The same, levels and starts estimated along: the search goes on from where it ended."""
-        try:
-            return self._searched(
-                candidate.orders,
-                candidate.orders.model(),
-                centred(self.first),
-                candidate.theta[None],
-                free=True,
-            )
-        except NOT_COMPUTED:
-            return None
-
-    def _searched(
-        self, orders: Shape, structure: Model, parts: Parts, points: Array, *, free: bool
-    ) -> Candidate:
-        kind = estimator(structure, 1.0).kind
-        check_length(self.samples, len(kind.names), kind.recent, outputs=1)
-        records = Records(tuple(kind.record(*part) for part in parts))
-        if free:
-            records = records.begun_freely(max(records.lateness(theta) for theta in points))
-        found = search(
-            records, points, starts=len(points), quick=_STEPS[orders.physical] * (_AGAIN if free else 1)
-        )
-        settled = settled_at(orders, found.point.theta, self.latest)
-        noise = noise_of(found.point, kind.own())
-        factor = factor_at(kind.names, records, found.point, noise)
-        deviations = np.linalg.norm(
-            scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True), axis=0
-        )
-        echoes = kind.echoes(found.point.theta, records.lengths)
-        white = White.of(records, found.point, echoes)
-        tests = score_tests(
-            records, found.point, white, recent=kind.recent, feedback=self.feedback, echoes=echoes
-        )
-        fitted = integrating(structure.at(found.point.theta, noise), (self.wanders,))
-        on_first = fits(fitted, self.levels, self.late)
-        on_second = fits(fitted, self.judging, self.late, self.before)
+    def _searched(self, orders: Shape) -> Candidate:
+        parts = self.first if orders.shared else self.white
+        near = self.swept.near(orders.order)
+        if not orders.physical and near.delays != orders.delays:
+            near = output_error(parts, near.order, orders.delays, F=near.F)
+        theta, deviations, variance, converged = _estimated(orders.model(), parts, orders.start(near))
+        orders = orders.at(theta)
+        if max(orders.delays) > _RUN_OFF * self.swept.most:
+            raise ArithmeticError("a dead time has run off to where nothing answers")
+        model = orders.noisy(theta, self.C, self.D)
+        model = model.at(model.theta, np.array([[variance]]))
+        plant = deviations[orders.model().in_plant]
+        judged = fits(model, self.judging, self.late)
+        unknowns = orders.size + (0 if orders.physical else len(orders.delays))
+        slow = orders.physical and orders.slowest(theta) > self.samples * self.step
         return Candidate(
-            settled,
-            fitted,
-            on_first.simulation[0],
-            on_second.simulation[0] if output_error_form(fitted).radius < 1.0 else -np.inf,
-            on_second.prediction[0],
-            float(np.log(max(noise[0, 0], 1e-300)) + orders.size * self._price / self.samples),
-            tuple(test.name for test in failed(tests)),
-            found.converged,
-            is_steady(fitted, self.samples) and not orders.beyond(found.point.theta, self.samples),
-            orders.ranges(found.point.theta, deviations),
-            self.latest,
+            orders.coloured(self.C, self.D),
+            model,
+            plant,
+            simulation_fit(model, self.first, self.late)[0],
+            judged.simulation[0],
+            judged.prediction[0],
+            float(np.log(max(variance, 1e-300))) + price(unknowns, self.samples),
+            converged or orders.physical,  # kinks at dead times stop a quick search early
+            orders.integrates or (is_steady(model, self.samples) and not slow),
+            certain(
+                model.theta[model.in_plant],
+                plant,
+                model.dead_times[model.in_plant],
+                self.step if orders.physical else 0.0,
+            ),
             self.feedback or self.wanders,
         )
+
+
+def _estimated(structure: Model, parts: Parts, start: Array) -> tuple[Array, Array, float, bool]:
+    """Return parameters (k,), their deviations, the variance of the errors, and whether a search settled."""
+    kind = estimator(structure, 1.0).kind
+    check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
+    records = Records(tuple(kind.record(*part) for part in centred(parts)))
+    records = records.begun_freely(records.lateness(start))
+    found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
+    noise = noise_of(found.point, kind.own())
+    factor = factor_at(kind.names, records, found.point, noise)
+    half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
+    return found.point.theta, np.linalg.norm(half, axis=0), float(noise[0, 0]), found.converged
 
 
 def explore_structure(
@@ -168,105 +140,97 @@ def explore_structure(
     feedback: bool = False,
     step: float = 1.0,
     physical: bool = True,
-    wanders: bool = False,
-    before: Parts = (),
+    only: Family | None = None,
 ) -> Chosen | None:
-    """The structures of one output, y (n, 1), from all inputs (n, r); None where nothing can be estimated.
+    """Return the structures of one output y (n, 1) from all inputs (n, r); None if none can be estimated.
 
     Args:
         first, second: records to estimate from and to judge by.
         feedback: whether u(t) may answer y(t).
         step: the sample time.
         physical: whether plants in s are tried.
-        wanders: whether the noise integrates.
-        before: what was recorded right before each of those that judge; empty: nothing.
+        only: the structure to take.
     """
-    levels, judging = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
-    first = differenced(levels) if wanders else levels
-    if any(len(y) != len(own) for (_, y), (_, own) in zip(second, judging, strict=True)):
-        before = ()
-    by_prediction = feedback or wanders
-    samples = sum(len(y) for _, y in first)
-    r, longest = first[0][0].shape[1], max(len(y) for _, y in judging)
-    highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
-    # In a loop an input answers the noise; what is left of it must be white to tell the plant.
-    clean = whitened(first) if by_prediction else first
-    delays = delays_of(first, clean, highest, longest, feedback=feedback, known=bool(before))
-    quick, late = delays.quick, delays.latest
-    by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
-    near = min(quick, key=lambda n: criterion(quick[n], samples))
-    resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
-    # Delays that some orders take for others are no reason to judge by other samples.
-    before = known_before(judging, before, late) if delays.told else ()
-    # What is to judge a model must be longer than its delay.
-    latest = min(_RUN_OFF * delays.most, longest + (late if before else 0) - 1)
-    parts = _Parts(first, levels, judging, before, feedback, wanders, quick, resting, late, latest)
-
-    families = dict[str, None]()
-
-    def judged(tried: Iterable[Shape]) -> list[Candidate]:
-        small = [shape for shape in dict.fromkeys(tried) if _PER_PARAMETER * shape.size <= samples]
-        families.update(dict.fromkeys(shape.family for shape in small))
-        return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
-
-    orders = sorted({*range(1, min(highest, _ALWAYS) + 1), near})
-    gain = static_gain(best_delays(clean, 0, 1, delays.most, quick[1].delays, delays.least).delays)
-    in_s = [process for n in quick if physical for process in processes(n, quick[n].delays, step)]
-    if wanders:
-        plain: list[Shape] = [gain, *(plant_order(n, quick[n].delays)[-1] for n in orders), *in_s]
-        found = judged(shape.with_coloured_noise()[0] for shape in plain)
-    else:
-        begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(delays.least))]
-        known = [shape for n in orders for shape in plant_order(n, quick[n].delays)]
-        judge = partial(simulation_fit, parts=judging, late=late, before=before)
-        found = judged([gain, *known, *_best_arx(first, judge, begun, samples), *in_s])
-        for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
-            simulating = [c for c in found if c.orders.family in family]
-            if simulating:
-                found += judged(with_noise(simulating))
-    again = {c.orders: parts.refined(c) for c in _leading(found)}
-    found = [again.get(c.orders) or c for c in found]
-    usable = [c for c in again.values() if c is not None and np.isfinite(c.validation)]
+    records = _prepared(busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES), feedback, step, only)
+    every = dict.fromkeys(_shapes(records, physical) if only is None else _fixed(records, only))
+    shapes = [shape for shape in every if _PER_PARAMETER * shape.size <= records.samples]
+    found = list[Candidate]()
+    try:
+        for count, shape in enumerate(shapes):
+            tell(Counted(f"structures estimated, now {shape.family}", count, len(shapes)))
+            candidate = records.candidate(shape)
+            found += [candidate] if candidate is not None else []
+    except KeyboardInterrupt:
+        if not found:
+            raise
+    usable = [c for c in found if np.isfinite(c.validation)]
     if not usable:
         return None
-    good = about_as_good(usable)
-    if good[0].failed and not (by_prediction or good[0].orders.coloured):
-        filtered = map(parts.refined, judged(good[0].orders.with_coloured_noise()))
-        good = noise_first(good, [c for c in filtered if c is not None])
-    best = good[0]
-    every = {c.orders: c for c in (*found, *good)}
-    rest = sorted((c for c in every.values() if c.orders != best.orders), key=likeliest)
     estimated = {c.orders.family for c in found}
-    dropped = tuple(family for family in families if family not in estimated)
-    return Chosen((best, *rest), by_order, tuple(good), first, delays.least, delays.most, dropped)
+    dropped = tuple(
+        dict.fromkeys(s.family for s in shapes if s.coloured(records.C, records.D).family not in estimated)
+    )
+    return Chosen(*ranked(usable), records.first, records.swept, int(feedback), dropped)
 
 
-def _leading(found: Sequence[Candidate]) -> list[Candidate]:
-    """The best of every family; those with coloured noise beside the plain ones, of which they are made."""
-    kept: list[Candidate] = []
-    for candidate in sorted(found, key=likeliest):
-        alike = sum(
-            (c.orders.family, c.orders.coloured) == (candidate.orders.family, candidate.orders.coloured)
-            for c in kept
-        )
-        if alike < _FINALISTS and np.isfinite(candidate.validation):
-            kept.append(candidate)
-    return kept
+def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: Family | None) -> _Records:
+    """Return the records with their noise whitened, and the regressions of all orders."""
+    samples, inputs = sum(len(y) for _, y in first), first[0][0].shape[1]
+    highest = max(min(_HIGHEST, samples // (6 * (inputs + 1))), 1)
+    swept, white, A = sweep(first, highest, least=int(feedback)), first, np.ones(1)
+    C = D = np.ones(1)
+    for _ in range(0 if only == "oe" else _ROUNDS_IN_LOOP if feedback else _ROUNDS):
+        left = output_errors(first, swept.best(samples))
+        A = whitening(left)
+        C, D = noise_model(left, int(feedback or only == "bj"))
+        white = whitened(first, A)
+        swept = sweep(white, highest, least=int(feedback))
+    longest = max(len(y) for _, y in judging)
+    late = max(max(one.delays) for one in swept.by_order.values()) + _SETTLES
+    wanders = lingering(D, max(len(y) for _, y in first)) > 0
+    return _Records(
+        first, judging, white, swept, late if late < longest // 2 else 0, C, D, feedback, wanders, step
+    )
 
 
-def _best_arx(
-    first: Parts, judge: Callable[[Model], tuple[float, ...]], begun: Sequence[tuple[int, ...]], samples: int
-) -> Iterator[Orders]:
-    """The ARX models that `judge` says simulate best, of sets of delays."""
-    r = len(begun[0])
-    highest = max(min(_HIGHEST_ARX, samples // (6 * (r + 1))), 1)
-    ranked = []
-    for a, b, lags, theta in arx_grid(first, highest, list(dict.fromkeys(begun))):
-        orders = arx(lags, a, b)
-        if np.all(np.isfinite(theta)) and orders.size == theta.size:
-            model = orders.model().at(theta)
-            with suppress(*NOT_COMPUTED):
-                if all(model.stable_outputs):
-                    ranked.append((judge(model)[0], orders))
-    ranked.sort(key=lambda pair: -pair[0])
-    return (orders for _, orders in ranked[:_ARX_KEPT])
+def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
+    """Yield the structures to try, the simplest first."""
+    swept, step = records.swept, records.step
+    near, highest = swept.best(records.samples), max(swept.by_order)
+    yield Orders("FIR", swept.near(1).delays, 1)
+    if physical:
+        yield from (Process(swept.near(n).delays, n, step) for n in range(1, min(max(near.order, 2), 3) + 1))
+        yield Process(swept.near(2).delays, 2, step, zero=True)
+    if physical and lingering(swept.near(1).F, records.samples):
+        yield Process(swept.near(1).delays, 0, step)
+    for n in sorted({1, near.order, min(near.order + 1, highest)}):
+        yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
+    yield from _best_arx(records)
+
+
+def _fixed(records: _Records, only: Family) -> Iterator[Shape]:
+    """Yield the orders of the one family that is asked for."""
+    swept = records.swept
+    if only == "arx":
+        yield from _best_arx(records)
+    elif only in ("oe", "bj", "armax"):
+        for n, one in swept.by_order.items():
+            if only == "armax":
+                yield Orders("ARMAX", one.delays, n, a=n, c=n)
+            else:
+                yield Orders("OE", one.delays, n, f=n)
+    else:
+        order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
+        yield Process(swept.near(order).delays, order, records.step)
+
+
+def _best_arx(records: _Records) -> Iterator[Orders]:
+    """Yield the ARX models that the criterion prefers, of the delays of the sweep."""
+    delays, samples = records.swept.best(records.samples).delays, records.samples
+    highest = max(min(_HIGHEST_ARX, samples // (6 * (len(delays) + 1))), 1)
+    listed = [
+        (float(np.log(max(loss, 1e-300))) + price(len(theta), rows), Orders("ARX", delays, b, a=a))
+        for a, b, theta, loss, rows in arx_models(records.first, highest, delays)
+        if np.all(np.isfinite(theta))
+    ]
+    yield from (orders for _, orders in sorted(listed, key=lambda one: one[0])[:_ARX_KEPT])

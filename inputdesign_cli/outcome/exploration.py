@@ -23,15 +23,18 @@ class Validation:
 
 @dataclass(frozen=True)
 class Structure:
-    """A structure that was tried: its orders and delays, and how it fits."""
+    """A structure that was tried: its orders and delays, and how it fits.
+
+    `certain` is whether no parameter of the plant deviates by more than half its value.
+    """
 
     family: str
     orders: Mapping[str, int]
     delay: tuple[int, ...]
     parameters: int
     criterion: float
-    failed: tuple[str, ...]
     converged: bool
+    certain: bool
     estimation_fit_percent: float | None = field(default=None, metadata=NULL)
     simulation_fit_percent: float | None = field(default=None, metadata=NULL)
     prediction_fit_percent: float | None = field(default=None, metadata=NULL)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import control
 
     from inputdesign_cli.compute.executor import Executor
+    from inputdesign_cli.explore import Family
     from inputdesign_cli.questions.assessment.assess import Assessment
     from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
     from inputdesign_cli.questions.exploration.explore import Exploration
@@ -184,13 +185,20 @@ def recorded_part(spec: Spec, path: Path, preparation: Preparation) -> Part:
         return read_part(build_rounds(spec), path, preparation)
 
 
-def explore(data: Files, preparation: Preparation | None = None, *, model: Spec | None = None) -> Exploration:
+def explore(
+    data: Files,
+    preparation: Preparation | None = None,
+    *,
+    model: Spec | None = None,
+    structure: Family | None = None,
+) -> Exploration:
     """Find a model in a log, without a spec; or judge a given model by it.
 
     Args:
         data: a data file, or several of the same experiment.
         preparation: which column is which, and what to do to the record before.
         model: to judge, as a spec (`load_spec(.., design=False)`).
+        structure: the structure to take; None: the simplest that explains the log as well as any.
 
     Raises:
         SpecError: the model cannot be judged.
@@ -199,13 +207,14 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
     """
     from inputdesign_cli.questions.building.header import build_header
     from inputdesign_cli.questions.exploration.build import model_to_judge, naming_model
-    from inputdesign_cli.questions.exploration.explore import explore as explore_log, judge
+    from inputdesign_cli.questions.exploration.explore import explore as explore_log
+    from inputdesign_cli.questions.exploration.judge import judge
     from inputdesign_cli.records import Preparation
 
     prepared = preparation or Preparation()
     if model is None:
         with sound_arithmetic(most_extreme({})):
-            return explore_log(_paths(data), prepared)
+            return explore_log(_paths(data), prepared, structure)
     with _placed(model), naming_model(model):
         return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
 

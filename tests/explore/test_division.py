@@ -5,7 +5,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.explore import explore_records
-from inputdesign_cli.explore.division import divided, known_before
+from inputdesign_cli.explore.division import divided
 
 
 def record(u):
@@ -20,7 +20,7 @@ def pulse(samples, up, down):
 
 @pytest.mark.parametrize(("up", "down"), [(50, 110), (20, 200), (100, 260), (130, 170), (30, 120)])
 def test_the_steps_of_a_single_pulse_are_parted_with_what_comes_after_them(up, down):
-    first, second, split, _ = divided([record(pulse(300, up, down))])
+    first, second, split = divided([record(pulse(300, up, down))])
     assert split.endswith("and the rest")
     assert len(first) == len(second) == 1
     cut = len(first[0][0])
@@ -32,7 +32,7 @@ def test_the_steps_of_a_single_pulse_are_parted_with_what_comes_after_them(up, d
 
 def test_records_that_move_all_along_keep_the_first_three_fifths():
     u = np.random.default_rng(1).choice([-1.0, 1.0], 200)
-    first, _, split, _ = divided([record(u)])
+    first, _, split = divided([record(u)])
     assert (len(first[0][0]), split) == (120, "the first 60 % and the rest")
 
 
@@ -59,18 +59,3 @@ def test_a_bump_up_and_down_tells_gain_and_time_constant(seed):
     w = np.array([1e-3, 0.01, 0.03])
     truth = 0.8 * (1.0 - pole) * np.exp(-7j * w) / (1.0 - pole * np.exp(-1j * w))
     assert np.abs(found.model.plant_at(w)[:, 0, 0] / truth - 1.0).max() < 0.05
-
-
-def test_what_judges_knows_what_was_recorded_right_before_it():
-    """Used where a delay would leave out much of what judges; blocks know those before them."""
-    u = np.random.default_rng(2).choice([-1.0, 1.0], 200)
-    _, second, _, before = divided([record(u)])
-    np.testing.assert_array_equal(before[0][1][:, 0], np.arange(120))
-    assert known_before(second, before, 10) == ()
-    assert known_before(second, before, 20) is before
-    both = np.column_stack(
-        [np.r_[moves := np.tile([1.0, -1.0], 75), np.zeros(150)], np.r_[np.zeros(150), moves]]
-    )
-    _, second, _, before = divided([record(both)])
-    for (_, y), (_, past) in zip(second, before, strict=True):
-        np.testing.assert_array_equal(past[:, 0], np.arange(y[0, 0]))

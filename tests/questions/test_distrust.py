@@ -77,7 +77,6 @@ def test_inputs_that_move_together_are_told_apart_by_nothing(tmp_path):
     y = scipy.signal.lfilter([0, 0.3], [1, -0.7], 3.0 * u) + 0.1 * rng.standard_normal(150)
     found = explore(stored(tmp_path / "log.csv", np.column_stack([u, 2.0 * u]), y, "u1,u2,y"))
     assert any("the inputs move together" in reason for reason in found.reasons)
-    assert not any("exciting of order 0 only" in reason for reason in found.reasons)
 
 
 def lags(u, plants, rng, noise=0.05):
@@ -107,8 +106,8 @@ def test_an_input_that_tells_nothing_of_what_it_does_is_named(tmp_path):
     y = lags(u, [(1.0, 8.0, 3), (0.0, 8.0, 1)], rng)
     found = explore(stored(tmp_path / "log.csv", u, y, "u1,u2,y"))
     said = [*found.results.result["notes"], *found.reasons]
-    assert any(told.startswith("no effect of u2 on the outputs") for told in said)
-    assert not any(told.startswith("no effect of u1") for told in said)
+    assert any(told.startswith("u2 has no effect") for told in said)
+    assert not any(told.startswith("u1 has no effect") for told in said)
 
 
 @pytest.mark.slow

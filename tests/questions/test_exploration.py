@@ -109,36 +109,32 @@ def test_an_input_without_effect_earns_no_trust(tmp_path):
     assert "no trust" in told.stdout
 
 
-def test_an_integrator_earns_no_trust_and_is_offered(tmp_path):
-    """y(t) - y(t-1) = 0.02 u(t-1): the slope is told, time constant and static gain are not."""
+@pytest.fixture
+def integrating(tmp_path):
+    """Return a log of y(t) - y(t-1) = 0.02 u(t-1)."""
     rng = np.random.default_rng(1)
-    u = np.repeat(rng.choice([-1.0, 1.0], 125), 8)
-    y = np.cumsum(np.concatenate([[0.0], 0.02 * u[:-1]])) + 0.05 * rng.standard_normal(1000)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 8)
+    y = np.cumsum(np.concatenate([[0.0], 0.02 * u[:-1]])) + 0.05 * rng.standard_normal(480)
     log = tmp_path / "log.csv"
     np.savetxt(log, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
-    found = explore(log, Preparation(sample_time=1.0))
-    (reason,) = found.reasons
-    assert "integrator" in reason
-    assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.02, rel=0.05)
-    spec = re.search(r"in SPEC (sample_time: \S+) and (plant: .*)$", reason)
-    assert re.search(r"parameters: \{K: 0\.0\d+, L: ([\d.]+)\}", spec[2])[1] == "0.1", (
-        "it answers the next row"
-    )
-    result = identify(parse_spec(f"{spec[1]}\n{spec[2]}\n", design=False), log).result
-    assert result["identification"]["theta"]["K"] == pytest.approx(0.02, rel=0.02)
-    assert not any("is asked" in note for note in result["notes"]), "this spec asks for nothing"
+    return log
 
 
-@pytest.mark.slow
-def test_an_integrator_that_no_stable_model_explains_is_offered(tmp_path):
-    """y(t) - y(t-1) = 0.05 u(t-3): estimates from the whole record end on the limit of stability."""
-    rng = np.random.default_rng(5)
-    u = np.repeat(rng.choice([-1.0, 1.0], 100), 8)
-    y = np.cumsum(np.concatenate([np.zeros(3), 0.05 * u[:-3]])) + 0.1 * rng.standard_normal(800)
-    log = tmp_path / "log.csv"
-    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
-    (reason,) = explore(log, Preparation(sample_time=1.0)).reasons
-    assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.05, rel=0.05)
+def test_an_integrator_earns_no_trust_until_somebody_says_that_it_is_one(integrating):
+    """Only the slope follows from the record: a long time constant would explain it as well."""
+    prepared = Preparation(sample_time=1.0)
+    found = explore(integrating, prepared)
+    assert [one.code for one in found.results.outcome.findings if one.message.startswith("no trust")] == [
+        "like-integrator"
+    ]
+    stated = explore(integrating, prepared, structure="integrator")
+    assert stated.reasons == ()
+    for one in (found, stated):
+        theta = one.results.outcome.identification.theta
+        assert theta["K"] == pytest.approx(0.02, rel=0.03)
+        assert theta["L"] < 0.2
+    design = solve(parse_spec(stated.results.resolved_spec, overrides=["spectrum.lines=20"]))
+    assert design.outcome.status == "optimal"
 
 
 def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):
@@ -157,9 +153,8 @@ def test_a_loop_whose_input_is_a_share_of_the_output_is_told_as_one(tmp_path):
     y = scipy.signal.lfilter([1.0], [1.0, -0.66], rng.standard_normal(200))  # 0.9 y - 0.4 * 0.6 y
     path = tmp_path / "log.csv"
     path.write_text("u,y\n" + "".join(f"{-0.6 * x!r},{x!r}\n" for x in y.tolist()))
-    with pytest.raises(DataError, match="data from a loop without excitation") as caught:
-        explore(path)
-    assert caught.value.diagnostics[0].hint.startswith("move the reference of the loop")
+    found = explore(path)
+    assert any("data from a loop without excitation" in reason for reason in found.reasons)
 
 
 @pytest.mark.parametrize(
@@ -244,29 +239,6 @@ def test_many_spikes_are_told(tmp_path):
 
 
 @pytest.mark.slow
-def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
-    """Of two inputs the second steps once only, at the end: plants in s with three poles cannot be told."""
-    rng = np.random.default_rng(0)
-    n = np.arange(200)
-    u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 40), 5), (n >= 195).astype(float)])
-    y = scipy.signal.lfilter([0, 0.2], [1, -0.8], u[:, 0]) + scipy.signal.lfilter(
-        [0, 0.3], [1, -0.6], u[:, 1]
-    )
-    rows = np.column_stack([n, u, y + 0.05 * rng.standard_normal(200)])
-    path = tmp_path / "log.csv"
-    path.write_text("time,u1,u2,y\n" + "\n".join(",".join(f"{x:.6g}" for x in row) for row in rows))
-    result = explore(path).results.result
-    (output,) = result["exploration"]["outputs"]
-    left = {structure["family"] for structure in output["structures"]}
-    assert not left & set(output["not_estimated"])
-    told = [note for note in result["notes"] if "model could be estimated" in note]
-    assert bool(told) == bool(output["not_estimated"])
-    assert {"FOPDT", "SOPDT", "TOPDT"} <= left | set(output["not_estimated"])
-    assert "u2 changes in 1 of its samples only" in told[0]
-    assert any("an input moves in one stretch of the record only" in note for note in result["notes"])
-
-
-@pytest.mark.slow
 def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
     rng = np.random.default_rng(2)
     u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)
@@ -340,4 +312,4 @@ def test_a_steady_sinusoid_tells_no_plant_of_three_parameters(tmp_path):
     rows = "".join(f"{a:.8g},{b:.8g}\n" for a, b in zip(u[600:], y[600:], strict=True))
     path.write_text("u,y\n" + rows)
     found = explore(path)
-    assert any("exciting of order 2 only" in reason for reason in found.reasons)
+    assert any("exciting of order 2, " in reason for reason in found.reasons)

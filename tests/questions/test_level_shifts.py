@@ -12,7 +12,7 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import LevelShift
 from inputdesign_cli.identification.adequacy import ScoreTest
 from inputdesign_cli.questions import explore
-from inputdesign_cli.questions.exploration import beside_shifts
+from inputdesign_cli.questions.exploration import explore as exploring
 from inputdesign_cli.records import Preparation, read_log
 
 K, T = 2.0, 12.0
@@ -120,20 +120,20 @@ def found_with(samples, places, split="halves"):
 
 
 @pytest.mark.parametrize(
-    ("answers", "lengths"),
+    ("answers", "lengths", "taken"),
     [
-        ([found_with(100, [])], (100,)),
-        ([found_with(100, [40]), found_with(97, [])], (39, 58)),
-        ([found_with(100, [40, 42]), found_with(95, [])], (39, 56)),
-        ([found_with(100, [8, 60]), found_with(86, [])], (49, 38)),
-        ([found_with(100, [40]), found_with(97, [], split="none"), found_with(100, [])], (100,)),
-        ([found_with(100, [40]), SpecError([]), found_with(100, [])], (100,)),
-        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [])], (39, 30, 25)),
-        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [20]), found_with(100, [])], (100,)),
+        ([found_with(100, [])], (100,), 0),
+        ([found_with(100, [40]), found_with(97, [])], (39, 58), 1),
+        ([found_with(100, [40, 42]), found_with(95, [])], (39, 56), 1),
+        ([found_with(100, [8, 60]), found_with(86, [])], (49, 38), 1),
+        ([found_with(100, [40]), found_with(97, [], split="none")], (100,), 0),
+        ([found_with(100, [40]), SpecError([])], (100,), 0),
+        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [])], (39, 30, 25), 2),
+        ([found_with(100, [40]), found_with(97, [70]), found_with(94, [20])], (100,), 0),
     ],
 )
-def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths):
-    """Shifts that overlap, leave too little beside them, are all that tells the plant, or have no end."""
+def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths, taken):
+    """Shifts that overlap, leave too little beside them, alone determine the plant, or have no end."""
     log = read_log(saved(tmp_path / "log.csv", rows_of(100, None, 1)), Preparation())
     given = iter(answers)
 
@@ -143,10 +143,10 @@ def test_what_is_left_out_of_a_log(monkeypatch, tmp_path, answers, lengths):
             raise answer
         return answer
 
-    monkeypatch.setattr(beside_shifts, "explore_records", explored)
-    rest, found = beside_shifts.explored_beside_shifts(log, loop=False)
+    monkeypatch.setattr(exploring, "explore_records", explored)
+    rest, found = exploring.explored_beside_shifts(log, loop=False)
     assert rest.lengths == lengths
-    assert found is answers[-1]
-    told = " ".join(rest.notes)
-    assert bool(shifts_in([told])) == (rest.lengths != (100,))
-    assert ("too few for a segment" in told) == (len(answers[0].estimate.shifted) == 2 and lengths[0] == 49)
+    assert found is answers[taken]
+    steps = " ".join(rest.notes)
+    assert bool(shifts_in([steps])) == (rest.lengths != (100,))
+    assert ("too few for a segment" in steps) == (lengths[0] == 49)

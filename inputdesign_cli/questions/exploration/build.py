@@ -63,6 +63,9 @@ def spec_text(log: Record, found: Found, sources: Sequence[Path]) -> str:
     limit, amplitude = _numbers([float(f"{x:.6g}") for x in power]), _numbers(widths)
     ranges = " and ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True))
     offset = levels[0] if single else levels
+    # Power at frequency zero determines the gain of an integrator without end.
+    family = "{type: multisine, lines: 100}" if found.integrates else "{type: fir, order: 20}"
+    kind_of = "multisine" if found.integrates else "filtered_noise"
     source = " ".join(" and ".join(path.name for path in sources).split())
     text = f"""\
 # Written by `idesign explore` from {source}.
@@ -96,8 +99,8 @@ limits:
   # amplitude: {amplitude}         # with it every sample stays within the range of the log, {ranges}
 
 # The family of spectra to search, and the signal to apply: about the middle of the range of the log.
-spectrum: {{type: fir, order: 20}}
-signal: {{type: filtered_noise, seed: 1, offset: {json.dumps(offset)}}}
+spectrum: {family}
+signal: {{type: {kind_of}, seed: 1, offset: {json.dumps(offset)}}}
 """
     return text
 

@@ -1,0 +1,83 @@
+"""Find outputs that drift along one line through all records, beside what the inputs do.
+
+Taking lines away from u and y, each alone, would not do: the response of the plant to the input has a line of
+its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.explore.fits import Parts
+from inputdesign_cli.explore.sweep import output_errors, sweep, whitening
+from inputdesign_cli.plant.filtering import filtered
+
+_HIGHEST = 3
+# Of longer records means over stretches give a slope as well: a line is slow.
+_MOST_SAMPLES = 1500
+# A line counts that is so many deviations from none, and rises by that many times the scatter about it.
+_CERTAIN, _RISES = 5.0, 1.0
+# A root of the noise that fades by fewer time constants within the records may be that of a random walk,
+# whose residuals look so beside all that was estimated.
+_WALKS = 40.0
+
+
+def slopes_of(parts: Parts, *, known: bool = False) -> Array:
+    """Return the slopes (p,), a sample, of the lines along which outputs drift; zero for no line.
+
+    Args:
+        parts: records u (n, r), y (n, p).
+        known: whether they are known to drift, so that any slope counts.
+    """
+    stretch = -(-sum(len(y) for _, y in parts) // _MOST_SAMPLES)
+    short = [tuple(_means(x, stretch) for x in part) for part in parts if len(part[1]) >= 10 * stretch]
+    slopes = np.zeros(parts[0][1].shape[1])
+    for i in range(slopes.size if short else 0):
+        slopes[i] = _line([(u, y[:, i : i + 1]) for u, y in short], known) / stretch
+    return slopes
+
+
+def _line(parts: Parts, known: bool) -> float:
+    """Return the slope of one output; zero unless it is far from none in noise of any colour.
+
+    What an output-error model with a line does not explain is whitened by an autoregression. The deviation of
+    the slope follows from the whitened line.
+    """
+    samples, longest = sum(len(y) for _, y in parts), max(len(y) for _, y in parts)
+    best = sweep(parts, max(min(_HIGHEST, samples // 12), 1), line=True).best(samples)
+    # A line that goes beyond what the output does is that of a plant which integrates.
+    reach = max(float(np.ptp(y)) for _, y in parts)
+    if not np.isfinite(best.slope) or abs(best.slope) * longest >= reach:
+        return 0.0
+    if known:
+        return best.slope
+    if abs(best.slope) * samples < _RISES * float(np.sqrt(best.loss)):
+        return 0.0
+    errors = output_errors(parts, best, line=True)
+    A = whitening(errors)
+    if float(np.max(np.roots(A).real, initial=0.0)) > 1.0 - _WALKS / samples:
+        return 0.0
+    white = [
+        (filtered(A, [1.0], e)[A.size - 1 :], _through(A, len(e))) for e in errors if len(e) > 2 * A.size
+    ]
+    power = sum(float(e @ e) for e, _ in white) / max(sum(len(e) for e, _ in white), 1)
+    size = sum(float(line @ line) for _, line in white)
+    return best.slope if abs(best.slope) * np.sqrt(size) > _CERTAIN * np.sqrt(power) else 0.0
+
+
+def _through(A: Array, samples: int) -> Array:
+    """Return a line of slope one, its level free, through A."""
+    line = filtered(A, [1.0], np.arange(samples, dtype=float))[A.size - 1 :]
+    return np.asarray(line - line.mean())
+
+
+def _means(x: Array, stretch: int) -> Array:
+    """Return means over stretches of so many samples, the last samples left out."""
+    whole = len(x) // stretch * stretch
+    return np.asarray(x[:whole].reshape(-1, stretch, x.shape[1]).mean(axis=1))
+
+
+def levelled(parts: Parts, slopes: Array) -> list[tuple[Array, Array]]:
+    """Return the records without lines of these slopes (p,); the middle of every record stays as it is."""
+    return [(u, y - np.outer(np.arange(len(y)) - 0.5 * (len(y) - 1), slopes)) for u, y in parts]

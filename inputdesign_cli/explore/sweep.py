@@ -1,0 +1,394 @@
+"""Choose delays and orders by linear regressions: output errors with one denominator for all inputs.
+
+The regressions are those of [steiglitz-mcbride-1965]. The products of all lags of y and u, through 1/F, give
+the errors of every delay at once. Levels, drift and the state at the start of each record are projected out.
+Before a record the inputs count as what they are at its beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.explore.fits import Parts
+from inputdesign_cli.explore.regressors import past, residuals
+from inputdesign_cli.identification.stability import reflected
+from inputdesign_cli.plant.filtering import filtered
+
+_WIDE, _ROUNDS, _POLISH, _BESIDE = 3, 8, 3, 5
+_RIDGE = 1e-12
+# The longest delay that is tried, in samples and in shares of the longest record.
+_MOST_DELAY, _SHARE, _LONG = 300, 2, 6
+_CONFIDENCE = 0.95
+# Time constants of a root within a record, below which it may as well integrate.
+_FADES = 8.0
+# Orders of an autoregression for the noise, and samples that each lag takes.
+_LAGS, _PER_LAG = (0, 1, 2, 3, 5, 8, 12), 15
+_MOST_NOISE, _LONG_NOISE = 2, 12
+
+
+@dataclass(frozen=True)
+class Regression:
+    """y = sum_j (B_j / F) u_j + level + start.
+
+    Attributes:
+        F: (n + 1,).
+        B: (r, n + 1), from the lags `delays` (r,) on.
+        loss: mean square of the output error.
+        slope: that of a line besides, a sample, where one was asked for.
+    """
+
+    F: Array
+    B: Array
+    delays: tuple[int, ...]
+    loss: float
+    slope: float = 0.0
+
+    @property
+    def order(self) -> int:
+        """Return the number of poles."""
+        return self.F.size - 1
+
+    def criterion(self, samples: int) -> float:
+        """Return BIC over the number of samples, delays counted."""
+        size = self.order + self.B.size + len(self.delays)
+        return float(np.log(max(self.loss, 1e-300)) + size * np.log(samples) / samples)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The best regression of every order, the longest delay that was tried, and the longest record."""
+
+    by_order: dict[int, Regression]
+    most: int
+    longest: int
+
+    def best(self, samples: int) -> Regression:
+        """Return the regression that BIC prefers, of those with the fewest poles that integrate.
+
+        Noise that wanders looks like the free response of integrators.
+        """
+        return min(
+            self.by_order.values(), key=lambda one: (lingering(one.F, self.longest), one.criterion(samples))
+        )
+
+    def near(self, order: int) -> Regression:
+        """Return the regression of that order, or of the nearest."""
+        return self.by_order[min(max(order, 1), max(self.by_order))]
+
+
+def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> Sweep:
+    """Return regressions of one output y (n, 1) of all orders up to `highest`.
+
+    Args:
+        parts: records u (n, r), y (n, 1).
+        least: the shortest delay to try.
+        line: whether the output drifts along one line through all records.
+    """
+    longest, inputs = max(len(y) for _, y in parts), parts[0][0].shape[1]
+    most = max(min(_MOST_DELAY, longest // _SHARE), 1)
+    begin, found = (max(least, 1),) * inputs, dict[int, Regression]()
+    for n in range(1, highest + 1):
+        # What acts before the longest delay is unknown: it counts, or all samples before are left out.
+        short = (longest // _LONG, 0)
+        wide: dict[int, list[tuple[int, int] | None]] = {1: [short, (most, most)], 2: [short, None]}
+        denominators = [np.ones(1), *(one.F for one in list(found.values())[-1:])]
+        tried = [
+            _settled(parts, n, begin, way, F, least, line)
+            for F in denominators
+            for way in wide.get(n, [None])
+        ]
+        found[n] = min(tried, key=lambda one: one.loss)
+        begin = found[n].delays
+    return Sweep(found, most, longest)
+
+
+def _settled(
+    parts: Parts,
+    n: int,
+    delays: tuple[int, ...],
+    way: tuple[int, int] | None,
+    F: Array,
+    least: int,
+    line: bool,
+) -> Regression:
+    """Return a model of order n: its delays from a wide range first, then from the next ones.
+
+    Args:
+        way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
+    """
+    for _ in range(_WIDE if way else 0):
+        most, skipped = way or (0, 0)
+        for j in range(len(delays)):
+            delays = _best_delay(parts, F, delays, n, j, (least, max(most, least + 1)), line, skipped)
+        F = _denominator(parts, F, n, delays, line)
+    best = output_error(parts, n, delays, line=line, F=F)
+    for j in range(len(delays)):
+        for step in (1, -1):
+            at, misses, tried = best.delays[j] + step, 0, 0
+            while least <= at and misses < 2 and tried < _BESIDE:
+                other = (*best.delays[:j], at, *best.delays[j + 1 :])
+                new = output_error(parts, n, other, line=line, F=best.F, rounds=_POLISH)
+                misses, tried = (0 if new.loss < best.loss else misses + 1), tried + 1
+                best = min(best, new, key=lambda one: one.loss)
+                at += step
+    return best
+
+
+def output_error(
+    parts: Parts,
+    n: int,
+    delays: Sequence[int],
+    *,
+    line: bool = False,
+    F: Array | None = None,
+    rounds: int = _ROUNDS,
+) -> Regression:
+    """Return the model of order n with given delays, the search begun from F (one: an ARX model)."""
+    F = np.ones(1) if F is None else F
+    best = _at(parts, F, n, delays, line)
+    for _ in range(rounds):
+        F = _denominator(parts, F, n, delays, line)
+        new = _at(parts, F, n, delays, line)
+        if new.loss < best.loss * (1.0 - 1e-6) or best.order != n:
+            best = new
+        elif not new.loss < 1.5 * best.loss:
+            break
+    return best
+
+
+def _blocks(
+    parts: Parts,
+    F: Array,
+    n: int,
+    ranges: Sequence[tuple[int, int]],
+    line: bool,
+    *,
+    through: bool,
+    skipped: int = 0,
+) -> Iterator[Array]:
+    """Yield of every record the columns and the target (n, m + 1), its own unknowns projected out.
+
+    Args:
+        ranges: of each input the first lag, and the one after the last.
+        through: whether lags of y stand among the columns, all signals through 1/F; else y is as it is.
+        skipped: samples of each record that are left out.
+    """
+    total, begin = sum(len(y) for _, y in parts), 0
+    for u, y in parts:
+        samples = len(y)
+        drift = (begin + np.arange(samples)) / total - 0.5
+        begin += samples
+        raw = np.stack(
+            [y[:, 0] - y[:, 0].mean(), drift, np.ones(samples), np.eye(1, samples)[0], *(u - u[0]).T]
+        )
+        smooth, sloped, held, impulse, *inputs = filtered([1.0], F, raw)
+        arrived = held
+        if not through:
+            smooth, sloped, held = raw[:3]
+        columns = [-lagged(smooth, lag) for lag in range(1, n + 1)] if through else []
+        columns += [sloped] if line else []
+        for x, (low, high) in zip(inputs, ranges, strict=True):
+            columns += [lagged(x, lag) for lag in range(low, high)]
+        own = [held, *(lagged(impulse, lag) for lag in range(n))]
+        # Before a long delay acts what held before the record, which may differ from its first value.
+        late = (low for low, high in ranges if samples // _LONG < low < samples and high - low <= n + 2)
+        own += [lagged(arrived, low) for low in late]
+        unknown, _ = np.linalg.qr(np.stack(own, axis=1)[skipped:])
+        both = np.column_stack([*columns, smooth])[skipped:]
+        yield both - unknown @ (unknown.T @ both)
+
+
+def _products(
+    parts: Parts,
+    F: Array,
+    n: int,
+    ranges: Sequence[tuple[int, int]],
+    line: bool,
+    *,
+    through: bool,
+    skipped: int = 0,
+) -> Array:
+    """Return the products (m + 1, m + 1) of columns and target, of all records."""
+    with np.errstate(all="ignore"):
+        blocks = _blocks(parts, F, n, ranges, line, through=through, skipped=skipped)
+        return np.asarray(sum(block.T @ block for block in blocks))
+
+
+def _solved(gram: Array) -> tuple[Array, float]:
+    """Return the least squares from products of columns and target, and the sum of squares that is left."""
+    size = len(gram) - 1
+    if not np.all(np.isfinite(gram)):
+        return np.full(size, np.nan), np.inf
+    scale = np.sqrt(np.maximum(np.diag(gram)[:size], 1e-300))
+    scaled = gram[:size, :size] / np.outer(scale, scale) + _RIDGE * np.eye(size)
+    solution = np.linalg.solve(scaled, gram[:size, size] / scale) / scale
+    left = gram[size, size] - 2.0 * solution @ gram[:size, size] + solution @ gram[:size, :size] @ solution
+    return solution, max(float(left), 0.0)
+
+
+def _near(n: int, delays: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the lags of B of a plant of order n behind a dead time of any size."""
+    return [(delay, delay + n + 1) for delay in delays]
+
+
+def _denominator(parts: Parts, F: Array, n: int, delays: Sequence[int], line: bool) -> Array:
+    """Return the next F, mirrored into the circle."""
+    solution, _ = _solved(_products(parts, F, n, _near(n, delays), line, through=True))
+    return reflected(np.concatenate([[1.0], solution[:n]])) if np.all(np.isfinite(solution)) else F
+
+
+def _at(parts: Parts, F: Array, n: int, delays: Sequence[int], line: bool) -> Regression:
+    """Return the model whose denominator is F: B, line, levels and starts by least squares."""
+    samples = sum(len(y) for _, y in parts)
+    solution, left = _solved(_products(parts, F, n, _near(n, delays), line, through=False))
+    slope = float(solution[0]) / samples if line else 0.0
+    loss = left / samples if np.isfinite(left) else np.inf
+    return Regression(F, solution[int(line) :].reshape(len(delays), n + 1), tuple(delays), loss, slope)
+
+
+def output_errors(parts: Parts, model: Regression, *, line: bool = False) -> list[Array]:
+    """Return the output errors (n,) of every record, level, drift and start projected out."""
+    n, near = model.order, _near(model.order, model.delays)
+    solution, _ = _solved(_products(parts, model.F, n, near, line, through=False))
+    blocks = _blocks(parts, model.F, n, near, line, through=False)
+    return [block[:, -1] - block[:, :-1] @ solution for block in blocks]
+
+
+def _best_delay(
+    parts: Parts,
+    F: Array,
+    delays: tuple[int, ...],
+    n: int,
+    j: int,
+    reach: tuple[int, int],
+    line: bool,
+    skipped: int,
+) -> tuple[int, ...]:
+    """Return the delays with that of input j replaced by the best within reach: one factor for all."""
+    b, (low, high), ranges = n + 1, reach, _near(n, delays)
+    ranges[j] = (low, high + b)
+    long = [part for part in parts if len(part[1]) > skipped + 4 * b]
+    if not long:
+        return delays
+    gram = _products(long, F, n, ranges, line, through=True, skipped=skipped)
+    if not np.all(np.isfinite(gram)):
+        return delays
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    gram = gram / np.outer(scale, scale)
+    begin = n + line + sum(last - first for first, last in ranges[:j])
+    wide = np.arange(begin, begin + high + b - low)
+    fixed = np.setdiff1d(np.arange(len(gram) - 1), wide)
+    rest = np.append(wide, len(gram) - 1)
+    across = gram[np.ix_(fixed, rest)]
+    known = gram[np.ix_(fixed, fixed)] + _RIDGE * np.eye(len(fixed))
+    left = gram[np.ix_(rest, rest)] - across.T @ np.linalg.solve(known, across)
+    at = np.arange(len(wide) - b + 1)[:, None] + np.arange(b)
+    squares = left[at[:, :, None], at[:, None, :]] + _RIDGE * np.eye(b)
+    moments = left[at, -1]
+    gains = np.sum(moments * np.linalg.solve(squares, moments[:, :, None])[:, :, 0], axis=1)
+    return (*delays[:j], low + int(np.argmax(gains)), *delays[j + 1 :])
+
+
+def delay_ranges(parts: Parts, model: Regression, *, least: int, most: int) -> tuple[tuple[int, int], ...]:
+    """Return the delays of each input that the likelihood ratio leaves at 95 % confidence."""
+    samples = sum(len(y) for _, y in parts)
+    limit, found = scipy.special.chdtri(1, 1.0 - _CONFIDENCE), []
+    for j, chosen in enumerate(model.delays):
+        losses = {}
+        for delay in range(max(chosen - _BESIDE, least), min(chosen + _BESIDE, most) + 1):
+            delays = (*model.delays[:j], delay, *model.delays[j + 1 :])
+            losses[delay] = output_error(parts, model.order, delays, F=model.F, rounds=_POLISH).loss
+        smallest = max(min(losses.values(), default=1.0), 1e-300)
+        kept = [d for d, loss in losses.items() if samples * np.log(loss / smallest) <= limit]
+        found.append((min(*kept, chosen), max(*kept, chosen)))
+    return tuple(found)
+
+
+def arx_models(
+    parts: Parts, most: int, delays: tuple[int, ...]
+) -> Iterator[tuple[int, int, Array, float, int]]:
+    """Yield all ARX models with orders up to `most`: a, b, coefficients, mean squared error, samples."""
+    size, first, rows = most * (len(delays) + 1) + 2, most + max(delays), 0
+    gram = np.zeros((size, size))
+    for u, y in parts:
+        if len(y) > first + 1:
+            x, out = u - u.mean(axis=0), y[:, 0] - y[:, 0].mean()
+            columns = [-lagged(out, lag) for lag in range(1, most + 1)]
+            columns += [lagged(x[:, j], d + lag) for j, d in enumerate(delays) for lag in range(most)]
+            block = np.stack([*columns, np.ones(len(out)), out], axis=1)[first:]
+            gram, rows = gram + block.T @ block, rows + len(block)
+    for a in range(1, most + 1) if rows > size else ():
+        for b in range(1, most + 1):
+            inputs = (range(most * (j + 1), most * (j + 1) + b) for j in range(len(delays)))
+            at = [*range(a), *(i for own in inputs for i in own), size - 2, size - 1]
+            theta, left = _solved(gram[np.ix_(at, at)])
+            yield a, b, theta[:-1], left / rows, rows
+
+
+def whitening(errors: Sequence[Array]) -> Array:
+    """Return the autoregression A (p + 1,) of errors (n,) whose order BIC prefers."""
+    samples = sum(len(e) for e in errors)
+    orders = [p for p in _LAGS if p * _PER_LAG <= samples]
+    long = [e[:, None] - e.mean() for e in errors if len(e) > 2 * orders[-1] and np.all(np.isfinite(e))]
+    if not long:
+        return np.ones(1)
+    most, best, found = orders[-1], np.inf, np.ones(1)
+    rows, targets = np.concatenate([past(e, most) for e in long]), np.concatenate([e[most:, 0] for e in long])
+    for p in orders:
+        A = np.linalg.lstsq(rows[:, :p], targets, rcond=1e-10)[0]
+        left = targets - rows[:, :p] @ A
+        criterion = len(left) * float(np.log(max(left @ left, 1e-300))) + p * float(np.log(len(left)))
+        if criterion < best:
+            best, found = criterion, np.concatenate([[1.0], -A])
+    return found
+
+
+def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
+    """Return C and D of the order that BIC prefers for errors (n,), at least `least`.
+
+    Past noise is taken from a long autoregression ([hannan-rissanen-1982]).
+    """
+    most, lags = _MOST_NOISE, _LONG_NOISE
+    long = [e[:, None] - e.mean() for e in errors if len(e) > 6 * lags and np.all(np.isfinite(e))]
+    none = np.eye(1, least + 1)[0]
+    if not long:
+        return none, none
+    new = residuals([past(v, lags) for v in long], [v[lags:] for v in long])
+    own = np.concatenate([past(v[lags:], most) for v in long])
+    noise = np.concatenate([past(e, most) for e in new])
+    targets = np.concatenate([v[lags + most :, 0] for v in long])
+    best, found = np.inf, (none, none)
+    for n in range(least, most + 1):
+        columns = np.column_stack([own[:, :n], noise[:, :n]])
+        theta = np.linalg.lstsq(columns, targets, rcond=1e-10)[0]
+        left = targets - columns @ theta
+        criterion = len(left) * np.log(max(float(left @ left), 1e-300)) + 2 * n * np.log(len(left))
+        if criterion < best:
+            C, D = (np.concatenate([[1.0], x]) for x in (theta[n:], -theta[:n]))
+            best, found = criterion, (reflected(C), reflected(D))
+    return found
+
+
+def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:
+    """Return the records through A (p + 1,), without the samples that need what was before."""
+    lost = A.size - 1
+    return [
+        (filtered(A, [1.0], u, axis=0)[lost:], filtered(A, [1.0], y, axis=0)[lost:])
+        for u, y in parts
+        if len(y) > 2 * lost + 1
+    ]
+
+
+def lingering(polynomial: Array, samples: int) -> int:
+    """Return how many roots hardly fade within so many samples, as if they integrated."""
+    return int(np.sum(np.roots(polynomial).real > 1.0 - _FADES / samples))
+
+
+def lagged(x: Array, lag: int) -> Array:
+    """Return x (n,) some samples later, zero before."""
+    return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])

@@ -1,0 +1,100 @@
+"""Judge a given model by data that it has not seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.explore import Fits, fits
+from inputdesign_cli.findings.explored_models import HALF, LEAST_FIT
+from inputdesign_cli.identification import cross_correlations
+from inputdesign_cli.identification.checks import check_varying, signal_name
+from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.shares import chance
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.assessment.identify import blaming_columns
+from inputdesign_cli.questions.exploration.explore import Exploration
+from inputdesign_cli.questions.exploration.outcome import validation_curves, validation_of
+from inputdesign_cli.records import Preparation, Record, read_data, read_sheet, with_channels
+
+# Past inputs explain what a judged model leaves: by chance alone, so seldom.
+_SURELY = 1e-6
+
+
+def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
+    """Return how a given model does on other data.
+
+    Raises:
+        DataError: the data cannot be used, or an output never changes.
+    """
+    started = time.perf_counter()
+    counts = {"u": header.units.inputs, "y": header.units.outputs}
+    sheet = read_sheet(paths[0], preparation=preparation)
+    own = {
+        name: column
+        for name, column in with_channels(sheet, preparation.columns).items()
+        if name in preparation.columns or int(name[1:]) <= counts[name[0]]
+    }
+    preparation = replace(preparation, columns=own)
+    data = read_data(paths, header.units, preparation)
+    with blaming_columns(paths[0], data):
+        check_varying((), data.u[:, :0], data.y)
+    at = np.cumsum(data.lengths)[:-1]
+    found = fits(model, list(zip(np.split(data.u, at), np.split(data.y, at), strict=True)))
+    table, curves = validation_curves(header.units, data, found)
+    reasons = _too_little(found) or _explained_by_inputs(found, data)
+    outcome = Outcome(
+        title=header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
+        status="validated",
+        samples=len(data.y),
+        validation=validation_of(found, reasons),
+        findings=data.findings or None,
+        notes=(*data.notes, *(f"no trust: {reason}" for reason in reasons)),
+        timing_s={"validation": time.perf_counter() - started},
+    )
+    return Exploration(
+        Results(outcome, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves}),
+        reasons,
+    )
+
+
+def _too_little(found: Fits) -> tuple[str, ...]:
+    """Return why a model is not of these data: its simulation explains nothing of an output."""
+    reasons = []
+    for i, fit in enumerate(found.simulation):
+        if fit < LEAST_FIT:
+            output = signal_name("y", i, len(found.simulation))
+            what = (
+                f"the simulation explains {fit:.1f} % of {output}, and less than {LEAST_FIT:g} % is "
+                "nothing: a level alone explains as much"
+                if np.isfinite(fit)
+                else f"the model has no simulation of {output}: its plant is unstable"
+            )
+            reasons.append(
+                f"{what}; see whether the model is of this plant, and gain, delay, units and columns agree"
+            )
+    return tuple(reasons)
+
+
+def _explained_by_inputs(found: Fits, data: Record) -> tuple[str, ...]:
+    """Return outputs of which a model explains less than half, where past inputs explain the rest.
+
+    A poor fit alone is no fault of the model: the noise may be strong.
+    """
+    reasons = []
+    for i in [i for i, fit in enumerate(found.simulation) if fit < HALF]:
+        test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
+        if not test.probability >= _SURELY:
+            output = signal_name("y", i, len(found.simulation))
+            reasons.append(
+                f"the simulation explains {found.simulation[i]:.1f} % of {output} only, and past inputs "
+                f"explain what it leaves (probability {chance(test.probability)}): the model is not of the "
+                "plant of these data, or this acts otherwise here"
+            )
+    return tuple(reasons)

@@ -1,0 +1,243 @@
+"""The simplest structure that explains a simulated plant is found, its parameters within their errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.explore import explore_records, explore_structure
+from inputdesign_cli.explore.candidates import ranked
+from tests.explore.plants import column, held, lag, with_noise
+from tests.explore.test_sweep import drifting
+
+STEP = 0.5
+
+
+def first_order(seed, samples=600, K=2.0, T=6.0, L=1.7, hold=10, ratio=10.0, pole=0.0):
+    """Return a record of a lag with dead time, samples half a unit of time apart."""
+    rng = np.random.default_rng(seed)
+    u = held(rng, samples, hold)[:, None]
+    x, _ = lag(K, T, L, STEP).simulate(u, np.zeros(u.shape), 1.0)
+    return u, 30.0 + with_noise(rng, x, ratio, pole)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return explore_records([first_order(2, ratio=25.0)], step=STEP)
+
+
+def test_gain_time_constant_and_dead_time_are_found(found):
+    assert found.model.names == ("K", "T", "L")
+    deviations = (found.estimate.theta - [2.0, 6.0, 1.7]) / np.sqrt(np.diag(found.estimate.covariance))
+    assert np.all(np.abs(deviations) < 4.0)
+    assert not np.any(found.slopes)
+    assert not found.wanders[0]
+
+
+def test_delays_lie_within_their_ranges(found):
+    """The first sample that the input moves is the fourth."""
+    (chosen,) = found.outputs
+    for candidate in chosen.candidates:
+        ((low, high),) = chosen.ranges(candidate)
+        assert low <= candidate.orders.delays[0] <= high
+    ((low, high),) = found.ranges[0]
+    assert low <= 4 <= high
+
+
+@pytest.mark.slow
+def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
+    """Dead times to 15 samples, time constants of 4 to 25; delays within one sample in 95, orders in 95."""
+    delays = orders = 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        T, L, hold = STEP * rng.uniform(4.0, 25.0), STEP * rng.uniform(0.0, 15.0), int(rng.integers(4, 12))
+        u, y = first_order(seed, 400, rng.uniform(0.5, 3.0), T, L, hold)
+        best = explore_structure([(u[:240], y[:240])], [(u[240:], y[240:])], step=STEP).best
+        delays += abs(best.orders.delays[0] - int(np.floor(L / STEP)) - 1) <= 1
+        orders += abs(best.orders.order - 1) <= 1
+    assert delays >= 95
+    assert orders >= 95
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pole", [0.0, 0.9, 0.95])
+def test_a_lag_with_dead_time_wins_where_it_explains_as_well(pole):
+    """Of six records in noise of another colour each, five at least; no more than one would be chance."""
+    families = [
+        explore_records([first_order(seed, pole=pole)], step=STEP).taken[0].orders.family for seed in range(6)
+    ]
+    assert families.count("FOPDT") >= 5
+
+
+def test_a_second_order_is_not_taken_for_a_first():
+    rng = np.random.default_rng(4)
+    u = held(rng, 900, 12)
+    x = scipy.signal.lfilter([0, 0, 0.05, 0.04], [1, -1.7, 0.8], u)
+    found = explore_records([column(u, with_noise(rng, x, 30.0))])
+    assert found.taken[0].orders.order == 2
+    w = np.array([1e-3, 0.1, 0.3])
+    q = np.exp(-1j * w)
+    truth = (0.05 * q**2 + 0.04 * q**3) / (1 - 1.7 * q + 0.8 * q**2)
+    np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], truth, rtol=0.1)
+
+
+@pytest.mark.parametrize(("hold", "delay"), [(1, 0), pytest.param(8, 2, marks=pytest.mark.slow)])
+def test_a_static_gain_has_no_pole(delay, hold):
+    rng = np.random.default_rng(1)
+    u = held(rng, 1000, hold)
+    y = 3.0 * np.concatenate([np.zeros(delay), u[: 1000 - delay]]) + 0.2 * rng.standard_normal(1000)
+    found = explore_records([column(u, y)])
+    assert (found.taken[0].orders.order, found.taken[0].orders.delays) == (0, (delay,))
+    assert found.model.theta == pytest.approx([3.0], abs=4.0 * 0.2 / np.sqrt(1000))
+
+
+@pytest.mark.parametrize(
+    ("only", "names"),
+    [
+        ("integrator", ("K", "L")),
+        ("arx", ("a", "b")),
+        *(
+            pytest.param(*pair, marks=pytest.mark.slow)
+            for pair in (
+                ("sopdt", ("K", "T", "zeta", "L")),
+                ("oe", ("b", "f")),
+                ("bj", ("b", "c", "d", "f")),
+                ("armax", ("a", "b", "c")),
+            )
+        ),
+    ],
+)
+def test_a_structure_that_is_asked_for_is_taken(only, names):
+    found = explore_records([first_order(3, 300)], step=STEP, only=only)
+    letters = {name if names[0] == "K" else name.rstrip("0123456789") for name in found.model.names}
+    assert set(names) <= letters <= {*names, "c1", "d1", "c2", "d2"}
+
+
+def test_an_integrator_is_taken_where_no_time_constant_follows():
+    rng = np.random.default_rng(1)
+    u = held(rng, 600, 8)
+    y = np.cumsum(np.concatenate([[0.0], 0.02 * u[:-1]])) + 0.05 * rng.standard_normal(600)
+    found = explore_records([column(u, y)])
+    assert found.integrates == (0,)
+    assert found.estimate.theta[0] == pytest.approx(0.02, rel=0.03)
+
+
+def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
+    """Gain 1.7, pole 0.98, dead time of six samples, one line, noise that fades in twelve samples."""
+    found = explore_records(drifting(2, 1e-3))
+    K, T, L = found.estimate.theta[:3]
+    assert found.taken[0].orders.family == "FOPDT"
+    assert pytest.approx(1.7, rel=0.02) == K
+    assert pytest.approx(-1.0 / np.log(0.98), rel=0.05) == T
+    assert pytest.approx(6.0, abs=1.0) == L
+    assert found.slopes == pytest.approx([1e-3], rel=0.15)
+
+
+def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion():
+    one = explore_structure(*([part] for part in (first_order(5, 240), first_order(6, 160))), step=STEP).best
+    plain = replace(one, validation=89.5, criterion=-1.0)
+    rich = replace(one, validation=90.0, criterion=-0.9)
+    edge = replace(one, validation=90.0, criterion=-2.0, steady=False)
+    vague = replace(one, validation=90.0, criterion=-2.0, certain=False)
+    weak = replace(one, validation=70.0, criterion=-3.0)
+    every, good = ranked([weak, edge, vague, rich, plain])
+    assert every == (plain, rich, vague, edge, weak)
+    assert good == every[:4]
+    # In a loop prediction errors alone rank what is steady and certain.
+    looped = [replace(c, by_prediction=True) for c in (weak, plain, rich)]
+    assert [c.criterion for c in ranked(looped)[0]] == [-3.0, -1.0, -0.9]
+
+
+def looped(rng, samples, noise):
+    """Return u = r - y without delay, about 0.3 q^-1 / (1 - 0.8 q^-1): u (n, 1), y (n, 1)."""
+    e, r = 0.2 * rng.standard_normal(samples), held(rng, samples, 5)
+    v = scipy.signal.lfilter([1.0], [1.0, -0.8], e) if noise == "arx" else e
+    u, y, x = np.zeros(samples), np.zeros(samples), np.zeros(samples)
+    for k in range(samples):
+        x[k] = 0.8 * x[k - 1] + 0.3 * u[k - 1] if k else 0.0
+        y[k] = x[k] + v[k]
+        u[k] = r[k] - y[k]
+    return column(u, y)
+
+
+@pytest.mark.parametrize("noise", ["arx", pytest.param("oe", marks=pytest.mark.slow)])
+def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
+    found = explore_records([looped(np.random.default_rng(1), 1000, noise)], feedback=True)
+    assert found.taken[0].orders.delays == (1,)
+    w = np.array([1e-4, 0.2])
+    expected = 0.3 * np.exp(-1j * w) / (1.0 - 0.8 * np.exp(-1j * w))
+    np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], expected, rtol=0.15)
+
+
+@pytest.mark.slow
+def test_two_inputs_and_outputs_are_one_model():
+    rng = np.random.default_rng(8)
+    u = np.stack([held(rng, 600, 8), held(rng, 600, 13)], axis=1)
+    G = [[([0, 0.2], 0.8), ([0, 0, -0.1], 0.9)], [([0, 0, 0, 0.3], 0.7), ([0, 0.1], 0.85)]]
+    rows = [sum(scipy.signal.lfilter(b, [1, -p], u[:, j]) for j, (b, p) in enumerate(row)) for row in G]
+    y = np.stack([with_noise(rng, x, 100.0) for x in rows], axis=1)
+    found = explore_records([(u, y)])
+    w = np.array([0.01, 0.2])
+    q = np.exp(-1j * w)
+    for i, row in enumerate(G):
+        for j, (b, p) in enumerate(row):
+            truth = sum(c * q**k for k, c in enumerate(b)) / (1.0 - p * q)
+            np.testing.assert_allclose(found.model.plant_at(w)[:, i, j], truth, atol=0.06)
+
+
+def test_an_input_that_never_moves_has_no_part_of_the_model():
+    u, y = first_order(11, 300)
+    found = explore_records([(np.column_stack([np.full(300, 3.0), u]), y)], step=STEP)
+    assert (found.still, found.moving) == ((0,), [1])
+    assert not np.any(found.model.B[0][0])
+    assert found.estimate.names == found.model.names
+    with pytest.raises(SpecError, match="same value"):
+        explore_records([(np.full((300, 1), 3.0), y)])
+
+
+def test_too_short_a_record_is_refused():
+    rng = np.random.default_rng(12)
+    with pytest.raises(SpecError, match="too few"):
+        explore_records([(rng.standard_normal((20, 1)), rng.standard_normal((20, 1)))])
+
+
+@pytest.mark.parametrize(("at", "flicker"), [(20, 0.0), pytest.param(110, 0.02, marks=pytest.mark.slow)])
+def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
+    """A lag of ten samples, gain one; a part of it says nothing, also where u flickers."""
+    rng = np.random.default_rng(1)
+    u = (np.arange(200) >= at)[:, None].astype(float)
+    y = scipy.signal.lfilter([0, 0.1], [1, -0.9], u, axis=0) + 0.02 * rng.standard_normal((200, 1))
+    found = explore_records([(u + flicker * rng.choice([-1.0, 1.0], u.shape), y)])
+    assert found.split == "none"
+    gain, corner = np.abs(found.model.plant_at(np.array([1e-4, 0.1]))[:, 0, 0])
+    assert gain == pytest.approx(1.0, abs=0.03)
+    assert corner == pytest.approx(abs(0.1 / (1 - 0.9 * np.exp(-0.1j))), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
+def test_a_dead_time_of_a_quarter_of_the_record_is_found(seed):
+    rng = np.random.default_rng(seed)
+    late = int(rng.integers(60, 100))
+    u = held(rng, 400, 15)
+    x = scipy.signal.lfilter([0.0] * late + [0.2], [1.0, -0.8], u)
+    found = explore_records([column(u, with_noise(rng, x))])
+    assert abs(found.taken[0].orders.delays[0] - late) <= 1
+
+
+def test_an_interrupted_search_gives_the_best_so_far(monkeypatch):
+    from inputdesign_cli.explore import search
+
+    tried = []
+
+    def candidate(self, orders, own=search._Records.candidate):
+        if len(tried) == 2:
+            raise KeyboardInterrupt
+        tried.append(own(self, orders))
+        return tried[-1]
+
+    monkeypatch.setattr(search._Records, "candidate", candidate)
+    u, y = first_order(3, 300)
+    chosen = explore_structure([(u[:180], y[:180])], [(u[180:], y[180:])], step=STEP)
+    assert set(map(id, chosen.candidates)) == set(map(id, tried))

@@ -1,0 +1,131 @@
+"""The regressions of the sweep are those of least squares, and give delays, poles, noise and slopes."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.explore.drift import levelled, slopes_of
+from inputdesign_cli.explore.sweep import (
+    arx_models,
+    delay_ranges,
+    noise_model,
+    output_error,
+    output_errors,
+    sweep,
+    whitened,
+    whitening,
+)
+from tests.explore.plants import column, held, with_noise
+
+
+def record(rng, delay, samples=400, ratio=10.0, F=(1.0, -0.85)):
+    u = held(rng, samples)
+    x = scipy.signal.lfilter(np.concatenate([np.zeros(delay), [0.15, 0.05]]), F, u)
+    return column(u, with_noise(rng, x, ratio))
+
+
+@pytest.mark.parametrize("delay", [1, 4, 9, 17, 90])
+def test_the_delay_of_a_lag_is_found_at_ten_decibels(delay):
+    for seed in range(4):
+        swept = sweep([record(np.random.default_rng(seed), delay)], 1)
+        assert abs(swept.by_order[1].delays[0] - delay) <= 1
+
+
+def test_the_best_delay_is_that_of_a_search_over_all():
+    one = record(np.random.default_rng(9), 7)
+    losses = [output_error([one], 1, (d,)).loss for d in range(30)]
+    assert sweep([one], 1).by_order[1].loss <= min(losses) * 1.001
+
+
+def test_each_of_two_inputs_has_its_own_delay():
+    rng = np.random.default_rng(2)
+    u = np.stack([held(rng, 800), held(rng, 800, 9)], axis=1)
+    x = scipy.signal.lfilter([0, 0, 0.2], [1, -0.8], u[:, 0])
+    x += scipy.signal.lfilter([0] * 12 + [-0.3], [1, -0.8], u[:, 1])
+    found = sweep([(u, with_noise(rng, x, 30.0)[:, None])], 1).by_order[1]
+    assert found.delays == pytest.approx((2, 12), abs=1)
+
+
+def test_poles_of_a_second_order_are_found_in_several_records():
+    rng, F = np.random.default_rng(3), [1.0, -1.5, 0.7]
+    parts = [record(rng, 3, F=F, ratio=100.0) for _ in range(3)]
+    swept = sweep(parts, 4)
+    np.testing.assert_allclose(swept.by_order[2].F, F, atol=0.03)
+    assert swept.best(1200).order in (2, 3)
+    left = sum(e @ e for e in output_errors(parts, swept.by_order[2])) / 1200
+    assert left == pytest.approx(swept.by_order[2].loss)
+
+
+def test_arx_models_are_those_of_least_squares():
+    """All of them from one matrix of products; each is compared with a regression of its own."""
+    rng = np.random.default_rng(4)
+    u, y = record(rng, 2)
+    first = 3 + 2
+    for a, b, theta, loss, rows in arx_models([(u, y)], 3, (2,)):
+        own = [-y[first - k : len(y) - k, 0] for k in range(1, a + 1)]
+        own += [u[first - 2 - k : len(u) - 2 - k, 0] for k in range(b)]
+        columns = np.stack([*own, np.ones(len(y) - first)], axis=1)
+        expected, left, *_ = np.linalg.lstsq(columns, y[first:, 0], rcond=None)
+        np.testing.assert_allclose(theta, expected[:-1], rtol=1e-4, atol=1e-6)
+        assert loss * rows == pytest.approx(float(left[0]), rel=1e-6)
+
+
+def test_an_autoregression_whitens_its_noise_and_no_white_one():
+    rng = np.random.default_rng(5)
+    e = rng.standard_normal(4000)
+    v = scipy.signal.lfilter([1.0], [1.0, -1.2, 0.5], e)
+    A = whitening([v[:2000], v[2000:]])
+    np.testing.assert_allclose(A[:3], [1.0, -1.2, 0.5], atol=0.06)
+    np.testing.assert_array_equal(whitening([e]), [1.0])
+    ((_, left),) = whitened([column(np.zeros(4000), v)], np.array([1.0, -1.2, 0.5]))
+    np.testing.assert_allclose(left[:, 0], e[2:], atol=1e-9)
+
+
+@pytest.mark.parametrize(("C", "D"), [([1.0], [1.0]), ([1.0, 0.5], [1.0, -0.9])])
+def test_orders_of_the_noise_are_found(C, D):
+    v = scipy.signal.lfilter(C, D, np.random.default_rng(6).standard_normal(4000))
+    found = noise_model([v])
+    for polynomial, expected in zip(found, (C, D), strict=True):
+        assert len(polynomial) == len(expected)
+        np.testing.assert_allclose(polynomial, expected, atol=0.07)
+
+
+def test_the_range_of_a_delay_holds_it():
+    inside = 0
+    for seed in range(20):
+        one = record(np.random.default_rng(seed), 5, ratio=2.0)
+        ((low, high),) = delay_ranges([one], sweep([one], 1).by_order[1], least=0, most=60)
+        inside += low <= 5 <= high
+    assert inside >= 17
+
+
+def drifting(seed, slope, samples=1600, pole=0.92):
+    """Return two records of steps of a slow lag; the drift has gone on through the gap between them."""
+    rng = np.random.default_rng(seed)
+    u = held(rng, samples, 100, (-3.0, -1.0, 2.0, 4.0))
+    x = scipy.signal.lfilter([0.0] * 7 + [0.034], [1.0, -0.98], u)
+    v = scipy.signal.lfilter([0.04], [1.0, -pole], rng.standard_normal(samples))
+    y = x + v + slope * np.arange(samples)
+    return [column(u[at], y[at]) for at in (slice(0, samples // 2), slice(samples // 2 + 200, samples))]
+
+
+@pytest.mark.parametrize("slope", [5e-4, -5e-4, 0.0])
+def test_one_line_through_all_records_is_found_and_none_invented(slope):
+    """The slope that was added, within a tenth; slow noise alone has none."""
+    parts = drifting(1, slope)
+    found = slopes_of(parts)
+    assert found == pytest.approx([slope], abs=5e-5)
+    level = levelled(parts, found)
+    left = slopes_of(level)
+    assert left == pytest.approx([0.0], abs=5e-5)
+
+
+def test_random_walks_seldom_have_a_line():
+    """A walk of unit steps rises by many times what whitened noise would allow."""
+    lines = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        u = held(rng, 600, 20)
+        y = scipy.signal.lfilter([0, 0.1], [1, -0.9], u) + np.cumsum(0.02 * rng.standard_normal(600))
+        lines += bool(slopes_of([column(u, y)])[0])
+    assert lines <= 1
