@@ -76,7 +76,7 @@ def test_the_model_is_judged_on_other_data(run, tmp_path):
 def test_a_real_record_without_a_header_whose_times_jitter():
     """Its noise integrates: D comes out on the unit circle, as near as a spec may have it."""
     found = explore(STEP, Preparation(columns={"time": "1", "u1": "2", "y1": "3"}))
-    assert any("jitter" in note for note in found.results.result["notes"])
+    assert "jitter-evened-out" in [one["code"] for one in found.results.result["findings"]]
     assert found.results.result["validation"]["simulation_fit_percent"] > 90.0
     assert parse_spec(found.results.resolved_spec).sample_time == pytest.approx(1.0, abs=0.05)
     parse_spec(found.results.files["model.yaml"].decode(), design=False)
