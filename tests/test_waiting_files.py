@@ -23,8 +23,7 @@ OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loa
 OPENED = {
     "regular_file.py": (2, "the function itself"),
     "error_codes.py": (1, "a file of the package"),
-    "cli/init.py": (1, "a file of the package"),
-    "cli/examples.py": (1, "a file of the package"),
+    "cli/reference.py": (2, "files of the package"),
     "cli/streams.py": (3, "the null device and the standard streams"),
     "outcome/origin.py": (1, "a comparison of plain files"),
     "outcome/replacing.py": (1, "files that were just written into a folder of its own"),
