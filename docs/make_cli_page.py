@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import re
+from collections import Counter
 from enum import Enum
 from pathlib import Path
 
@@ -19,11 +21,10 @@ INTRODUCTION = """\
 
 {help}
 
-Data go to standard output, everything else to standard error; progress is shown on a terminal only, and
-`NO_COLOR` is honoured. Every command explains itself with `--help`, and `idesign --version` prints the
-version. A command exits with
+Results go to standard output, everything else to standard error. Progress is shown on a terminal only, and
+`NO_COLOR` is honoured. Every command has `--help`; `idesign --version` prints the version.
 
-| code | when |
+| exit code | when |
 |---|---|
 | 0 | done |
 | 1 | a value differs from its golden value, or a target is missed |
@@ -33,30 +34,55 @@ version. A command exits with
 | 5 | undecided: the data contradict the model structure (`assess`, `next`) |
 | 70 | an error inside idesign; please report it |
 | 130, 143, 129 | interrupted (Ctrl-C), terminated (SIGTERM), the terminal has gone (SIGHUP) |
-| 141 | the reader of standard output has gone (`idesign .. \\| head`); nothing is said then |
+| 141 | the reader of standard output has gone (`idesign .. \\| head`); nothing is printed then |
+
+## Options of several commands
+
+{shared}
 """
 
 
 def page() -> str:
-    """The whole page as Markdown."""
+    """Return the whole page as Markdown."""
     group = typer.main.get_command(app)
-    parts = [INTRODUCTION.format(help=group.help)]
+    rows = Counter(row for command in group.commands.values() for row in rows_of(command))
+    shared = [row for row, count in rows.items() if count > 1]
+    parts = [INTRODUCTION.format(help=group.help, shared="\n".join(table(shared)))]
     for name, command in group.commands.items():
-        parts.append(section(name, command))
+        parts.append(section(name, command, shared))
     return "\n".join(parts)
 
 
-def section(name, command) -> str:
-    """One command: what it does, how it is called, its arguments and options."""
+def rows_of(command) -> list[tuple[str, str]]:
+    """Return the name and the help of every argument and option of a command."""
     shown = [parameter for parameter in command.params if parameter.name != "help"]
-    arguments = [p for p in shown if p.param_type_name == "argument"]
-    options = [p for p in shown if p.param_type_name == "option"]
-    usage = " ".join(["idesign", name, *(["[OPTIONS]"] if options else []), *(a.metavar for a in arguments)])
-    rows = [(f"`{a.metavar}`", a.help) for a in arguments] + [(option_names(o), o.help) for o in options]
-    lines = [f"## idesign {name}", "", inspect.cleandoc(command.help), "", "```", usage, "```"]
-    if rows:
-        lines += ["", "| | |", "|---|---|", *(f"| {left} | {right} |" for left, right in rows)]
+    arguments = [(f"`{p.metavar}`", p.help) for p in shown if p.param_type_name == "argument"]
+    return arguments + [(option_names(p), p.help) for p in shown if p.param_type_name == "option"]
+
+
+def section(name, command, shared) -> str:
+    """Describe one command: what it does, how it is called, its own arguments and options."""
+    rows = rows_of(command)
+    own = [row for row in rows if row not in shared]
+    options = any(p.param_type_name == "option" for p in command.params if p.name != "help")
+    arguments = [p.metavar for p in command.params if p.param_type_name == "argument"]
+    usage = " ".join(["idesign", name, *(["[OPTIONS]"] if options else []), *arguments])
+    lines = [f"## idesign {name}", "", inspect.cleandoc(command.help), "", f"`{usage}`"]
+    if own:
+        lines += ["", *table(own)]
+    if len(own) < len(rows):
+        also = [
+            re.findall(r"`(-[^`]+)`", left)[-1]
+            for left, right in rows
+            if (left, right) in shared and "`-" in left
+        ]
+        lines += ["", "Also " + ", ".join(f"`{option}`" for option in also) + "."] if also else []
     return "\n".join(lines) + "\n"
+
+
+def table(rows) -> list[str]:
+    """Return a Markdown table without a header."""
+    return ["| | |", "|---|---|", *(f"| {left} | {right} |" for left, right in rows)]
 
 
 def option_names(option) -> str:
