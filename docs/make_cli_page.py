@@ -71,12 +71,9 @@ def section(name, command, shared) -> str:
     if own:
         lines += ["", *table(own)]
     if len(own) < len(rows):
-        also = [
-            re.findall(r"`(-[^`]+)`", left)[-1]
-            for left, right in rows
-            if (left, right) in shared and "`-" in left
-        ]
-        lines += ["", "Also " + ", ".join(f"`{option}`" for option in also) + "."] if also else []
+        names = [left for left, right in rows if (left, right) in shared and "`-" in left]
+        also = ", ".join(f"`{re.findall(r'`(-[^`]+)`', left)[-1]}`" for left in names)
+        lines += ["", f"Also {also}."] if also else []
     return "\n".join(lines) + "\n"
 
 
