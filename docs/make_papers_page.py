@@ -30,10 +30,9 @@ INTRODUCTION = """\
 
 <!-- Written by `make papers` from docs/papers/ and golden/: change those, not this page. -->
 
-Every figure of a paper that a shipped spec reproduces, side by side: the printed value, the value that
-`idesign` computes, and a value from an independent solution or a closed form where there is one. The last
-column gives the reason for a difference, or for the tolerance. The same comparison runs as `idesign check`,
-with a tolerance for each line; "misses" in the table would be a line that fails it.
+Every figure of a paper that a shipped spec reproduces: the printed value, the value that `idesign` computes, and
+one from an independent solution or a closed form. The last column explains a difference from the print, or its
+tolerance. `idesign check` repeats the comparison; a line beyond its tolerance would show "misses" here.
 """
 
 
@@ -89,7 +88,7 @@ def line(paper: Row | None, other: Row | None) -> str:
         computed + misses,
         percent(paper.computed, paper.quantity.expected) if paper else "",
         f"{other.quantity.expected:.7g}" if other else "",
-        first.quantity.why,
+        paper.quantity.why if paper else "",
     ]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
