@@ -29,12 +29,9 @@ JUDGED = ("validated", "note")
 TEXT = """\
 # Raw logs to judged models: converter, cylinders, column
 
-One command looks for a model and judges its structure by a part of the record that it was not estimated from;
-a second judges the model by another file. Nothing is edited by hand; every note is shown, its end cut off.
-`python docs/make_records_page.py` runs the commands and writes this page; a test runs it. Whose records these
-are stands in [data/README.md](data/README.md); what the commands do, in
-[identification.md](identification.md#idesign-explore), and how a log leads to an assessed experiment, in
-[tutorial.md](tutorial.md).
+One command finds a model and judges its structure on a part of the record that it was not estimated from. A second command
+judges the model by another file. `python docs/make_records_page.py` runs the commands and writes this page; a test runs it.
+Long notes are cut. The records come from [others](data/README.md); the command is described in [explore.md](explore.md).
 
 ## A converter: a file to learn from and one to judge by
 
@@ -44,22 +41,17 @@ are stands in [data/README.md](data/README.md); what the commands do, in
 
 ![fit to the second file](images/records_converter_fit.png)
 
-A simulation error of {converter_left} is no noise. The converter answers a step up otherwise than a
-step down. That is seen in the first half of the first file alone: after a step up
-the output rings with a decay of 0.0154 +- 0.0004 and a frequency of 0.0503 +- 0.0004 per sample, after a step
-down with 0.0204 +- 0.0008 and 0.0414 +- 0.0010 (a damped sinusoid fitted to each by robust least squares).
-The model is one for both: good for a first design, and an experiment with small steps about one level would
-tell that level's.
+A simulation error of {converter_left} is not noise. The converter responds differently to steps up and down. After a step up
+the output rings with a decay of 0.0154 +- 0.0004 and a frequency of 0.0503 +- 0.0004 per sample. After a step down these are
+0.0204 +- 0.0008 and 0.0414 +- 0.0010. The linear model is a compromise, good for a first design. An experiment with small
+steps about one level would give the model of that level.
 
-The first file does not tell which compromise the second asks for. ARX models of orders and delays to 8 that
-are estimated from it reach 61.6 % there at best, chosen on that second file; 58.8 or 61.5 % where the first
-alone chooses, by simulation or by BIC. In the halves of the first file it is 63.5, 59.1 and 44.8 %, where
-`explore` gives 57.0 ([table](identification.md#idesign-explore)).
+ARX models of orders and delays to 8, estimated from the first file, explain at most 61.6 % of the second.
 
 ## Two cylinders: one file, halved by its times
 
-A hydraulic test bench with two inputs and two outputs. The file has no header, so columns are told by their
-numbers. The first half is explored, the second judges:
+A hydraulic test bench with two inputs and two outputs. The file has no header, so columns are named by number. The first
+half is explored, the second judges:
 
 {cylinders_explore}
 
@@ -67,15 +59,13 @@ numbers. The first half is explored, the second judges:
 
 ![fit to the second half](images/records_cylinders_fit.png)
 
-Each output follows its own input within three samples, and the other input hardly acts on it. What the model
-leaves is no noise either: overshoots and slow tails at some of the steps, which a linear model of this order
-does not show. Notes of the first half name the samples that hold most of it.
+Each output follows its own input within three samples, and the other input hardly acts on it. The residuals contain
+overshoots and slow tails at some steps; notes name these samples.
 
 ## A column: a model in s, and the one that made the record
 
-Reflux and steam of a distillation column, simulated by others after Wood and Berry, with noise. Each input
-moves in one half of the record, so no half can judge the other: blocks in turn do. The file has no times;
-samples are a minute apart.
+Reflux and steam of a distillation column, simulated by others after Wood and Berry, with noise. Each input moves in one half
+of the record, so blocks in turn estimate and judge. The file has no times; samples are a minute apart.
 
 {column_explore}
 
@@ -83,15 +73,13 @@ samples are a minute apart.
 
 ![frequency response of the record alone, and of the model](images/records_column_frequency_response.png)
 
-The record itself tells gains, time constants and dead times of all four entries. Beside them, what Wood and
-Berry published ([specs/wood_berry.yaml](../specs/wood_berry.yaml)):
+Gains, time constants and dead times of all four entries, and the published ones
+([specs/wood_berry.yaml](../specs/wood_berry.yaml)):
 
 {column_table}
 
-The noise drifts, and both outputs have the same. Filtered noise makes up for the drift; that one noise drives
-both outputs no structure here says, so a test of whiteness still fails. Gains and time constants are within
-{column_worst} of what was published, and all twelve within 1.1 deviations, though these come from the
-covariance that a note does not trust.
+One drifting noise drives both outputs, which no structure here contains, so a test of whiteness fails. Gains and time constants
+are within {column_worst} of the published ones, and all twelve values within 1.1 deviations.
 """
 
 
