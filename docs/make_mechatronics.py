@@ -34,16 +34,17 @@ TEXT = (
     """\
 # Mechatronics: from a data sheet to a speed loop with a proved margin
 
-A motor is to get a PI loop for its speed. The data sheet states gain and time constant within 20 %, and the drive takes 0
-to 24 V through 12 bits. The experiment takes twenty seconds.
+A motor is to get a PI loop for its speed. The data sheet states gain and time constant within 20 %, and the
+drive takes 0 to 24 V through 12 bits. The experiment takes twenty seconds.
 
-`python docs/make_mechatronics.py` runs the commands and writes this page; a test runs it. The motor is simulated, with a gain
-20 % below the data sheet and a time constant 15 % above. The tool sees the data only.
+`python docs/make_mechatronics.py` runs the commands and writes this page; a test runs it. The motor is
+simulated, with a gain 20 % below the data sheet and a time constant 15 % above. The tool sees the data
+only.
 
 ## 1. What you know, in your words
 
-`rest.csv` is half a minute of speed at a constant 10 V, which contains the noise. Six answers are given in the terminal or
-in a file, `answers.yaml`:
+`rest.csv` is half a minute of speed at a constant 10 V, which contains the noise. Six answers are given in
+the terminal or in a file, `answers.yaml`:
 
 ```yaml
 """
@@ -56,11 +57,13 @@ in a file, `answers.yaml`:
 
 {deduced}
 
-The controller is tuned anew at each of thirty motors within 20 %. At each the margin must hold for every motor within r_u.
+The controller is tuned anew at each of thirty motors within 20 %. At each the margin must hold for every
+motor within r_u.
 
 ## 2. The signal
 
-The record has {levels} levels of voltage, which are codes of the converter. The lower panel shows the expected speed:
+The record has {levels} levels of voltage, which are codes of the converter. The lower panel shows the
+expected speed:
 
 ![the voltage to apply and the speed to be expected](images/mechatronics_signal.png)
 
@@ -70,13 +73,13 @@ The discs show the uncertainty of the loop after the experiment. They stay out o
 
 ## 3. The experiment and its verdict
 
-`signal.csv` is played to the drive; voltage and speed are logged in `log.csv`, beginning at rest at 10 V and
-80 rad/s:
+`signal.csv` is played to the drive; voltage and speed are logged in `log.csv`, beginning at rest at 10 V
+and 80 rad/s:
 
 {assess}
 
-Met: exit code 0. Gain and time constant are those of this motor, and the controller settings follow from them.
-`assessed/model.yaml` keeps the model with its covariance.
+Met: exit code 0. Gain and time constant are those of this motor, and the controller settings follow from
+them. `assessed/model.yaml` keeps the model with its covariance.
 
 ![what the model explains of the record](images/mechatronics_fit.png)
 

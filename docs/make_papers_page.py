@@ -30,9 +30,9 @@ INTRODUCTION = """\
 
 <!-- Written by `make papers` from docs/papers/ and golden/: change those, not this page. -->
 
-Every figure of a paper that a shipped spec reproduces: the printed value, the value that `idesign` computes, and
-one from an independent solution or a closed form. The last column explains a difference from the print, or its
-tolerance. `idesign check` repeats the comparison; a line beyond its tolerance would show "misses" here.
+Every figure of a paper that a shipped spec reproduces: the printed value, the value that `idesign` computes,
+and one from an independent solution or a closed form. The last column explains a difference from the print,
+or its tolerance. `idesign check` repeats the comparison; a line beyond its tolerance would show "misses".
 """
 
 

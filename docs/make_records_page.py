@@ -29,9 +29,10 @@ JUDGED = ("validated", "note")
 TEXT = """\
 # Raw logs to judged models: converter, cylinders, column
 
-One command finds a model and judges its structure on a part of the record that it was not estimated from. A second command
-judges the model by another file. `python docs/make_records_page.py` runs the commands and writes this page; a test runs it.
-Long notes are cut. The records come from [others](data/README.md); the command is described in [explore.md](explore.md).
+One command finds a model and judges its structure on a part of the record that it was not estimated from. A
+second command judges the model by another file. `python docs/make_records_page.py` runs the commands and
+writes this page; a test runs it. Long notes are cut. The records come from [others](data/README.md); the
+command is described in [explore.md](explore.md).
 
 ## A converter: a file to learn from and one to judge by
 
@@ -41,17 +42,18 @@ Long notes are cut. The records come from [others](data/README.md); the command 
 
 ![fit to the second file](images/records_converter_fit.png)
 
-A simulation error of {converter_left} is not noise. The converter responds differently to steps up and down. After a step up
-the output rings with a decay of 0.0154 +- 0.0004 and a frequency of 0.0503 +- 0.0004 per sample. After a step down these are
-0.0204 +- 0.0008 and 0.0414 +- 0.0010. The linear model is a compromise, good for a first design. An experiment with small
-steps about one level would give the model of that level.
+A simulation error of {converter_left} is not noise. The converter responds differently to steps up and
+down. After a step up the output rings with a decay of 0.0154 +- 0.0004 and a frequency of 0.0503 +- 0.0004
+per sample. After a step down these are 0.0204 +- 0.0008 and 0.0414 +- 0.0010. The linear model is a
+compromise, good for a first design. An experiment with small steps about one level would give the model of
+that level.
 
 ARX models of orders and delays to 8, estimated from the first file, explain at most 61.6 % of the second.
 
 ## Two cylinders: one file, halved by its times
 
-A hydraulic test bench with two inputs and two outputs. The file has no header, so columns are named by number. The first
-half is explored, the second judges:
+A hydraulic test bench with two inputs and two outputs. The file has no header, so columns are named by
+number. The first half is explored, the second judges:
 
 {cylinders_explore}
 
@@ -59,13 +61,14 @@ half is explored, the second judges:
 
 ![fit to the second half](images/records_cylinders_fit.png)
 
-Each output follows its own input within three samples, and the other input hardly acts on it. The residuals contain
-overshoots and slow tails at some steps; notes name these samples.
+Each output follows its own input within three samples, and the other input hardly acts on it. The residuals
+contain overshoots and slow tails at some steps; notes name these samples.
 
 ## A column: a model in s, and the one that made the record
 
-Reflux and steam of a distillation column, simulated by others after Wood and Berry, with noise. Each input moves in one half
-of the record, so blocks in turn estimate and judge. The file has no times; samples are a minute apart.
+Reflux and steam of a distillation column, simulated by others after Wood and Berry, with noise. Each input
+moves in one half of the record, so blocks in turn estimate and judge. The file has no times; samples are a
+minute apart.
 
 {column_explore}
 
@@ -78,8 +81,9 @@ Gains, time constants and dead times of all four entries, and the published ones
 
 {column_table}
 
-One drifting noise drives both outputs, which no structure here contains, so a test of whiteness fails. Gains and time constants
-are within {column_worst} of the published ones, and all twelve values within 1.1 deviations.
+One drifting noise drives both outputs, which no structure here contains, so a test of whiteness fails.
+Gains and time constants are within {column_worst} of the published ones, and all twelve values within 1.1
+deviations.
 """
 
 

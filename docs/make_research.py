@@ -42,28 +42,28 @@ TEXT = (
     """\
 # Research: published designs side by side
 
-Least-costly and D-optimal designs, compared on a published example in ten minutes. `python docs/make_research.py` runs
-the commands and writes this page; a test runs it.
+Least-costly and D-optimal designs, compared on a published example in ten minutes. `python
+docs/make_research.py` runs the commands and writes this page; a test runs it.
 
 ## 1. A design from a paper
 
-The first illustration of [Bombois and Scorletti](references.md#bombois-least-costly): y = 3.6 q^-1 / (1 - 0.7
-q^-1) u + (1 - 0.9 q^-1) e, an error below 1 % of |G| at all frequencies after 500 samples:
+The first illustration of [Bombois and Scorletti](references.md#bombois-least-costly): y = 3.6 q^-1 / (1 -
+0.7 q^-1) u + (1 - 0.9 q^-1) e, an error below 1 % of |G| at all frequencies after 500 samples:
 
 {copy}
 
 {least}
 
-The paper prints 0.25, and 1.7 for white noise, at an initial estimate that it does not print. All figures are compared in
-[papers.md](papers.md).
+The paper prints 0.25, and 1.7 for white noise, at an initial estimate that it does not print. All figures
+are compared in [papers.md](papers.md).
 
 ![r_u against r_adm](images/research_bound.png)
 
 ## 2. What the proof says
 
-The first line bounds every FIR spectrum of order 20 by the dual problem. The second bounds every spectrum: {over} % of the cost at most
-could be saved by another family. The certificate is the accuracy that a unit of power gives at each frequency, relative to
-the best. It is nowhere above one.
+The first line bounds every FIR spectrum of order 20 by the dual problem. The second bounds every spectrum:
+{over} % of the cost at most could be saved by another family. The certificate is the accuracy that a unit
+of power gives at each frequency, relative to the best. It is nowhere above one.
 
 ![the certificate](images/research_optimality.png)
 
@@ -75,8 +75,9 @@ It maximises log det M, whichever error matters. How large is the error of its r
 
 {judged}
 
-{ratio} times the admissible error. The error falls with the root of the power, so a D-optimal record of the required
-accuracy takes {more} times the power of the least-costly spectrum. White noise takes {white} times as much.
+{ratio} times the admissible error. The error falls with the root of the power, so a D-optimal record of the
+required accuracy takes {more} times the power of the least-costly spectrum. White noise takes {white} times
+as much.
 
 ## 4. A longer filter
 
@@ -92,9 +93,9 @@ r_u is asymptotic. Two hundred simulated experiments with the designed spectrum,
 
 {simulated}
 
-G has two free parameters. With 95 % probability (chi-squared, two degrees of freedom) the estimate lies in an ellipse, and
-r_u is the largest |G_hat - G| in it. To first order 95.1 % of the runs stay below r_u at all frequencies together. These are
-the runs counted here.
+G has two free parameters. With 95 % probability (chi-squared, two degrees of freedom) the estimate lies in
+an ellipse, and r_u is the largest |G_hat - G| in it. To first order 95.1 % of the runs stay below r_u at
+all frequencies together. These are the runs counted here.
 
 ## 6. In Python
 

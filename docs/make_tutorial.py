@@ -32,27 +32,28 @@ SETTLED = 400  # samples at the operating point before an experiment
 TEXT = """\
 # From a log to an assessed experiment
 
-A log of a small board with two heaters and two temperature sensors leads to an experiment, a model of the required
-accuracy, and a verdict on the data. Computing takes less than a minute.
+A log of a small board with two heaters and two temperature sensors leads to an experiment, a model of the
+required accuracy, and a verdict on the data. Computing takes less than a minute.
 
-`python docs/make_tutorial.py` runs the commands and writes this page; a test runs it. The log is real
-([its origin](data/README.md)): run the commands in a folder with a copy of `docs/data/tclab/two_heaters.txt`. The two
-experiments are simulated by an energy balance that is fitted to the log, with the noise of the log.
+`python docs/make_tutorial.py` runs the commands and writes this page; a test runs it. The log is real ([its
+origin](data/README.md)): run the commands in a folder with a copy of `docs/data/tclab/two_heaters.txt`. The
+two experiments are simulated by an energy balance that is fitted to the log, with the noise of the log.
 
 ## 1. What is in the log
 
-Ten minutes, a row about every three seconds, with jitter; both heaters were switched. We want a model from heater 1 to
-temperature 1:
+Ten minutes, a row about every three seconds, with jitter; both heaters were switched. We want a model from
+heater 1 to temperature 1:
 
 {explore}
 
-One command reads the file, resamples it, finds a structure on one part of the record, and judges it on the other:
+One command reads the file, resamples it, finds a structure on one part of the record, and judges it on the
+other:
 
 ![fit of the model to the log](images/tutorial_log_fit.png)
 
-Estimated from the first part alone, this structure explains {validated} of the temperatures of the other; the
-parameters above use the whole log. The command also writes `found/spec.yaml`, ready for a design. The shaded discs show the
-frequency response of the data alone, the line that of the model:
+Estimated from the first part alone, this structure explains {validated} of the temperatures of the other;
+the parameters above use the whole log. The command also writes `found/spec.yaml`, ready for a design. The
+shaded discs show the frequency response of the data alone, the line that of the model:
 
 ![frequency response of the log, without a model and by the model](images/tutorial_log_frequency_response.png)
 
@@ -60,7 +61,8 @@ The discs are wide at the frequencies that matter for a controller.
 
 ## 2. The shortest experiment
 
-We ask for errors below 15 % of |G| from 0.003 to 0.04 rad/s, with 95 % confidence, and allow the heater 20 to 80 %:
+We ask for errors below 15 % of |G| from 0.003 to 0.04 rad/s, with 95 % confidence, and allow the heater 20
+to 80 %:
 
 {solve}
 
@@ -73,26 +75,26 @@ within 20 and 80 % {record}. It has two levels:
 
 ## 3. The experiment
 
-The board settles at 50 %, `design/signal.csv` is applied, and the temperature is recorded in `first.csv`. Do these data
-meet the target?
+The board settles at 50 %, `design/signal.csv` is applied, and the temperature is recorded in `first.csv`.
+Do these data meet the target?
 
 {first}
 
-They miss it: exit code 1. The model from the log was wrong at high frequencies. At the new estimate the error is {ratio} times
-the admissible one. The same command has designed the top-up: the shortest record that, with these data, meets the target if
-the model structure is right.
+They miss it: exit code 1. The model from the log was wrong at high frequencies. At the new estimate the
+error is {ratio} times the admissible one. The same command has designed the top-up: the shortest record
+that, with these data, meets the target if the model structure is right.
 
 ![the error that the first experiment leaves](images/tutorial_first_data_bound.png)
 
 ## 4. The top-up
 
-That record is just enough if its model is right, and the first one was not. So we leave a reserve and ask for 12 % where 15 %
-are wanted:
+That record is just enough if its model is right, and the first one was not. So we leave a reserve and ask
+for 12 % where 15 % are wanted:
 
 {reserve}
 
-`reserve/signal.csv`, {reserved} samples instead of {needed}, is applied in the same way. Both records are estimated
-jointly and judged by the 15 %:
+`reserve/signal.csv`, {reserved} samples instead of {needed}, is applied in the same way. Both records are
+estimated jointly and judged by the 15 %:
 
 {second}
 
