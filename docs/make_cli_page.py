@@ -47,7 +47,7 @@ def page() -> str:
     group = typer.main.get_command(app)
     rows = Counter(row for command in group.commands.values() for row in rows_of(command))
     shared = [row for row, count in rows.items() if count > 1]
-    parts = [INTRODUCTION.format(help=group.help, shared="\n".join(table(shared)))]
+    parts = [INTRODUCTION.format(help=group.help, shared="\n".join(listed(shared)))]
     for name, command in group.commands.items():
         parts.append(section(name, command, shared))
     return "\n".join(parts)
@@ -69,7 +69,7 @@ def section(name, command, shared) -> str:
     usage = " ".join(["idesign", name, *(["[OPTIONS]"] if options else []), *arguments])
     lines = [f"## idesign {name}", "", inspect.cleandoc(command.help), "", f"`{usage}`"]
     if own:
-        lines += ["", *table(own)]
+        lines += ["", *listed(own)]
     if len(own) < len(rows):
         names = [left for left, right in rows if (left, right) in shared and "`-" in left]
         also = ", ".join(f"`{re.findall(r'`(-[^`]+)`', left)[-1]}`" for left in names)
@@ -77,9 +77,9 @@ def section(name, command, shared) -> str:
     return "\n".join(lines) + "\n"
 
 
-def table(rows) -> list[str]:
-    """Return a Markdown table without a header."""
-    return ["| | |", "|---|---|", *(f"| {left} | {right} |" for left, right in rows)]
+def listed(rows) -> list[str]:
+    """Return a Markdown list of names and what they mean."""
+    return [f"- {left}: {right}" for left, right in rows]
 
 
 def option_names(option) -> str:

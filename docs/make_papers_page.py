@@ -32,7 +32,7 @@ INTRODUCTION = """\
 
 Every figure of a paper that a shipped spec reproduces: the printed value, the value that `idesign` computes,
 and one from an independent solution or a closed form. The last column explains a difference from the print,
-or its tolerance. `idesign check` repeats the comparison; a line beyond its tolerance would show "misses".
+or its tolerance. `idesign check` compares these and further quantities.
 """
 
 
@@ -61,7 +61,10 @@ def results_of(golden: Golden) -> dict[str, Results]:
 
 
 def table(rows: list[Row]) -> str:
-    """The comparison as Markdown; what a paper prints and what was solved independently share a line."""
+    """The comparison as Markdown: the figures that a paper prints, or all where it prints none.
+
+    A printed value and one of an independent solution share a line.
+    """
     lines = [
         "| quantity | paper | computed | difference | independent | reason |",
         "|---|---|---|---|---|---|",
@@ -69,11 +72,18 @@ def table(rows: list[Row]) -> str:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.run, row.quantity.path), []).append(row)
+    if any(printed_in_paper(row) for row in rows):
+        groups = {place: group for place, group in groups.items() if any(map(printed_in_paper, group))}
     for group in groups.values():
-        printed = [row for row in group if row.quantity.source.startswith("paper")]
+        printed = [row for row in group if printed_in_paper(row)]
         others = [row for row in group if row not in printed]
         lines += [line(*pair) for pair in zip_longest(printed, others)]
     return "\n".join(lines)
+
+
+def printed_in_paper(row: Row) -> bool:
+    """Say whether a paper prints the expected value of this quantity."""
+    return row.quantity.source.startswith("paper")
 
 
 def line(paper: Row | None, other: Row | None) -> str:
