@@ -83,15 +83,8 @@ them. `assessed/model.yaml` keeps the model with its covariance.
 
 ![what the model explains of the record](images/mechatronics_fit.png)
 
-## 4. Was it too much?
-
-A quarter of the time, with the other answers unchanged:
-
-{short}
-
-This is enough for the margin too: a quarter of the data gives twice the error. For a flexible axis see
-[wizard.md](wizard.md#a-flexible-axis-and-its-controller). `idesign watch speed.yaml` shows the design
-[while you edit](watch.md). """
+For a flexible axis see [wizard.md](wizard.md#a-flexible-axis-and-its-controller).
+"""
 )
 
 
@@ -125,9 +118,6 @@ def mechatronics(folder: Path, images: Path) -> str:
     found["assess"], _ = terminal.run(
         *("assess", "speed.yaml", "log.csv", "--operating-point", "u1=10,y1=80", "-o", "assessed"),
         kept=("estimate", "assessed", "verdict", "loop", "controller", "margin", "files"),
-    )
-    found["short"], _ = terminal.run(
-        *("wizard", "--answers", "answers.yaml", "-a", "time=5 s", "--solve", "-o", "short.yaml")
     )
     keep(folder / "runs" / "speed", images, "mechatronics", signal="signal", nyquist="nyquist")
     keep(folder / "assessed", images, "mechatronics", fit="fit")

@@ -23,15 +23,15 @@ FILES = (
 )
 PUBLISHED = DOCS.parent / "specs" / "wood_berry.yaml"
 
-EXPLORED = ("estimate", "fit", "validated", "residuals", "note", "verdict")
-JUDGED = ("validated", "note")
+EXPLORED = ("estimate", "fit", "validated", "residuals", "verdict")
+JUDGED = ("validated",)
 
 TEXT = """\
 # Raw logs to judged models: converter, cylinders, column
 
 One command finds a model and judges its structure on a part of the record that it was not estimated from. A
 second command judges the model by another file. `python docs/make_records_page.py` runs the commands and
-writes this page; a test runs it. Long notes are cut. The records come from [others](data/README.md); the
+writes this page; a test runs it. Notes are not shown. The records come from [others](data/README.md); the
 command is described in [explore.md](explore.md).
 
 ## A converter: a file to learn from and one to judge by
@@ -62,7 +62,7 @@ number. The first half is explored, the second judges:
 ![fit to the second half](images/records_cylinders_fit.png)
 
 Each output follows its own input within three samples, and the other input hardly acts on it. The residuals
-contain overshoots and slow tails at some steps; notes name these samples.
+contain overshoots and slow tails at some steps; notes of the command name these samples.
 
 ## A column: a model in s, and the one that made the record
 

@@ -1,4 +1,4 @@
-"""Writes docs/research.md: compares published criteria on a published example, by commands and from Python.
+"""Writes docs/research.md: compares published criteria on a published example.
 
 python docs/make_research.py [DIR]
 """
@@ -10,36 +10,7 @@ from pathlib import Path
 
 from pages import Terminal, filled, keep, write
 
-SCRIPT = """\
-import numpy as np
-
-from inputdesign_cli import load_spec, solve
-
-spec = load_spec("first_order.yaml")
-design = solve(spec)
-M = design.information
-print("log det M of the least-costly design:", round(np.linalg.slogdet(M)[1], 4))
-
-# The same number without the package: quadrature of the textbook formula (Ljung 1999, section 9.4).
-w = (np.arange(200000) + 0.5) * np.pi / 200000
-q = np.exp(-1j * w)
-F, C = 1 - 0.7 * q, 1 - 0.9 * q
-towards_b, towards_f = q / F / C, -3.6 * q**2 / F**2 / C
-phi = design.spectrum(w)[:, 0, 0].real
-plain = np.zeros((3, 3))
-for i, a in ((0, towards_b), (2, towards_f)):
-    for j, b in ((0, towards_b), (2, towards_f)):
-        plain[i, j] = 500 * np.mean((a * b.conj()).real * phi)
-plain[1, 1] = 500 / (1 - 0.9**2)  # the noise teaches its own zero
-print("largest relative difference to quadrature:", f"{np.max(np.abs(plain - M)) / np.max(M):.0e}")
-
-for share in (0.005, 0.01, 0.02):
-    cost = solve(spec.with_(**{"accuracy.model_error.relative": share})).result["cost"]
-    print(f"error below {100 * share:g} %: least power {cost:.4g}")
-"""
-
-TEXT = (
-    """\
+TEXT = """\
 # Research: published designs side by side
 
 Least-costly and D-optimal designs, compared on a published example in ten minutes. `python
@@ -97,20 +68,8 @@ G has two free parameters. With 95 % probability (chi-squared, two degrees of fr
 an ellipse, and r_u is the largest |G_hat - G| in it. To first order 95.1 % of the runs stay below r_u at
 all frequencies together. These are the runs counted here.
 
-## 6. In Python
-
-`compare.py` recomputes the information matrix by plain quadrature:
-
-```python
+Further: [python.md](python.md), [method.md](method.md), [errata.md](errata.md).
 """
-    + SCRIPT
-    + """```
-
-{python}
-
-A quarter of the power gives twice the error, as theory says for open loop. Further: [python.md](python.md),
-[method.md](method.md), [errata.md](errata.md). """
-)
 
 
 def research(folder: Path, images: Path) -> str:
@@ -141,8 +100,6 @@ def research(folder: Path, images: Path) -> str:
         *("simulate", "first_order.yaml", "--set", "simulation.runs=200", "-o", "simulated"),
         kept=("simulated",),
     )
-    (folder / "compare.py").write_text(SCRIPT, encoding="utf-8")
-    found["python"] = terminal.python("compare.py")
     keep(folder / "least_costly", images, "research", bound="bound", optimality="optimality")
     keep(folder / "orders", images, "research", curves="curves")
     return filled(TEXT, found)

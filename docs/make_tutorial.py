@@ -166,18 +166,18 @@ def tutorial(folder: Path, images: Path) -> str:
     columns = "time=1,u1=Heater 1,y1=Temperature 1"
     found["explore"], said = terminal.run(
         *("explore", LOG.name, "--columns", columns, "-o", "found"),
-        kept=("estimate", "noise", "fit", "validated", "residuals", "note", "files"),
+        kept=("estimate", "fit", "validated", "residuals", "files"),
     )
     (found["validated"],) = re.findall(r"validated +simulation explains ([\d.]+ %)", said)
     changes = [word for change in TARGET for word in ("--set", change)]
     found["solve"], said = terminal.run(
         *("solve", "found/spec.yaml", *changes, "-o", "design"),
-        kept=("asked", "samples", "power", "model error", "signal", "proved", "note"),
+        kept=("asked", "samples", "power", "model error", "signal", "proved"),
     )
     (found["white"],) = re.findall(r"white excitation: (\d+)", said)
     (found["spectrum"],) = re.findall(r"spectrum alone would take (\d+)", said)
     (found["record"],) = re.findall(r"signal +(\d+) samples", said)
-    shown = ("estimate", "assessed", "verdict", "signal", "note", "files")
+    shown = ("estimate", "assessed", "verdict", "signal", "files")
     experiment(folder / "design" / "signal.csv", folder / "first.csv", seed=1)
     found["first"], said = terminal.run(
         *("assess", "design/spec.yaml", "first.csv", "-o", "first_assessed"), kept=shown, code=1
