@@ -38,8 +38,18 @@ Results go to standard output, everything else to standard error. Progress is sh
 
 ## Options of several commands
 
+Sections name two groups: *run options* are {run}; *data options* are {data}.
+
 {shared}
 """
+
+GROUPS = {
+    "data options": {
+        *("--columns", "--sample-time", "--time-unit", "--resample", "--detrend"),
+        *("--skip", "--range", "--without"),
+    },
+    "run options": {"--overwrite", "--no-output", "--no-figures", "--figure-format", "--json", "--quiet"},
+}
 
 
 def page() -> str:
@@ -47,7 +57,8 @@ def page() -> str:
     group = typer.main.get_command(app)
     rows = Counter(row for command in group.commands.values() for row in rows_of(command))
     shared = [row for row, count in rows.items() if count > 1]
-    parts = [INTRODUCTION.format(help=group.help, shared="\n".join(listed(shared)))]
+    named = {word.split()[0]: ", ".join(f"`{one}`" for one in sorted(GROUPS[word])) for word in GROUPS}
+    parts = [INTRODUCTION.format(help=group.help, shared="\n".join(listed(shared)), **named)]
     for name, command in group.commands.items():
         parts.append(section(name, command, shared))
     return "\n".join(parts)
@@ -72,8 +83,11 @@ def section(name, command, shared) -> str:
         lines += ["", *listed(own)]
     if len(own) < len(rows):
         names = [left for left, right in rows if (left, right) in shared and "`-" in left]
-        also = ", ".join(f"`{re.findall(r'`(-[^`]+)`', left)[-1]}`" for left in names)
-        lines += ["", f"Also {also}."] if also else []
+        also = {re.findall(r"`(-[^`]+)`", left)[-1] for left in names}
+        groups = [word for word, options in GROUPS.items() if options <= also]
+        grouped = {option for word in groups for option in GROUPS[word]}
+        rest = [f"`{option}`" for option in sorted(also - grouped)]
+        lines += ["", f"Also {', '.join([*rest, *groups])}."] if also else []
     return "\n".join(lines) + "\n"
 
 
