@@ -61,10 +61,7 @@ def results_of(golden: Golden) -> dict[str, Results]:
 
 
 def table(rows: list[Row]) -> str:
-    """The comparison as Markdown: the figures that a paper prints, or all where it prints none.
-
-    A printed value and one of an independent solution share a line.
-    """
+    """Return the figures that a paper prints as Markdown, with independent solutions in the same line."""
     lines = [
         "| quantity | paper | computed | difference | independent | reason |",
         "|---|---|---|---|---|---|",
@@ -72,18 +69,13 @@ def table(rows: list[Row]) -> str:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.run, row.quantity.path), []).append(row)
-    if any(printed_in_paper(row) for row in rows):
-        groups = {place: group for place, group in groups.items() if any(map(printed_in_paper, group))}
     for group in groups.values():
-        printed = [row for row in group if printed_in_paper(row)]
+        printed = [row for row in group if row.quantity.source.startswith("paper")]
+        if not printed:
+            continue
         others = [row for row in group if row not in printed]
         lines += [line(*pair) for pair in zip_longest(printed, others)]
     return "\n".join(lines)
-
-
-def printed_in_paper(row: Row) -> bool:
-    """Say whether a paper prints the expected value of this quantity."""
-    return row.quantity.source.startswith("paper")
 
 
 def line(paper: Row | None, other: Row | None) -> str:
