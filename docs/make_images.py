@@ -2,7 +2,7 @@
 
     python docs/make_images.py [NAME ..]
 
-The tutorial, the walkthroughs and the page of the papers draw theirs themselves.
+The tutorials and the page of the papers draw theirs themselves.
 """
 
 from __future__ import annotations

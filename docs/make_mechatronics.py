@@ -78,7 +78,7 @@ and 80 rad/s:
 
 {assess}
 
-Met: exit code 0. Gain and time constant are those of this motor, and the controller settings follow from
+Met: exit code 0. Gain and time constant belong to this motor, and the controller settings follow from
 them. `assessed/model.yaml` keeps the model with its covariance.
 
 ![what the model explains of the record](images/mechatronics_fit.png)
