@@ -26,8 +26,6 @@ IMAGES = ROOT / "docs" / "images"
 SPECS = ROOT / "specs"
 # Image -> spec, figure.
 PICTURES = {
-    "first_order_bound": ("first_order", "bound"),
-    "first_order_spectrum": ("first_order", "spectrum"),
     "heater_loop_nyquist": ("heater_loop", "nyquist"),
     "limited_signal": ("limited_signal", "signal"),
     "robust_fan": ("robust_first_order", "fan"),
