@@ -103,7 +103,7 @@ def option_names(option) -> str:
         return names
     if isinstance(option.default, Enum):
         return f"{names} {'|'.join(type(option.default))} (default {option.default})".replace("|", "\\|")
-    return f"{names} {option.metavar}"
+    return f"{names} {option.metavar}" if option.metavar else names
 
 
 if __name__ == "__main__":

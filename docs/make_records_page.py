@@ -15,19 +15,14 @@ import yaml
 
 from pages import DOCS, Terminal, filled, write
 
-FILES = (
-    "buck_converter/buck_id.csv",
-    "buck_converter/buck_valid.csv",
-    "cylinders/MultivariableCylinders.csv",
-    "wood_berry/record.csv",
-)
+FILES = ("buck_converter/buck_id.csv", "buck_converter/buck_valid.csv", "wood_berry/record.csv")
 PUBLISHED = DOCS.parent / "specs" / "wood_berry.yaml"
 
 EXPLORED = ("estimate", "fit", "validated", "residuals", "verdict")
 JUDGED = ("validated",)
 
 TEXT = """\
-# Raw logs to judged models: converter, cylinders, column
+# Raw logs to judged models: a converter and a column
 
 One command finds a model and judges its structure on a part of the record that it was not estimated from. A
 second command judges the model by another file. `python docs/make_records_page.py` runs the commands and
@@ -49,20 +44,6 @@ compromise, good for a first design. An experiment with small steps about one le
 that level.
 
 ARX models of orders and delays to 8, estimated from the first file, explain at most 61.6 % of the second.
-
-## Two cylinders: one file, halved by its times
-
-A hydraulic test bench with two inputs and two outputs. The file has no header, so columns are named by
-number. The first half is explored, the second judges:
-
-{cylinders_explore}
-
-{cylinders_judge}
-
-![fit to the second half](images/records_cylinders_fit.png)
-
-Each output follows its own input within three samples, and the other input hardly acts on it. The residuals
-contain overshoots and slow tails at some steps; notes of the command name these samples.
 
 ## A column: a model in s, and the one that made the record
 
@@ -103,20 +84,6 @@ def converter(terminal: Terminal, images: Path, found: dict[str, str]) -> None:
     shutil.copy(terminal.folder / "converter_judged" / "fit.png", images / "records_converter_fit.png")
 
 
-def cylinders(terminal: Terminal, images: Path, found: dict[str, str]) -> None:
-    """One file, halved."""
-    file = ("MultivariableCylinders.csv", "--columns", "time=1,u1=2,u2=3,y1=4,y2=5")
-    found["cylinders_explore"], _ = terminal.run(
-        *("explore", *file, "--range", "0:119.4", "-o", "cylinders"), kept=EXPLORED
-    )
-    found["cylinders_judge"], _ = terminal.run(
-        *("explore", *file, "--range", "119.5:239", "--validate", "cylinders/model.yaml"),
-        *("-o", "cylinders_judged"),
-        kept=JUDGED,
-    )
-    shutil.copy(terminal.folder / "cylinders_judged" / "fit.png", images / "records_cylinders_fit.png")
-
-
 def column(terminal: Terminal, images: Path, found: dict[str, str]) -> None:
     """A record whose plant is known."""
     found["column_explore"], said = terminal.run(
@@ -142,7 +109,7 @@ def records(folder: Path, images: Path) -> str:
     for file in FILES:
         shutil.copy(DOCS / "data" / file, folder)
     terminal, found = Terminal(folder), dict[str, str]()
-    for part in (converter, cylinders, column):
+    for part in (converter, column):
         part(terminal, images, found)
     return filled(TEXT, found)
 
