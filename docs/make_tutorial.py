@@ -32,8 +32,8 @@ SETTLED = 400  # samples at the operating point before an experiment
 TEXT = """\
 # From a log to an assessed experiment
 
-A log of a small board with two heaters and two temperature sensors leads to an experiment, a model of the
-required accuracy, and a verdict on the data. Computing takes less than a minute.
+A log of a small board with two heaters and two temperature sensors leads to an experiment and a verdict on
+its data. Computing takes less than a minute.
 
 `python docs/make_tutorial.py` runs the commands and writes this page; a test runs it. The log is real ([its
 origin](data/README.md)): run the commands in a folder with a copy of `docs/data/tclab/two_heaters.txt`. The
