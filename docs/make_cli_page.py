@@ -37,30 +37,21 @@ Results go to standard output, everything else to standard error. Progress is sh
 | 141 | the reader of standard output has gone (`idesign .. \\| head`); nothing is printed then |
 
 ## Options of several commands
-
-Sections name two groups: *run options* are {run}; *data options* are {data}.
-
-{shared}
 """
-
-GROUPS = {
-    "data options": {
-        *("--columns", "--sample-time", "--time-unit", "--resample", "--detrend"),
-        *("--skip", "--range", "--without"),
-    },
-    "run options": {"--overwrite", "--no-output", "--no-figures", "--figure-format", "--json", "--quiet"},
-}
 
 
 def page() -> str:
     """Return the whole page as Markdown."""
     group = typer.main.get_command(app)
-    rows = Counter(row for command in group.commands.values() for row in rows_of(command))
-    shared = [row for row, count in rows.items() if count > 1]
-    named = {word.split()[0]: ", ".join(f"`{one}`" for one in sorted(GROUPS[word])) for word in GROUPS}
-    parts = [INTRODUCTION.format(help=group.help, shared="\n".join(listed(shared)), **named)]
-    for name, command in group.commands.items():
-        parts.append(section(name, command, shared))
+    commands = {name: rows_of(command) for name, command in group.commands.items()}
+    counted = Counter(row for rows in commands.values() for row in rows)
+    run = [row for row in commands["solve"] if row in commands["explore"]]
+    data = [row for row in commands["explore"] if row in commands["assess"] and row not in run]
+    others = [row for row, count in counted.items() if count > 1 and row not in run + data]
+    groups = {"Run options": run, "Data options": data, "Other options": others}
+    parts = [INTRODUCTION.format(help=group.help)]
+    parts += [f"### {title}\n\n{listed(rows)}" for title, rows in groups.items()]
+    parts += [section(name, command, groups) for name, command in group.commands.items()]
     return "\n".join(parts)
 
 
@@ -71,29 +62,24 @@ def rows_of(command) -> list[tuple[str, str]]:
     return arguments + [(option_names(p), p.help) for p in shown if p.param_type_name == "option"]
 
 
-def section(name, command, shared) -> str:
-    """Describe one command: what it does, how it is called, its own arguments and options."""
+def section(name, command, groups) -> str:
+    """Describe one command: what it does, its own arguments and options, and the common ones."""
     rows = rows_of(command)
-    own = [row for row in rows if row not in shared]
-    options = any(p.param_type_name == "option" for p in command.params if p.name != "help")
     arguments = [p.metavar for p in command.params if p.param_type_name == "argument"]
-    usage = " ".join(["idesign", name, *(["[OPTIONS]"] if options else []), *arguments])
-    lines = [f"## idesign {name}", "", inspect.cleandoc(command.help), "", f"`{usage}`"]
-    if own:
-        lines += ["", *listed(own)]
-    if len(own) < len(rows):
-        names = [left for left, right in rows if (left, right) in shared and "`-" in left]
-        also = {re.findall(r"`(-[^`]+)`", left)[-1] for left in names}
-        groups = [word for word, options in GROUPS.items() if options <= also]
-        grouped = {option for word in groups for option in GROUPS[word]}
-        rest = [f"`{option}`" for option in sorted(also - grouped)]
-        lines += ["", f"Also {', '.join([*rest, *groups])}."] if also else []
-    return "\n".join(lines) + "\n"
+    own = [row for row in rows if not any(row in group for group in groups.values())]
+    whole = [title for title, group in groups.items() if all(row in rows for row in group)]
+    single = [row for title, group in groups.items() if title not in whole for row in group if row in rows]
+    also = [re.findall(r"`-[^`]+`", left)[-1] for left, _ in single if "`-" in left]
+    also += [title.lower() for title in whole]
+    lines = ["## " + " ".join(["idesign", name, *arguments]), "", inspect.cleandoc(command.help), ""]
+    lines += [listed(own)] if own else []
+    lines += [f"Also {', '.join(also)}.\n"] if also else []
+    return "\n".join(lines)
 
 
-def listed(rows) -> list[str]:
+def listed(rows) -> str:
     """Return a Markdown list of names and what they mean."""
-    return [f"- {left}: {right}" for left, right in rows]
+    return "".join(f"- {left}: {right}\n" for left, right in rows)
 
 
 def option_names(option) -> str:
