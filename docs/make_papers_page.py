@@ -69,17 +69,19 @@ def table(rows: list[Row]) -> str:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.run, row.quantity.path), []).append(row)
+    said = ""
     for group in groups.values():
         printed = [row for row in group if row.quantity.source.startswith("paper")]
-        if not printed:
-            continue
         others = [row for row in group if row not in printed]
-        lines += [line(*pair) for pair in zip_longest(printed, others)]
+        for paper, other in zip_longest(printed, others) if printed else ():
+            why = paper.quantity.why if paper else ""
+            lines.append(line(paper, other, "as above" if why and why == said else why))
+            said = why
     return "\n".join(lines)
 
 
-def line(paper: Row | None, other: Row | None) -> str:
-    """One quantity."""
+def line(paper: Row | None, other: Row | None, why: str) -> str:
+    """Return the line of one quantity, with the reason for a difference."""
     first = paper or other
     assert first is not None
     computed = "-" if first.computed is None else f"{first.computed:.7g}"
@@ -90,7 +92,7 @@ def line(paper: Row | None, other: Row | None) -> str:
         computed + misses,
         percent(paper.computed, paper.quantity.expected) if paper else "",
         f"{other.quantity.expected:.7g}" if other else "",
-        paper.quantity.why if paper else "",
+        why,
     ]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
