@@ -2,7 +2,7 @@
 
     python docs/make_images.py [NAME ..]
 
-The tutorial, the walkthroughs and the page of the papers draw theirs themselves.
+The tutorials and the page of the papers draw theirs themselves.
 """
 
 from __future__ import annotations
@@ -26,8 +26,6 @@ IMAGES = ROOT / "docs" / "images"
 SPECS = ROOT / "specs"
 # Image -> spec, figure.
 PICTURES = {
-    "first_order_bound": ("first_order", "bound"),
-    "first_order_spectrum": ("first_order", "spectrum"),
     "heater_loop_nyquist": ("heater_loop", "nyquist"),
     "limited_signal": ("limited_signal", "signal"),
     "robust_fan": ("robust_first_order", "fan"),

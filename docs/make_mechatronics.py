@@ -34,17 +34,17 @@ TEXT = (
     """\
 # Mechatronics: from a data sheet to a speed loop with a proved margin
 
-A motor is to get a PI loop for its speed. The data sheet tells gain and time constant within 20 %, the drive
-takes 0 to 24 V through 12 bits, and nobody wants to try settings at the machine. Ten minutes, of which the
-motor turns for twenty seconds.
+A motor is to get a PI loop for its speed. The data sheet states gain and time constant within 20 %, and the
+drive takes 0 to 24 V through 12 bits. The experiment takes twenty seconds.
 
-`python docs/make_mechatronics.py` runs the commands below and writes this page; a test runs it. The motor is
-played: its gain is 20 % below the data sheet and its time constant 15 % above. The tool sees the data only.
+`python docs/make_mechatronics.py` runs the commands and writes this page; a test runs it. The motor is
+simulated, with a gain 20 % below the data sheet and a time constant 15 % above. The tool sees the data
+only.
 
 ## 1. What you know, in your words
 
-`rest.csv` is half a minute of speed at a constant 10 V: it tells the noise. The rest is six answers, in the
-terminal (`idesign wizard` asks) or in a file, `answers.yaml`:
+`rest.csv` is half a minute of speed at a constant 10 V, which contains the noise. Six answers are given in
+the terminal or in a file, `answers.yaml`:
 
 ```yaml
 """
@@ -53,48 +53,38 @@ terminal (`idesign wizard` asks) or in a file, `answers.yaml`:
 
 {wizard}
 
-No FIR order, no confidence level, no grid was asked for. `speed.yaml` has them, with a comment on every line;
-this is what the margin became:
+`speed.yaml` has a comment on every line. The margin became:
 
 {deduced}
 
-The controller is tuned anew at each of thirty motors within 20 %, as it will be after the experiment, and at
-each the margin must hold for every motor within r_u.
+The controller is tuned anew at each of thirty motors within 20 %. At each the margin must hold for every
+motor within r_u.
 
 ## 2. The signal
 
-The record has {levels} levels of voltage, which are codes of the converter. Below stands the speed to be
-expected:
+The record has {levels} levels of voltage, which are codes of the converter. The lower panel shows the
+expected speed:
 
 ![the voltage to apply and the speed to be expected](images/mechatronics_signal.png)
 
 ![the loop with the discs that the data leave, and the circle to keep off](images/mechatronics_nyquist.png)
 
-The discs are what the data will leave open of the loop: they stay out of the circle about -1 that 6 dB mean.
+The discs show the uncertainty of the loop after the experiment. They stay out of the 6 dB circle about -1.
 
 ## 3. The experiment and its verdict
 
-`signal.csv` is played to the drive; voltage and speed are logged in `log.csv`, beginning at rest at 10 V and
-80 rad/s:
+`signal.csv` is played to the drive; voltage and speed are logged in `log.csv`, beginning at rest at 10 V
+and 80 rad/s:
 
 {assess}
 
-Met: exit code 0. Gain and time constant are those of this motor, not of the data sheet, and the settings of
-the controller follow from them. `assessed/model.yaml` keeps the model with its covariance.
+Met: exit code 0. Gain and time constant belong to this motor, and the controller settings follow from
+them. `assessed/model.yaml` keeps the model with its covariance.
 
 ![what the model explains of the record](images/mechatronics_fit.png)
 
-## 4. Was it too much?
-
-A quarter of the time, said in one word; the rest of the answers stay:
-
-{short}
-
-Enough for the margin, too: the error is twice that of twenty seconds, as a quarter of the data has it.
-
-A flexible axis is asked for in the same way; [wizard.md](wizard.md#a-flexible-axis-and-its-controller) tells
-what to know of its controller. While you edit `speed.yaml`, `idesign watch speed.yaml` shows [what becomes of
-it](watch.md). """
+For a flexible axis see [wizard.md](wizard.md#a-flexible-axis-and-its-controller).
+"""
 )
 
 
@@ -128,9 +118,6 @@ def mechatronics(folder: Path, images: Path) -> str:
     found["assess"], _ = terminal.run(
         *("assess", "speed.yaml", "log.csv", "--operating-point", "u1=10,y1=80", "-o", "assessed"),
         kept=("estimate", "assessed", "verdict", "loop", "controller", "margin", "files"),
-    )
-    found["short"], _ = terminal.run(
-        *("wizard", "--answers", "answers.yaml", "-a", "time=5 s", "--solve", "-o", "short.yaml")
     )
     keep(folder / "runs" / "speed", images, "mechatronics", signal="signal", nyquist="nyquist")
     keep(folder / "assessed", images, "mechatronics", fit="fit")

@@ -30,10 +30,9 @@ INTRODUCTION = """\
 
 <!-- Written by `make papers` from docs/papers/ and golden/: change those, not this page. -->
 
-Every figure of a paper that a shipped spec reproduces, side by side: the printed value, the value that
-`idesign` computes, and a value from an independent solution or a closed form where there is one. The last
-column gives the reason for a difference, or for the tolerance. The same comparison runs as `idesign check`,
-with a tolerance for each line; "misses" in the table would be a line that fails it.
+Every figure of a paper that a shipped spec reproduces: the printed value, the value that `idesign` computes,
+and one from an independent solution or a closed form. The last column explains a difference from the print,
+or its tolerance. `idesign check` compares these and further quantities.
 """
 
 
@@ -62,7 +61,7 @@ def results_of(golden: Golden) -> dict[str, Results]:
 
 
 def table(rows: list[Row]) -> str:
-    """The comparison as Markdown; what a paper prints and what was solved independently share a line."""
+    """Return the figures that a paper prints as Markdown, with independent solutions in the same line."""
     lines = [
         "| quantity | paper | computed | difference | independent | reason |",
         "|---|---|---|---|---|---|",
@@ -70,15 +69,19 @@ def table(rows: list[Row]) -> str:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.run, row.quantity.path), []).append(row)
+    said = ""
     for group in groups.values():
         printed = [row for row in group if row.quantity.source.startswith("paper")]
         others = [row for row in group if row not in printed]
-        lines += [line(*pair) for pair in zip_longest(printed, others)]
+        for paper, other in zip_longest(printed, others) if printed else ():
+            why = paper.quantity.why if paper else ""
+            lines.append(line(paper, other, "as above" if why and why == said else why))
+            said = why
     return "\n".join(lines)
 
 
-def line(paper: Row | None, other: Row | None) -> str:
-    """One quantity."""
+def line(paper: Row | None, other: Row | None, why: str) -> str:
+    """Return the line of one quantity, with the reason for a difference."""
     first = paper or other
     assert first is not None
     computed = "-" if first.computed is None else f"{first.computed:.7g}"
@@ -89,7 +92,7 @@ def line(paper: Row | None, other: Row | None) -> str:
         computed + misses,
         percent(paper.computed, paper.quantity.expected) if paper else "",
         f"{other.quantity.expected:.7g}" if other else "",
-        first.quantity.why,
+        why,
     ]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 

@@ -1,4 +1,4 @@
-"""Writes docs/research.md: compares published criteria on a published example, by commands and from Python.
+"""Writes docs/research.md: compares published criteria on a published example.
 
 python docs/make_research.py [DIR]
 """
@@ -10,65 +10,31 @@ from pathlib import Path
 
 from pages import Terminal, filled, keep, write
 
-SCRIPT = """\
-import numpy as np
-
-from inputdesign_cli import load_spec, solve
-
-spec = load_spec("first_order.yaml")
-design = solve(spec)
-M = design.information
-print("log det M of the least-costly design:", round(np.linalg.slogdet(M)[1], 4))
-
-# The same number without the package: quadrature of the textbook formula (Ljung 1999, section 9.4).
-w = (np.arange(200000) + 0.5) * np.pi / 200000
-q = np.exp(-1j * w)
-F, C = 1 - 0.7 * q, 1 - 0.9 * q
-towards_b, towards_f = q / F / C, -3.6 * q**2 / F**2 / C
-phi = design.spectrum(w)[:, 0, 0].real
-plain = np.zeros((3, 3))
-for i, a in ((0, towards_b), (2, towards_f)):
-    for j, b in ((0, towards_b), (2, towards_f)):
-        plain[i, j] = 500 * np.mean((a * b.conj()).real * phi)
-plain[1, 1] = 500 / (1 - 0.9**2)  # the noise teaches its own zero
-print("largest relative difference to quadrature:", f"{np.max(np.abs(plain - M)) / np.max(M):.0e}")
-
-for share in (0.005, 0.01, 0.02):
-    cost = solve(spec.with_(**{"accuracy.model_error.relative": share})).result["cost"]
-    print(f"error below {100 * share:g} %: least power {cost:.4g}")
-"""
-
-TEXT = (
-    """\
+TEXT = """\
 # Research: published designs side by side
 
-You have read of least-costly and of D-optimal designs, and want to know how they compare on an example in
-print, with numbers that you can check. This takes ten minutes, most of them yours.
-
-`python docs/make_research.py` runs the commands below and writes this page; a test runs it.
+Least-costly and D-optimal designs, compared on a published example in ten minutes. `python
+docs/make_research.py` runs the commands and writes this page; a test runs it.
 
 ## 1. A design from a paper
 
-The first illustration of [Bombois and Scorletti](references.md#bombois-least-costly): y = 3.6 q^-1 / (1 - 0.7
-q^-1) u + (1 - 0.9 q^-1) e, an error below 1 % of |G| at all frequencies after 500 samples. The spec comes
-with the tool:
+The first illustration of [Bombois and Scorletti](references.md#bombois-least-costly): y = 3.6 q^-1 / (1 -
+0.7 q^-1) u + (1 - 0.9 q^-1) e, an error below 1 % of |G| at all frequencies after 500 samples:
 
 {copy}
 
 {least}
 
-The paper prints 0.25, and 1.7 for white noise, at an initial estimate that it does not print; here the true
-parameters stand in its place. All figures of the papers stand beside ours in [papers.md](papers.md), and
-`idesign check` repeats the comparison.
+The paper prints 0.25, and 1.7 for white noise, at an initial estimate that it does not print. All figures
+are compared in [papers.md](papers.md).
 
 ![r_u against r_adm](images/research_bound.png)
 
 ## 2. What the proof says
 
-Two lines begin with `proved`. The first bounds every FIR spectrum of order 20, by the dual of the problem;
-the gap is what the solver left. The second bounds every spectrum whatsoever: {over} % of the cost could at
-most be saved by another family of spectra. The certificate is a function of frequency that anybody can check:
-what a unit of power buys there, relative to the best. It is nowhere above one.
+The first line bounds every FIR spectrum of order 20 by the dual problem. The second bounds every spectrum:
+{over} % of the cost at most could be saved by another family. The certificate is the accuracy that a unit
+of power gives at each frequency, relative to the best. It is nowhere above one.
 
 ![the certificate](images/research_optimality.png)
 
@@ -76,19 +42,17 @@ what a unit of power buys there, relative to the best. It is nowhere above one.
 
 {rival}
 
-It maximises log det M, and does not know which error matters. How large is the error of its record where 1 %
-is asked?
+It maximises log det M, whichever error matters. How large is the error of its record where 1 % is asked?
 
 {judged}
 
-{ratio} times what is admitted. The error falls with the root of the power, so that a D-optimal record of the
-accuracy asked for takes {more} times the power of the least-costly spectrum: the price of a criterion that is
-not the question. White noise takes {white} times as much.
+{ratio} times the admissible error. The error falls with the root of the power, so a D-optimal record of the
+required accuracy takes {more} times the power of the least-costly spectrum. White noise takes {white} times
+as much.
 
 ## 4. A longer filter
 
-How much of this depends on the order of the FIR spectrum? A sweep over it, resumable, with one row per point
-in `sweep.csv`:
+A sweep over the order of the FIR spectrum, with one row per point in `sweep.csv`:
 
 {sweep}
 
@@ -100,26 +64,12 @@ r_u is asymptotic. Two hundred simulated experiments with the designed spectrum,
 
 {simulated}
 
-The alpha of 2.45 is for all frequencies at once. G has two free parameters. With 95 % (chi-squared, two
-degrees of freedom) the estimate lies in an ellipse, and r_u is the largest |G_hat - G| in that ellipse. To
-first order 95.1 % of the runs stay below r_u at all frequencies together, and 95.1 to 98.6 % at one
-frequency alone. What is counted here are runs that stay below at all frequencies.
+G has two free parameters. With 95 % probability (chi-squared, two degrees of freedom) the estimate lies in
+an ellipse, and r_u is the largest |G_hat - G| in it. To first order 95.1 % of the runs stay below r_u at
+all frequencies together. These are the runs counted here.
 
-## 6. In Python
-
-Everything is a function, results are arrays. `compare.py` recomputes the information matrix by plain
-quadrature:
-
-```python
+Further: [python.md](python.md), [method.md](method.md), [errata.md](errata.md).
 """
-    + SCRIPT
-    + """```
-
-{python}
-
-A quarter of the power for twice the error, as theory has it in open loop. [python.md](python.md) tells the
-rest, [method.md](method.md) the mathematics, [errata.md](errata.md) what is misprinted in the papers. """
-)
 
 
 def research(folder: Path, images: Path) -> str:
@@ -150,8 +100,6 @@ def research(folder: Path, images: Path) -> str:
         *("simulate", "first_order.yaml", "--set", "simulation.runs=200", "-o", "simulated"),
         kept=("simulated",),
     )
-    (folder / "compare.py").write_text(SCRIPT, encoding="utf-8")
-    found["python"] = terminal.python("compare.py")
     keep(folder / "least_costly", images, "research", bound="bound", optimality="optimality")
     keep(folder / "orders", images, "research", curves="curves")
     return filled(TEXT, found)

@@ -32,46 +32,42 @@ SETTLED = 400  # samples at the operating point before an experiment
 TEXT = """\
 # From a log to an assessed experiment
 
-A log of a small board, two heaters with two temperature sensors, leads to an experiment whose model is as
-accurate as asked, with a verdict on the data. Computing takes less than a minute, the experiments as
-long as heating takes.
+A log of a small board with two heaters and two temperature sensors leads to an experiment and a verdict on
+its data. Computing takes less than a minute.
 
-`python docs/make_tutorial.py` runs the commands below and writes this page; a test runs it. The log is real
-([its origin](data/README.md)): `docs/data/tclab/two_heaters.txt`; run the commands in a folder with a
-copy of it. The two experiments are played: by an energy balance of the board
-(convection, radiation, the sensor's lag) that is fitted to the log, with the noise of the log. The tool
-sees the data only.
+`python docs/make_tutorial.py` runs the commands and writes this page; a test runs it. The log is real ([its
+origin](data/README.md)): run the commands in a folder with a copy of `docs/data/tclab/two_heaters.txt`. The
+two experiments are simulated by an energy balance that is fitted to the log, with the noise of the log.
 
 ## 1. What is in the log
 
-Ten minutes, a row about every three seconds, with jitter; both heaters were switched. Heater 1 and
-temperature 1 are what we want a model of:
+Ten minutes, a row about every three seconds, with jitter; both heaters were switched. We want a model from
+heater 1 to temperature 1:
 
 {explore}
 
-One command reads the file, evens out the jitter and tells that it did, finds the delay and the orders on
-one part of the record, and judges them on the other:
+One command reads the file, resamples it, finds a structure on one part of the record, and judges it on the
+other:
 
 ![fit of the model to the log](images/tutorial_log_fit.png)
 
-Estimated from the first part alone, the structure that it chose explains {validated} of the temperatures of
-the other; the parameters above are those of the whole log. The command also writes `found/spec.yaml`: plant,
-noise, levels and limits as in the log, ready for a design. How good is the model?
-The data alone say where G may be at each frequency (shaded), and how the model goes through it:
+Estimated from the first part alone, this structure explains {validated} of the temperatures of the other;
+the parameters above use the whole log. The command also writes `found/spec.yaml`, ready for a design. The
+shaded discs show the frequency response of the data alone, the line that of the model:
 
 ![frequency response of the log, without a model and by the model](images/tutorial_log_frequency_response.png)
 
-Ten minutes of this input tell little where a controller would act.
+The discs are wide at the frequencies that matter for a controller.
 
 ## 2. The shortest experiment
 
 We ask for errors below 15 % of |G| from 0.003 to 0.04 rad/s, with 95 % confidence, and allow the heater 20
-to 80 %. How long must it run?
+to 80 %:
 
 {solve}
 
-White excitation of that power would take {white} samples where the best spectrum takes {spectrum}; a record
-that keeps within 20 and 80 % takes {record}. It has two levels, and its power where it teaches something:
+White excitation of equal power needs {white} samples, the best spectrum {spectrum}, a record
+within 20 and 80 % {record}. It has two levels:
 
 ![the signal](images/tutorial_design_signal.png)
 
@@ -79,28 +75,26 @@ that keeps within 20 and 80 % takes {record}. It has two levels, and its power w
 
 ## 3. The experiment
 
-`design/signal.csv` is applied to the board, which was left to settle at 50 %, and the temperature is
-recorded beside it, in `first.csv`. Do these data meet the target?
+The board settles at 50 %, `design/signal.csv` is applied, and the temperature is recorded in `first.csv`.
+Do these data meet the target?
 
 {first}
 
-They miss it: exit code 1. The log had told the fast part of the plant badly, so that the design stood on a
-wrong model; the new data tell it better, and at the new estimate the error is {ratio} times what is
-admitted. That is what assessing is for; a note tells how far the plant is from that of the design. The same
-command has designed what the new model still needs: the shortest record that, together with these data, meets
-the target if the structure of the model is right.
+They miss it: exit code 1. The model from the log was wrong at high frequencies. At the new estimate the
+error is {ratio} times the admissible one. The same command has designed the top-up: the shortest record
+that, with these data, meets the target if the model structure is right.
 
 ![the error that the first experiment leaves](images/tutorial_first_data_bound.png)
 
 ## 4. The top-up
 
-That record would just do if the model that it rests on were right, and the first design rested on one that
-was not. So we leave a reserve, and ask the top-up for 12 % where 15 % are wanted:
+That record is just enough if its model is right, and the first one was not. So we leave a reserve and ask
+for 12 % where 15 % are wanted:
 
 {reserve}
 
-`reserve/signal.csv`, {reserved} samples in place of {needed}, is applied in the same way. Both records are
-estimated jointly, and judged by the 15 %:
+`reserve/signal.csv`, {reserved} samples instead of {needed}, is applied in the same way. Both records are
+estimated jointly and judged by the 15 %:
 
 {second}
 
@@ -108,11 +102,10 @@ Met: exit code 0. The model, with its covariance, is `second_assessed/model.yaml
 
 ![the error that both experiments leave](images/tutorial_second_bound.png)
 
-![fit of the model to both experiments, which a dotted line parts](images/tutorial_second_fit.png)
+![fit of the model to both experiments, separated by a dotted line](images/tutorial_second_fit.png)
 
-What an accuracy may be is in [questions.md](questions.md), what verdicts rest on in
-[identification.md](identification.md); a response without any model is measured as
-[frequency_response.md](frequency_response.md) tells.
+Further: [questions.md](questions.md) (requirements), [assess.md](assess.md) (verdicts),
+[frequency_response.md](frequency_response.md) (a response without a model).
 """
 
 TARGET = (
@@ -173,18 +166,18 @@ def tutorial(folder: Path, images: Path) -> str:
     columns = "time=1,u1=Heater 1,y1=Temperature 1"
     found["explore"], said = terminal.run(
         *("explore", LOG.name, "--columns", columns, "-o", "found"),
-        kept=("estimate", "noise", "fit", "validated", "residuals", "note", "files"),
+        kept=("estimate", "fit", "validated", "residuals", "files"),
     )
     (found["validated"],) = re.findall(r"validated +simulation explains ([\d.]+ %)", said)
     changes = [word for change in TARGET for word in ("--set", change)]
     found["solve"], said = terminal.run(
         *("solve", "found/spec.yaml", *changes, "-o", "design"),
-        kept=("asked", "samples", "power", "model error", "signal", "proved", "note"),
+        kept=("asked", "samples", "power", "model error", "signal", "proved"),
     )
     (found["white"],) = re.findall(r"white excitation: (\d+)", said)
     (found["spectrum"],) = re.findall(r"spectrum alone would take (\d+)", said)
     (found["record"],) = re.findall(r"signal +(\d+) samples", said)
-    shown = ("estimate", "assessed", "verdict", "signal", "note", "files")
+    shown = ("estimate", "assessed", "verdict", "signal", "files")
     experiment(folder / "design" / "signal.csv", folder / "first.csv", seed=1)
     found["first"], said = terminal.run(
         *("assess", "design/spec.yaml", "first.csv", "-o", "first_assessed"), kept=shown, code=1

@@ -23,10 +23,6 @@ class Terminal:
         """The block of a page for a command, and its whole output; the exit code must be as expected."""
         return self._shown(["-m", "inputdesign_cli", *words], command(words), kept, code)
 
-    def python(self, script: str) -> str:
-        """A script in the folder: the block of a page."""
-        return self._shown([script], f"python {script}", ("",), 0)[0]
-
     def _shown(self, run: list[str], typed: str, kept: tuple[str, ...], code: int) -> tuple[str, str]:
         done = subprocess.run(
             [sys.executable, *run], cwd=self.folder, capture_output=True, text=True, check=False
