@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.response import Goal, ResponseLines
+from inputdesign_cli.design.convex.response_lines import Goal, ResponseLines
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model

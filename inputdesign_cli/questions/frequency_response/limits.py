@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.response import UnreachableError
+from inputdesign_cli.design.convex.response_lines import UnreachableError
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.outcome.rounding import rounded_up
 from inputdesign_cli.outcome.units import Units

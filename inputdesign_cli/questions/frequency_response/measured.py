@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.response import ResponseLines
+from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE
 from inputdesign_cli.findings.nonlinear_response import Distorted, nonlinear_response, silent_lines_answer

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.response import Goal
+from inputdesign_cli.design.convex.response_lines import Goal
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.limits_not_kept import StatedLimits, limits_not_kept
 from inputdesign_cli.findings.response_record import noise_leaks, record_of_whole_periods, start_shifts

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.response import ResponseDesign, UnreachableError, cheapest, most_accurate
+from inputdesign_cli.design.convex.response_lines import (
+    ResponseDesign,
+    UnreachableError,
+    cheapest,
+    most_accurate,
+)
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.monte_carlo.response import study_response

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.response import Goal, ResponseDesign, ResponseLines, ResponseProblem
+from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.outcome import Powers

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.response import (
+from inputdesign_cli.design.convex.response_lines import (
     ResponseLines,
     ResponseProblem,
     UnreachableError,
