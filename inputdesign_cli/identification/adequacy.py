@@ -203,13 +203,14 @@ def robust_white(
         tests = [_tested(records, judged, tried, echoes) for tried in past_residuals(records, judged)]
         return not failed([test for test in tests if test is not None])
 
-    if white_enough(white):
+    if white_enough(white) or white_enough(less):
         return None
     of_inputs = caused(records, point.theta, recent, feedback=feedback)
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
     trend = _trend(records, point.theta).white(white)
-    if white_enough(less.without(np.column_stack([columns, trend]))):
+    # Few regressors first: what many explain of right residuals correlates those that are left.
+    if any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend]))):
         return None
     whitening = Whitening.of(white.without(columns).errors, records.lengths)
     return White.of(records, point, whitening=whitening)

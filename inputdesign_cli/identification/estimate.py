@@ -136,7 +136,9 @@ class Estimate:
         # Likelihood ratios are compared with one, scores with the other.
         by_ratio, by_score = chance_of_shifts(self.shifts)
         of_structure = {one.test for one in self.directed if one.of_structure}
-        compared = [(by_ratio, test) for test in self.beside_shifts]
+        # Where the noise is refuted, that says nothing of shifts: they are tested with white residuals.
+        beside = [test for test in self.beside_shifts if not (self.coloured and test.fault == "noise")]
+        compared = [(by_ratio, test) for test in beside]
         compared += [
             (by_ratio if test in of_structure else by_score, test) for test in directed if test in others
         ]
