@@ -54,7 +54,7 @@ tell that level's.
 The first file does not tell which compromise the second asks for. ARX models of orders and delays to 8 that
 are estimated from it reach 61.6 % there at best, chosen on that second file; 58.8 or 61.5 % where the first
 alone chooses, by simulation or by BIC. In the halves of the first file it is 63.5, 59.1 and 44.8 %, where
-`explore` gives 57.0 ([table](identification.md#idesign-explore)).
+`explore` gives 57.1 ([table](identification.md#idesign-explore)).
 
 ## Two cylinders: one file, halved by its times
 

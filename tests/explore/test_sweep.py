@@ -111,7 +111,7 @@ def drifting(seed, slope, samples=1600, pole=0.92):
 
 @pytest.mark.parametrize("slope", [1e-3, -1e-3, 0.0])
 def test_one_line_through_all_records_is_found_and_none_invented(slope):
-    """Noise of power 0.5^2 at low frequencies gives the slope of 800 and 600 samples a deviation of 6.4e-5."""
+    """Noise of a power of 0.25 at low frequencies gives the slope a deviation of 6.4e-5."""
     parts = drifting(1, slope)
     found = slopes_of(parts)
     assert found == pytest.approx([slope], abs=3 * 6.4e-5)
