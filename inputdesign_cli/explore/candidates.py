@@ -27,6 +27,8 @@ _AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
 _UNCERTAIN = 0.5
 # What a parameter must take off the variance of prediction errors, however long the record is.
 _WORTH = 0.01
+# What gains, time constants and dead times are worth by the same measure, beside polynomials.
+_NAMED = 0.02
 
 Ranges = tuple[tuple[int, int | None], ...]
 """Delays from the one to the other; None: the record sets no upper limit."""
@@ -137,7 +139,7 @@ def ranked(usable: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Ca
         return c.by_prediction or (own <= most and 1e4 - own**2 >= _EXPLAINED * explained)
 
     def preference(c: Candidate) -> tuple[float, ...]:
-        by = c.criterion if is_good(c) else -c.validation
+        by = c.criterion - _NAMED * c.orders.physical if is_good(c) else -c.validation
         return not is_good(c), not c.steady, not c.certain, not c.converged, by
 
     every = tuple(sorted(usable, key=preference))

@@ -197,6 +197,8 @@ def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool)
     samples, reason = sum(len(y) for _, y in used), None
     made = list[_Together]()
     for taken in _combinations(found):
+        if made and not _good(found, taken):
+            break
         names = " and ".join(dict.fromkeys(c.orders.family for c in taken))
         tell(Counted(f"models of the whole record, now {names}", len(made), len(made) + 1))
         try:
@@ -221,6 +223,11 @@ def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool)
         hint="record it in a loop, or remove the drift: --detrend linear",
         key="y",
     )
+
+
+def _good(found: Sequence[Chosen], taken: Sequence[Candidate]) -> bool:
+    """Return whether all explain their part of the record about as well as any."""
+    return all(any(c is own for own in chosen.good) for chosen, c in zip(found, taken, strict=True))
 
 
 def _order_of(one: _Together, samples: int) -> tuple[bool, bool]:
@@ -267,16 +274,16 @@ def _identified(structure: Model, used: Parts, feedback: bool, ramp: bool) -> tu
 def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
     """Yield what may be taken for all outputs together, all in s or all in q^-1, the best first."""
     first = found[0].best.orders.physical
+    last = list[tuple[Candidate, ...]]()
     for kind in (first, not first):
         every = [[c for c in chosen.candidates if c.orders.physical == kind] for chosen in found]
         # What is open on one part seldom is certain on the whole: after the best it is left out.
-        kept = [[c for c in chosen.good if c.orders.physical == kind and c.certain] for chosen in found]
-        ranked = [
-            own[:1] + [c for c in more if c is not own[0]][: _MOST_TRIED - 1]
-            for own, more in zip(every, kept, strict=True)
-        ]
-        for rank in range(max(map(len, ranked)) if all(every) else 0):
+        good = [[c for c in chosen.good if c.orders.physical == kind] for chosen in found]
+        ranked = [own[:1] + [c for c in own[1:] if c.certain][: _MOST_TRIED - 1] for own in good]
+        for rank in range(max(map(len, ranked)) if all(ranked) else 0):
             yield tuple(own[min(rank, len(own) - 1)] for own in ranked)
+        last += [tuple(own[0] for own in every)] if all(every) and not all(ranked) else []
+    yield from last
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:

@@ -205,6 +205,8 @@ def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
         yield Process(swept.near(1).delays, 0, step)
     for n in sorted({1, near.order, min(near.order + 1, highest)}):
         yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
+    if highest > 1:
+        yield Orders("ARMAX", swept.near(2).delays, 2, a=2, c=2)
     yield from _best_arx(records)
 
 
