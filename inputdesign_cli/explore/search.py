@@ -58,7 +58,7 @@ class _Records:
         first, judging: records of one output; of each that judges the first `late` samples are left out.
         white: the first part through the autoregression of its noise; `swept` its regressions.
         C, D: the noise beside a plant.
-        feedback: whether inputs answer the outputs; `wanders`, whether the noise does not fade.
+        feedback: whether inputs answer the outputs.
         step: the sample time.
     """
 
@@ -70,7 +70,6 @@ class _Records:
     C: Array
     D: Array
     feedback: bool
-    wanders: bool
     step: float
 
     @property
@@ -116,7 +115,7 @@ class _Records:
                 model.dead_times[model.in_plant],
                 self.step if orders.physical else 0.0,
             ),
-            self.feedback or self.wanders,
+            self.feedback,
         )
 
 
@@ -187,10 +186,7 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
         swept = sweep(white, highest, least=int(feedback))
     longest = max(len(y) for _, y in judging)
     late = max(max(one.delays) for one in swept.by_order.values()) + _SETTLES
-    wanders = lingering(D, max(len(y) for _, y in first)) > 0
-    return _Records(
-        first, judging, white, swept, late if late < longest // 2 else 0, C, D, feedback, wanders, step
-    )
+    return _Records(first, judging, white, swept, late if late < longest // 2 else 0, C, D, feedback, step)
 
 
 def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
@@ -205,7 +201,7 @@ def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
         yield Process(swept.near(1).delays, 0, step)
     for n in sorted({1, near.order, min(near.order + 1, highest)}):
         yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
-    if highest > 1:
+    if highest > 1 and not records.feedback:
         yield Orders("ARMAX", swept.near(2).delays, 2, a=2, c=2)
     yield from _best_arx(records)
 

@@ -97,8 +97,8 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
         if slope
     ]
     notes += [
-        f"{signal_name('y', i, outputs)} wanders as a random walk does, whatever the inputs do: structures "
-        "are ranked by prediction errors, and the gain is that of the steps, not of levels that lie far apart"
+        f"{signal_name('y', i, outputs)} wanders as a random walk does, whatever the inputs do: the "
+        "gain is that of the steps, not of levels that lie far apart"
         for i, wanders in enumerate(found.wanders)
         if wanders
     ]
