@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.outcome import Information, ModelError, Objective, Outcome, read_plain, write_plain
+from inputdesign_cli.outcome import Information, ModelError, Objective, Outcome, write_plain
 from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
 
 Array = NDArray[np.float64]
@@ -30,11 +30,6 @@ class Table:
     """Columns of one CSV file: header name (with its unit, `frequency_rad_per_s`) -> values (n,)."""
 
     columns: Mapping[str, Array]
-
-
-def typed(result: Result) -> Outcome:
-    """Return a result that was put together as plain data with its types."""
-    return read_plain(Outcome, result)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from inputdesign_cli.errors import (
     OutputError,
 )
 from inputdesign_cli.outcome.provenance import environment
-from inputdesign_cli.outcome.results import Json, typed
+from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.questions.verbs import Verb, run_verb
 from inputdesign_cli.specification import SpecTemplate
@@ -98,8 +98,8 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
         with bare_interruptions():
             results = run_verb(job.verb, spec)
         seconds = time.perf_counter() - started
-        timing = {**results.result.get("timing_s", {}), "point": seconds}
-        results = replace(results, outcome=typed({**results.result, "timing_s": timing}))
+        timing = {**(results.outcome.timing_s or {}), "point": seconds}
+        results = replace(results, outcome=replace(results.outcome, timing_s=timing))
         from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.outcome.run_directory import write_run
 

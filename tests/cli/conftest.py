@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import questions, specification
-from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
 from tests.support.command_line import RESULT
 from tests.support.commands import caller
+from tests.support.outcomes import typed
 
 
 @pytest.fixture

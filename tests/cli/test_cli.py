@@ -12,8 +12,9 @@ import inputdesign_cli
 from inputdesign_cli import questions
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, InaccurateError, InfeasibleError, OutputError, SpecError
-from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.results import Results
 from tests.support.command_line import RESULT, diagnostic
+from tests.support.outcomes import typed
 from tests.support.processes import running
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]

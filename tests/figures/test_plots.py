@@ -16,8 +16,9 @@ from inputdesign_cli.figures.plots import draw, draw_all
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import TYPE_SIZE
 from inputdesign_cli.outcome.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
-from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.results import Results
 from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound
+from tests.support.outcomes import typed
 
 
 @cache

@@ -8,8 +8,9 @@ import pytest
 from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
 from inputdesign_cli.outcome.golden import compare
 from inputdesign_cli.outcome.golden_file import load_golden
-from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions.verbs import execute
+from tests.support.outcomes import typed
 
 SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
 

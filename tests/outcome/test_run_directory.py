@@ -15,8 +15,9 @@ import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import replacing
-from inputdesign_cli.outcome.results import Results, typed
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
+from tests.support.outcomes import typed
 from tests.support.run_directories import a_run, marks, names, write_with_figures
 
 

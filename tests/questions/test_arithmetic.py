@@ -10,8 +10,9 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
-from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions.arithmetic import finite, most_extreme, sound_arithmetic
+from tests.support.outcomes import typed
 
 BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}"
 CRITERION = "accuracy: {criterion: D}\nlimits: {input_power: 1}"

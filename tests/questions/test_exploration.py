@@ -13,11 +13,11 @@ from typer.testing import CliRunner
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.questions import explore, identify, solve
 from inputdesign_cli.records import Preparation, read_log
 from inputdesign_cli.specification import load_spec, parse_spec
 from tests.support.logs import lag_log
+from tests.support.outcomes import typed
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
 

@@ -7,8 +7,8 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.cli.summary import summary
-from inputdesign_cli.outcome.results import typed
 from tests.support.first_order_specs import ERROR, FIR, PLANT, run
+from tests.support.outcomes import typed
 
 
 def test_what_a_shortest_experiment_says_is_of_its_whole_samples():

@@ -4,8 +4,8 @@ import pytest
 
 from inputdesign_cli import parse_spec, simulate
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.report.evidence import simulation_table
+from tests.support.outcomes import typed
 
 SPEC = """
 plant: {A: [1, -0.8], B: [0, 1, -1.5]}

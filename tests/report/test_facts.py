@@ -4,8 +4,8 @@ import pytest
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.cli.summary import summary
-from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.report.facts import facts, proofs
+from tests.support.outcomes import typed
 
 ROBUST = {
     "source": "intervals",

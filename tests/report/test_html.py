@@ -16,11 +16,11 @@ import pytest
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.results import typed
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.sweeps.running import run_sweep
+from tests.support.outcomes import typed
 from tests.support.pages import XHTML, parse, words
 
 

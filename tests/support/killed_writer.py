@@ -15,8 +15,9 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome import replacing
-from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.run_directory import read_run, write_run
+from tests.support.outcomes import typed
 
 STEPS = ("open", "os.", "shutil.")
 

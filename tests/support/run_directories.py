@@ -3,8 +3,9 @@
 import numpy as np
 
 from inputdesign_cli.outcome.curves import OptimalityCurves, SignalCurves
-from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.run_directory import write_run
+from tests.support.outcomes import typed
 
 
 def a_run(mark: str, *, optimality: bool = False) -> Results:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
-from inputdesign_cli.outcome.results import Results, Table, typed
+from inputdesign_cli.outcome.results import Results, Table
+from tests.support.outcomes import typed
 from tests.support.sweep_files import SPEC
 
 

@@ -1,0 +1,8 @@
+"""Outcomes that tests put together as plain data."""
+
+from inputdesign_cli.outcome import Outcome, read_plain
+
+
+def typed(result):
+    """Return the outcome that plain data stand for."""
+    return read_plain(Outcome, result)
