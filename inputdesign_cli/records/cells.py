@@ -28,7 +28,9 @@ _UNIT = re.compile(
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
 # Numbers with marks between thousands, or with a unit in the same cell.
-_MARKED = re.compile(r"[-+\u2212]?\d[\d.,'\u2019_ \u00a0\u202f]*[^\W\d]{0,5}[%°]?")
+_MARKED = re.compile(
+    r"[-+\u2212]?\d([\d.,'\u2019_ \u00a0\u202f]*\d)?\.?[ \u00a0\u202f]?[^\W\d]{0,5}[ \u00a0\u202f]?[%°]?"
+)
 # Whole numbers below a million, where a point may stand between thousands.
 _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
 _THOUSAND = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from inputdesign_cli.findings.copied_samples import SAMPLES_REPEATED
 from inputdesign_cli.findings.other_systems import contradictions, differences, repetitions
 from inputdesign_cli.identification.repeated import Repetition
 from inputdesign_cli.outcome.shares import chance
@@ -25,7 +26,8 @@ def test_samples_that_come_again_in_a_record_without_a_file_are_told():
 
 
 def test_files_with_rows_in_common_are_found_beside_no_repetition():
-    (found,) = repetitions(SimpleNamespace(repeated=None), (), ["a.csv and b.csv have rows in common"])
+    copies = [SAMPLES_REPEATED.found("a.csv and b.csv have rows in common", where="b.csv")]
+    (found,) = repetitions(SimpleNamespace(repeated=None), (), copies)
     assert (found.code, found.severity) == ("samples-repeated", "refuted")
 
 

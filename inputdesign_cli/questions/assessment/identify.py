@@ -238,7 +238,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
         *started(estimate),
         *on_the_circle(model, estimate),
         *speaking_against(task, found),
-        *hardly_explained(units, model, estimate),
+        *([] if stopped_at_ends(model, estimate) else hardly_explained(units, model, estimate)),
         *near_zero(model, estimate),
         *band_limited(model, estimate),
         *differences(estimate, [name for name, _ in found.data.files]),
