@@ -126,10 +126,10 @@ class Chosen:
 
 
 def ranked(usable: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """Return candidates, the one to take first, and those that simulate about as well as any.
+    """Return the candidates, the preferred one first, and the subset that simulates about equally well.
 
-    An input that answers the noise carries it, so that in a loop a wrong plant may simulate the output
-    better than the right one. Prediction errors do not err ([ljung-1999], Section 13.4).
+    In closed loop the input depends on the noise, so that a wrong plant may simulate the output better than
+    the right one. Prediction errors are free of this bias ([ljung-1999], Section 13.4).
     """
     error = min(100.0 - c.validation for c in usable)
     most, explained = max(_AS_GOOD * error, error + _POINTS), 1e4 - error**2

@@ -1,7 +1,7 @@
-"""Find outputs that drift along one line through all records, beside what the inputs do.
+"""Find outputs that drift along one line through all records, in addition to the response to the inputs.
 
-Taking lines away from u and y, each alone, would not do: the response of the plant to the input has a line of
-its own.
+Lines that are removed from u and y separately are no remedy: the response of the plant to the input
+contains a line of its own.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def _through(A: Array, samples: int) -> Array:
 
 
 def _means(x: Array, stretch: int) -> Array:
-    """Return means over stretches of so many samples, the last samples left out."""
+    """Return means over blocks of `stretch` samples; the samples after the last whole block are left out."""
     whole = len(x) // stretch * stretch
     return np.asarray(x[:whole].reshape(-1, stretch, x.shape[1]).mean(axis=1))
 

@@ -93,7 +93,7 @@ class Found:
 
 
 def _steady(taken: Sequence[Candidate], model: Model, samples: int) -> bool:
-    """Return whether a plant is stable, as far as so many samples show; an integrator is what it says."""
+    """Return whether a plant is stable, as far as `samples` samples show, or integrates by its structure."""
     return is_steady(model, samples) or any(c.orders.integrates for c in taken)
 
 
@@ -287,10 +287,11 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
-    """Return models of single outputs, of structures of one kind, as one model.
+    """Return one model that joins models of single outputs with structures of one kind.
 
     Args:
-        inputs: of the whole; those that are `moving` are those of the single models. Plants in s have all.
+        inputs: number of inputs of the joint model. Sampled single models have the `moving` ones only,
+            process models have all.
     """
     processes = [(c.orders, c.model.theta) for c in taken if c.orders.physical is True]
     if processes:

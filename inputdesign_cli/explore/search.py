@@ -1,6 +1,6 @@
-"""Find the structure that explains an output: estimated on one part of the record, judged on another.
+"""Find the structure that explains an output: estimated on one part of the record, validated on another.
 
-A sweep of regressions gives delays and orders. An autoregression of what it leaves whitens the noise, and a
+A sweep of regressions gives delays and orders. An autoregression of its residuals whitens the noise, and a
 second sweep of the whitened records gives starts. About a dozen structures are then estimated by output
 errors of the whitened records, which are prediction errors for that noise.
 """

@@ -62,11 +62,11 @@ class _Apart:
 
 @dataclass(frozen=True)
 class Distance:
-    """How far an estimate lies from the plant of the spec.
+    """The distance of an estimate from the plant of the spec.
 
     Attributes:
         listed: the parameters that are farthest, with their values and deviations.
-        worst: where G differs most; None where nothing has r_u.
+        worst: where G differs most; None if no error of G has an r_u.
     """
 
     nominal: Nominal

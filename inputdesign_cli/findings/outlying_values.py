@@ -220,9 +220,9 @@ def _usual_solution(columns: Array, wanted: Array) -> Array:
 
 
 def beyond_precision(name: str, x: Array) -> tuple[int, str, str] | None:
-    """Return the value of a signal x (n,), NaN where missing, whose square leaves double precision.
+    """Return the row of a value in x (n,) whose square leaves double precision, with message and hint.
 
-    With its message and hint; None where all squares stay within it, relative to each other too.
+    x is NaN where samples are missing. Return None if all squares stay in range, also relative to each other.
     """
     row, lost = int(np.nanargmax(np.abs(x))), absurd(x)
     size = abs(float(x[row]))

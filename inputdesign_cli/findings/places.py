@@ -18,7 +18,7 @@ _LISTED = 12
 
 
 class Recorded(Protocol):
-    """Outputs as they stand in the files; see `Recorded` of the data."""
+    """Outputs as the files contain them; see `Recorded` of the data."""
 
     @property
     def rows(self) -> NDArray[np.int64]:
@@ -46,7 +46,7 @@ class Samples(Protocol):
 
     @property
     def r(self) -> Array | None:
-        """(samples, r), the reference of a loop; None where it is not known."""
+        """Return the reference of a loop (samples, r), or None if it is not known."""
 
     @property
     def time(self) -> Array:

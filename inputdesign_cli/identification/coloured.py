@@ -1,8 +1,8 @@
-"""Estimates of models with noise that is coloured besides, or drifts: see `plant.coloured`.
+"""Estimate models with additional coloured noise, or with drift: see `plant.coloured`.
 
-The records are those of the plant; their prediction errors and all that depends on them go through
-D (1 - q^-1) / C. Starts of the plant are made from differences where the noise drifts, those of C and D from
-what the plant leaves.
+The records belong to the plant. Their prediction errors, and all that depends on them, go through
+D (1 - q^-1) / C. Starts of the plant are made from differences if the noise drifts. Starts of C and D are
+made from the residuals of the plant.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class ColouredRecord(OverRecord):
         return errors, psi
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """What the past adds to those of the plant, filtered, and by noise before the record through C/D."""
+        """Return the starts of the plant, filtered, and the effect of noise before the record through C/D."""
         return self._through(theta, self.record.starts(self._of_plant(theta), free=free))
 
     def _through(self, theta: Array, raw: Sequence[Start]) -> tuple[Start, ...]:
@@ -77,7 +77,7 @@ class ColouredRecord(OverRecord):
         return self.record.lateness(self._of_plant(theta))
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of the plant, and C and D."""
+        """Return the parameters on which the starts depend: in the plant, and all of C and D."""
         own = np.arange(len(self.structure.plant.parameters), self.size)
         return np.concatenate([self.record.in_starts(free=free), own])
 
@@ -152,12 +152,12 @@ class ColouredKind(OfModel):
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
-        """(k,): those of the plant."""
+        """Return `explaining` of the plant, with False for C and D (k,)."""
         return np.concatenate([self.plant.explaining, np.zeros(self._own, dtype=bool)])
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those of the plant, and C and D."""
+        """Return `whitening` of the plant, with True for C and D (k,)."""
         return np.concatenate([self.plant.whitening, np.ones(self._own, dtype=bool)])
 
     @property
@@ -165,7 +165,7 @@ class ColouredKind(OfModel):
         return len(self.model.own_parameters)
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has; those that several share count by their share."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
         taken = self.plant.own()
         for parameter in self.model.own_parameters:
             rows = [i for i, _ in parameter.places]
@@ -177,7 +177,7 @@ class ColouredKind(OfModel):
         return ColouredRecord(self.plant.record(u, y), self.model)
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Those of C and D; what the plant has of its own is not known behind filters."""
+        """Return the echoes of C and D, or None if the plant has its own: filtered, they are not known."""
         model, first = self.model.at(theta), len(self.model.plant.parameters)
         if self.plant.echoes(theta[:first], lengths) != ():
             return None
@@ -189,7 +189,7 @@ class ColouredKind(OfModel):
         return tuple(found)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Those of the plant, each with C and D from what it leaves, and the `given` one."""
+        """Return the starts of the plant, each with C and D from its residuals, and the `given` one."""
         first = len(self.model.plant.parameters)
         known = reduce(np.convolve, {tuple(p): p for p in self.model.fixed}.values())
         found = self.plant.starts(
@@ -204,7 +204,7 @@ class ColouredKind(OfModel):
         )
 
     def _noise(self, parts: Sequence[Part], theta: Array) -> Array:
-        """C and D from what the plant leaves of the first part; those common to outputs by their mean."""
+        """Return C and D from the plant's residuals in the first part; shared ones are means over outputs."""
         u, y = parts[0]
         errors, _ = self.plant.record(u, y).errors_and_gradient(theta)
         if not np.all(np.isfinite(errors)):
@@ -230,7 +230,7 @@ class ColouredKind(OfModel):
         return replace(self, plant=self.plant.holding(known[: len(self.model.plant.parameters)]))
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Those of the plant; the tests of many signals look at C and D."""
+        """Return the extensions of the plant; the tests of many signals look at C and D."""
         here = self.model.at(theta)
         of_plant = theta[: len(self.model.plant.parameters)]
         return tuple(
@@ -242,7 +242,7 @@ class ColouredKind(OfModel):
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """As the plant tells, of the errors and starts before they were filtered."""
+        """Return the simulation of the plant, by the errors and starts before they were filtered."""
         theta = found.point.theta[: len(self.model.plant.parameters)]
         shaped = self.model.at(found.point.theta).shaped
         at = np.cumsum(found.records.lengths)[:-1]

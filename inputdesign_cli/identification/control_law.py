@@ -1,7 +1,7 @@
-"""Do logged signals obey the controller that is known, u = r - C y, sample by sample?
+"""Test whether logged signals obey the known controller, u = r - C y, sample by sample.
 
-An input that is logged a sample late biases what is estimated in a loop, and no residual tells: the model
-takes the shift for a delay. The controller does tell, where the reference was logged too.
+An input that is logged a sample late biases estimates in closed loop. No residual shows it: the model takes
+the shift for a delay. The controller shows it if the reference was logged too.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _FEWEST = 20
 class Shift:
     """Signals `letter` of input `channel` obey the controller `lag` samples later (earlier, if negative).
 
-    `left` is what the law leaves of each as it is logged, and `then` when shifted: rms, over that of the
-    input.
+    `left` is the rms error of the control law as logged, `then` the one after the shift. Both are relative to
+    the rms of the input.
     """
 
     letter: str

@@ -28,18 +28,18 @@ _SAME = 0.99
 
 @dataclass(frozen=True)
 class Alternative:
-    """The model with one parameter more, which is zero in the model.
+    """The model with one additional parameter, which is zero in the model.
 
     Attributes:
         name: of the parameter; `phrase`, what it is, for a sentence.
-        fault: what is wrong where it is missing.
+        fault: what is wrong if it is missing.
         column: (N, p), minus the derivative of the prediction errors with respect to it.
         slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
             each state that a plant may be in.
         lag: whether it is a pole or a dead time of the plant.
-        echo: what past errors add to `column`; None where they add nothing.
-        estimated: makes the larger model from the same data, and the statistic of its likelihood ratio; None
-            where there is none.
+        echo: what past errors add to `column`; None if they add nothing.
+        estimated: returns the larger model from the same data, and the statistic of its likelihood ratio;
+            None if no larger model is estimated.
     """
 
     name: str
@@ -105,11 +105,11 @@ _Tried = tuple[Alternative, Array, Array]
 def directed_tests(
     white: White, alternatives: Sequence[Alternative], parameters: int, echoes: Echoes | None = None
 ) -> tuple[Directed, ...]:
-    """Return the test of every alternative; those that these data cannot distinguish share one.
+    """Return the test of every alternative; alternatives that these data cannot distinguish share one.
 
     Args:
         parameters: k of the model.
-        echoes: what past errors add to the gradients of parameters; None where that is not known.
+        echoes: what past errors add to the gradients of parameters; None if that is not known.
     """
     groups: list[list[_Tried]] = []
     for alternative in alternatives:

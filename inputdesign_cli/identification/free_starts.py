@@ -1,12 +1,12 @@
-"""Starts that nobody knows, eliminated from prediction errors (variable projection, and its determinant).
+"""Eliminate unknown starts from prediction errors (variable projection, and its determinant).
 
-Each acts on one output of one record alone. Their responses are made orthonormal there; only the weights of
-the errors tie the outputs together.
+Each start acts on one output of one record alone. Its responses are made orthonormal there; only the weights
+of the errors couple the outputs.
 
-The likelihood is that of what the starts leave open, [harville-1977]: unknowns are integrated over, not only
-estimated, which the determinant stands for. Without it a noise model with a zero on the unit circle, which
-forgets no start, would explain short records too well. Directions of what free unknowns cause before the
-inverse of the noise model are made orthonormal first, so that the measure is not one of the parameters.
+The likelihood is the restricted one, [harville-1977]. The unknowns are integrated over, not only estimated,
+which adds the determinant. Without it a noise model with a zero on the unit circle, which forgets no start,
+would explain short records too well. Responses to free unknowns before the inverse of the noise model are
+made orthonormal first, so that the measure does not depend on the parameters.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ class Elimination(NamedTuple):
 
 @dataclass(frozen=True)
 class _Basis:
-    """What one start of N samples can explain: orthonormal directions (N + n, m + n).
+    """Orthonormal directions (N + n, m + n) of all errors that one start of N samples can explain.
 
     Attributes:
         coefficients: (K, m + n), of its unknowns for each direction.
         span: (N, m), of the disturbance that free unknowns cause, orthonormal; `by` (K, m) of these.
         inverse: of the factor R of Z = Q R, Z being the responses to directions of `span` and past noise.
-        determinant: log det Z^T Z; `of_noise`, the same of past noise alone.
+        determinant: log det Z^T Z; `of_noise`, the one of past noise alone.
     """
 
     directions: Array
@@ -94,7 +94,7 @@ class _Block(NamedTuple):
 
 @dataclass(frozen=True)
 class FreeStarts:
-    """The starts of records of these `lengths`; those of the longest, output by output.
+    """The starts of records of these `lengths`; `starts` has the longest record's, output by output.
 
     Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
     as large as an error each, they are errors of their own.
@@ -120,7 +120,7 @@ class FreeStarts:
 
     @cached_property
     def unknowns(self) -> int:
-        """Number m of free unknowns, those that are the same as others left out."""
+        """Return the number m of free unknowns, without linearly dependent ones."""
         return sum(block.basis.span.shape[1] for block in self._blocks)
 
     @cached_property
@@ -138,7 +138,7 @@ class FreeStarts:
         return sum(block.basis.of_noise for block in self._blocks)
 
     def slopes(self, starts: Sequence[Start]) -> Array:
-        """(parts,): the derivatives of the terms of the determinant, given those of the starts."""
+        """Return the derivatives (parts,) of the determinant's terms from the derivatives of the starts."""
         zeros = [float(start.zeros) for start in starts]
         own = {
             (length, i): basis.slope(starts[i].cropped(length)) for (length, i), basis in self._bases.items()
@@ -248,7 +248,7 @@ class FreeStarts:
 
 
 def _orthonormal(start: Start) -> _Basis:
-    """The directions of one start, those of free unknowns that are the same as others left out."""
+    """Return the directions of one start, without linearly dependent free unknowns."""
     norm = np.linalg.norm(start.disturbance, axis=1)
     scale = np.where(norm > 0.0, norm, np.inf)  # a start that no output shows is left at zero
     span, s, V = np.linalg.svd(start.disturbance.T / scale, full_matrices=False)

@@ -1,10 +1,10 @@
-"""The frequency response of a plant from data alone, without a model, and how far to trust it.
+"""Estimate the frequency response of a plant from data alone, without a model, and its uncertainty.
 
-From inputs that repeat, line by line: the mean of the periods, and their scatter ([pintelon-schoukens-2012],
-Section 2.5). From others by a local polynomial: around each frequency, responses and the leakage of start and
-end are parabolas, fitted to a few lines of the Fourier transforms (the same, Section 7.3). A parabola does
-not follow the phase of a long dead time: where one is known, inputs are delayed by it first. Signals x from
-outside, such as the reference of a loop, are instruments: G is the response to x of y over that of u.
+If the inputs repeat, it follows line by line from mean and scatter of the periods ([pintelon-schoukens-2012],
+Section 2.5). Otherwise a local polynomial is used (Section 7.3): around each frequency, responses and the
+leakage of start and end are parabolas, fitted to a few lines of the Fourier transforms. A parabola does not
+follow the phase of a long dead time: if one is known, inputs are delayed by it first. Signals x from outside,
+for example the reference of a loop, are instruments: G is the response of y to x over the response of u.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class FrequencyResponse:
         frequency: (n,), rad/sample.
         G: (n, p, r).
         radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
-        noise: (n, p): the spectrum of what the inputs do not explain; that of white noise is its variance.
+        noise: (n, p): the spectrum of the unexplained part of y; for white noise it is the variance.
         coherence: (n, p): the share of the spectrum of y that the inputs explain.
         method: how it was estimated.
     """
@@ -76,14 +76,13 @@ def frequency_response(
     lengths: Sequence[int] | None = None,
     delays: Callable[[int], NDArray[np.int64]] | None = None,
 ) -> FrequencyResponse | None:
-    """From records that follow each other; None where they are too short or excite no frequency enough.
+    """Return the response from consecutive records; None if they are too short or excite no frequency enough.
 
     Args:
         u, y: (N, r), (N, p).
-        x: (N, r), what excites from outside; None: u itself, which then must not answer y.
-        delays: of records of so many samples, those by which inputs are thought to act late, (p, r). They
-            are tried where they turn the phase fast, and kept where they leave less unexplained; not with
-            signals from outside.
+        x: (N, r), the external excitation; None: u itself, which then must not depend on y.
+        delays: gives presumed delays of the inputs (p, r) for records of a number of samples. They are tried
+            if they turn the phase fast, and kept if less remains unexplained; not with external signals.
     """
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
@@ -159,7 +158,7 @@ def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
 
 
 def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
-    """What periods of so many samples gave, with discs of confidence."""
+    """Return the response from periods of `period` samples, with discs of confidence."""
     return FrequencyResponse(
         2.0 * np.pi * found.harmonics / period,
         found.G,
@@ -256,10 +255,10 @@ def _centres(samples: int) -> Array:
 def _at(
     w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int, terms: int
 ) -> tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
-    """G (p, r) and its radius, noise and coherence (p,) at w; None where inputs cannot be told apart.
+    """Return G (p, r), its radius, noise and coherence (p,) at w; None if inputs are not separable.
 
     Args:
-        terms: of the polynomials.
+        terms: the number of terms of the polynomials.
     """
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):

@@ -1,9 +1,9 @@
-"""Does a sensor stand still? Then samples are equal where noise, or the input, would move them.
+"""Detect a sensor that stands still: its samples are equal although noise, or the input, would move them.
 
 An innovation of standard deviation s falls into a cell of width d, wherever it lies, with a probability of at
-most d f / s, where f is the largest density of usual noise. So many equal samples in a row are beyond chance
-where that is small. Where rounding hides the noise, the model tells: it moves by more than a cell and its own
-errors while the sensor does not.
+most d f / s, where f is the largest density of usual noise. If that is small, a row of equal samples is
+beyond chance. If rounding hides the noise, the model decides: it moves by more than a cell and its own errors
+while the sensor does not.
 """
 
 from __future__ import annotations

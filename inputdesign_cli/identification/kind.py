@@ -64,10 +64,10 @@ class Kind(Protocol):
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those that make residuals look whiter."""
+        """Return the mask (k,) of the parameters that make residuals look whiter."""
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has; those that n outputs share count as 1/n."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
 
     def record(self, u: Array, y: Array) -> Record:
         """Samples u (N, r), y (N, p) that the structure is to explain."""
@@ -76,7 +76,7 @@ class Kind(Protocol):
         """Where to begin: points made from records at rest about zero, and the `given` one (k,)."""
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
-        """The same, with starts that keep the known (k,) of its parameters where they know how to."""
+        """Return the kind with starts that keep `known` parameters (k,), if its starts can do that."""
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """What the structure at theta (k,) would become by one parameter more.
@@ -109,13 +109,13 @@ def identify_records(
     near: bool = False,
     ramp: bool = False,
 ) -> Estimate:
-    """The maximum-likelihood estimate of a structure from one record, or jointly from several.
+    """Return the maximum-likelihood estimate of a structure from one record, or jointly from several.
 
     Args:
-        kind: of which names, orders and delays are those of the estimate; numbers are not used.
+        kind: gives names, orders and delays; its numbers are not used.
         u, y: (N, r), (N, p).
         start: (k,), tried besides starts that are made from the data.
-        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
         earlier: an estimate from other data, which counts along.
@@ -194,10 +194,10 @@ def fit_records(records: Sequence[Records], start: Array, steps: Array, own: Arr
 
 
 def fit_batches(kind: Kind, u: ArrayLike, y: ArrayLike, start: ArrayLike) -> BatchEstimate:
-    """The same, of records as arrays.
+    """Estimate many records, given as arrays, each from a single start and without checks.
 
     Args:
-        kind: of which the structure is meant.
+        kind: gives the structure.
         u: (N, r) common to all runs, or (runs, N, r).
         y: (runs, N, p).
         start: (k,) for all runs, or (runs, k).

@@ -1,9 +1,9 @@
-"""Does an output shift and stay where it is, though no input does that, as after a change of load?
+"""Detect an output that shifts and stays there without a cause in the inputs, as after a change of load.
 
-What shifts is a step, or one that a lag makes smooth, from any sample on until the record ends
-([tsay-1988]). Scores of all of them are correlations of the residuals with one response: a test for every
-sample costs no more than a few transforms. A test of trends, which shares its power among many signals,
-hardly notices what has happened once; and what the estimate makes of it is another gain and slower dynamics.
+The shift is a step, or a step smoothed by a lag, from any sample on until the record ends ([tsay-1988]).
+Scores of all of them are correlations of the residuals with one response: a test for every sample costs no
+more than a few transforms. A test of trends shares its power among many signals, and hardly notices a single
+event. The estimate takes the shift for another gain and slower dynamics.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class LevelShift:
         begins, ends: between these samples it likely begins and has settled, the last left out.
         rises: whether the output is larger after it.
         test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-        score: the statistic of the score, which is smaller; so many `looks` it was the largest of.
-        alone: whether it explains more than a line through its record does, or single samples beside it do.
+        score: the statistic of the score, which is smaller; it is the largest of `looks` statistics.
+        alone: whether it explains more than a line through its record, or single samples next to it.
     """
 
     output: int
@@ -92,7 +92,7 @@ def level_shifts(
 
 
 def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
-    """The probability of so many shifts together, by the likelihood ratio and by the score."""
+    """Return the probability that all these shifts are chance, by the likelihood ratio and by the score."""
     looks = shifts[0].looks
     return (
         _by_chance([shift.test.statistic for shift in shifts], looks),
@@ -101,7 +101,7 @@ def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
 
 
 def _by_chance(statistics: Sequence[float], looks: int) -> float:
-    """That of a sum of statistics, each the largest of so many."""
+    """Return the probability of a sum of statistics as large, each the largest of `looks`."""
     size = len(statistics)
     return min(float(looks) ** size * float(scipy.special.chdtrc(size, sum(statistics))), 1.0)
 

@@ -63,7 +63,7 @@ class Whitening:
 
     @classmethod
     def of(cls, errors: Array, lengths: tuple[int, ...]) -> Whitening:
-        """Return those of residuals (N, p): autoregressions, of the orders that BIC prefers."""
+        """Return the filters for residuals (N, p): autoregressions, of the orders that BIC prefers."""
         return cls(tuple(_autoregression(v, lengths) for v in errors.T), lengths)
 
     def through(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:

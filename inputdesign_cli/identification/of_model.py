@@ -77,14 +77,14 @@ class OverRecord:
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
-        """Those of the other, whose parameters come first."""
+        """Return the dead times of the inner record, whose parameters come first."""
         return self.record.dead_times
 
     def crossings(self, theta: Array) -> Array:
-        """Those of the other."""
+        """Return the crossings of the inner record, with zeros for further parameters."""
         own = self.record.crossings(theta[: self.record.size])
         return np.pad(own, ((0, 0), (0, 0), (0, theta.size - self.record.size)))
 
     def remembering(self, late: int) -> Self:
-        """The same, with a record that does."""
+        """Return the record with free responses of its inner record, which last `late` samples."""
         return replace(self, record=self.record.remembering(late))

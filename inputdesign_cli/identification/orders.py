@@ -58,7 +58,7 @@ class Polynomials:
 class OutputOrders:
     """Orders of one output: A y = sum_j (B_j / F_j) u_j + (C / D) e; entries that are zero are left out.
 
-    theta is ordered as a1.., the coefficients of B entry by entry, c1.., d1.., those of F.
+    theta is ordered as a1.., the coefficients of B entry by entry, c1.., d1.., the coefficients of F.
     """
 
     a: int

@@ -36,7 +36,7 @@ class PolynomialRecord:
 
     @cached_property
     def problem(self) -> PredictionErrors:
-        """The same as a problem of one run, from rest."""
+        """Return the record as a problem of one run, from rest."""
         return self.structure.problem(self.u[None], self.y[None])
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -80,7 +80,7 @@ class PolynomialRecord:
         return self
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of C and D; of F as well if the states are free."""
+        """Return the indices of the coefficients of C and D; of F as well if the states are free."""
         found = [
             place[block.columns]
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)

@@ -73,14 +73,14 @@ class PredictionErrors:
         return len(self.y) * self.y[0].shape[0]
 
     def kept(self, runs: NDArray[np.bool_]) -> PredictionErrors:
-        """The same with some of the runs only."""
+        """Return the problem with some of the runs only."""
         u, y = (tuple(x[:, runs] for x in signals) for signals in (self.u, self.y))
         return replace(self, u=u, y=y)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta (runs, k) with the roots of C, D and F mirrored into the unit circle where they leave it.
+        """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
 
-        Roots of F that are exactly one are those of integrators, and stay.
+        Roots of F that are exactly one belong to integrators, and stay.
         """
         theta = theta.copy()
         for letter, columns in self._monic:

@@ -28,11 +28,11 @@ _EXACT = 1e-20
 
 @dataclass(frozen=True)
 class Point:
-    """Records at theta (k,): their errors and gradient, W (p, p), cost.
+    """Errors, gradient, weights W (p, p) and cost of records at theta (k,).
 
     Attributes:
-        known: (k, k), half the Hessian of what is known from an earlier estimate and of what integrating over
-            unknown starts adds; `towards` (k,), minus half the gradient.
+        known: (k, k), half the Hessian of the terms of an earlier estimate and of integrating over unknown
+            starts; `towards` (k,), minus half their gradient.
     """
 
     theta: Array
@@ -65,7 +65,7 @@ class Point:
         return np.asarray(self._weighed(every) @ every.reshape(len(every), -1).T + self.known)
 
     def against(self, regressors: NDArray[np.float64]) -> Array:
-        """(k, k): the same with regressors phi (k, N, p) in place of one psi; none of past noise."""
+        """Return `hessian` (k, k) with regressors phi (k, N, p) for one psi, and without past noise."""
         return np.asarray(self._weighed(self.psi) @ regressors.reshape(len(regressors), -1).T + self.known)
 
     @property

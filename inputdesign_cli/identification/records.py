@@ -61,7 +61,7 @@ class Record(Protocol):
         """(m, 2, k): steps of a dead time to sampling instants, kinks of the cost, and half a sample on."""
 
     def remembering(self, late: int) -> Self:
-        """The same, with free responses of inputs before it that act for so many samples."""
+        """Return the record with free responses to inputs before it, which act for `late` samples."""
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
         """The parameters on which the starts depend."""

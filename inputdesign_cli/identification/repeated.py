@@ -1,13 +1,13 @@
-"""Were samples recorded once and given twice? Then prediction errors of different times follow each other.
+"""Detect samples that were recorded once and given twice: their prediction errors repeat.
 
-Errors of different times are independent if the model is right, and so is every other copy of the noise: only
-the same noise, also where it was rounded, shifted or scaled, comes again. Where the model is wrong errors are
-coloured, and slow ones follow each other by chance; and inputs that come again bring the same errors. So what
-past errors and the inputs explain is taken off first, by an autoregression with inputs.
+If the model is right, errors of different times are independent. Only a copy of the same noise, even rounded,
+shifted or scaled, repeats. If the model is wrong, errors are coloured, and slow ones follow each other by
+chance. Inputs that repeat bring the same errors, too. So the part that past errors and the inputs explain is
+taken off first, by an autoregression with inputs.
 
-A controller makes u(t) from y(t), so that u(t) tells e(t): what is left beside it are steps of the reference,
-which come again. In a loop only past inputs count, therefore. Without one u(t) may act at once; since a loop
-may be unknown, samples are given twice if they come again both beside u(t) and without it.
+A controller makes u(t) from y(t), so that u(t) contains e(t). A regression on u(t) then leaves steps of the
+reference, which repeat. So in a loop only past inputs count. Without a loop u(t) may act at once. Since a
+loop may be unknown, samples are given twice only if they repeat both with u(t) as regressor and without it.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ class Repetition:
 
 
 def repetition(errors: Array, inputs: Array | None = None, *, feedback: bool = False) -> Repetition | None:
-    """The longest stretch of errors (samples, p) that comes again; None where none does.
+    """Return the longest stretch of errors (samples, p) that repeats, or None if none does.
 
     Args:
         inputs: (samples, r), of the same times.
-        feedback: Whether the inputs were made from the outputs.
+        feedback: whether the inputs were made from the outputs.
     """
     spread = np.median(np.abs(errors), axis=0) / NORMAL
     samples = len(errors)
@@ -74,7 +74,7 @@ def _again(e: Array) -> Repetition | None:
 
 
 def whitened(x: Array) -> Array:
-    """What an autoregression leaves of a signal (N,), by the equations of Yule and Walker."""
+    """Return the residuals of an autoregression of a signal (N,), by the equations of Yule and Walker."""
     order = min(_ORDER, x.size // 10)
     x = x - x.mean()
     products = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, 2 * x.size)) ** 2, 2 * x.size)[: order + 1]

@@ -1,6 +1,6 @@
-"""Is what the model leaves unexplained white, and free of the past input? [ljung-1999], Section 16.6.
+"""Test whether residuals are white, and independent of past inputs. [ljung-1999], Section 16.6.
 
-Of several outputs all channels are tested at once, in units of the residuals' own covariance.
+For several outputs all channels are tested at once, in units of the residuals' own covariance.
 """
 
 from __future__ import annotations

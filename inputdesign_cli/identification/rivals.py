@@ -1,7 +1,7 @@
-"""Other minima that explain the data nearly as well as the best one.
+"""Find other minima that explain the data nearly as well as the best one.
 
-A dead time that was excited at a few frequencies is known only up to whole periods; near-equal minima then
-stand far apart, and the covariance tells of one of them alone.
+A dead time that was excited at a few frequencies is known only up to whole periods. Near-equal minima then
+stand far apart, and the covariance describes one of them alone.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def is_near(records: Records, point: Point, theta: Array, excess: float) -> bool
 
 
 def excess_of(records: Records, point: Point, cost: float) -> float:
-    """What parameters of a `cost` have more in -2 log likelihood than those of a point."""
+    """Return by how much -2 log likelihood at parameters of a `cost` exceeds its value at a point."""
     if records.weights is not None:
         return cost - point.cost
     return point.near.freedom * float(np.log(cost / point.cost))

@@ -1,8 +1,8 @@
-"""What nobody knows of the past of a record: its level, the states of the plant, the noise before it.
+"""Describe the unknown past of a record: its level, the states of the plant, the noise before it.
 
-Level and states are unknown numbers. The noise before a record is as random as that in it: of stationary
-noise C/D e, what it adds later has a covariance that C and D tell ([ljung-1999], Section 10.5, on initial
-conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihood).
+Level and states are unknown numbers. The noise before a record is as random as the noise in it. For
+stationary noise C/D e, its later effect has a covariance that C and D determine ([ljung-1999], Section 10.5,
+on initial conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihood).
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def differences(above: Sequence[Start], below: Sequence[Start], span: float) -> 
 
 
 def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
-    """(n, samples): what stationary noise C/D e before a record adds to (D/C) of what is in it.
+    """Return what stationary noise C/D e before a record adds to (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
     first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values

@@ -34,7 +34,7 @@ def starting_points(row: OutputOrders, u: Sequence[Array], y: Array) -> Array:
 
 
 def _nearly_cancelling(row: OutputOrders, theta: Array) -> list[Array]:
-    """The same with C and D that nearly cancel, at low or at high frequency: often minima of their own."""
+    """Return `theta` with C and D that nearly cancel, at low and at high frequency: often separate minima."""
     C, D = (row.by_letter[letter][0] for letter in "cd")
     points = []
     for sign in (1.0, -1.0) if row.c and row.d else ():

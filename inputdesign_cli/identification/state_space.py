@@ -130,15 +130,15 @@ class StateSpaceRecord:
         return np.flatnonzero([letter == DELAY for letter, _, _ in self.structure.entries])
 
     def crossings(self, theta: Array) -> Array:
-        """Those of its dead time."""
+        """Return the crossings of its dead time."""
         return crossings_of(theta, self.dead_times, self.structure.at(theta).sample_time or 1.0, len(self.y))
 
     def remembering(self, late: int) -> Self:
-        """The same, where unknown inputs act for so many samples."""
+        """Return the record with free responses to inputs before it, which act for `late` samples."""
         return replace(self, late=late)
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of A, C and K; of B where it is no matter of course which way inputs push the states."""
+        """Return the indices of entries in A, C and K; of B and delays too if few inputs push many states."""
         if not (free or self._coloured):
             return np.zeros(0, dtype=np.int64)
         pushed = free and self.late > 0 and self.structure.order > 2 * self.structure.inputs
@@ -206,7 +206,7 @@ class StateSpaceKind(OfModel):
 
     @cached_property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those in H."""
+        """Return the mask (k,) of the parameters of the noise model H."""
         coloured = bool(np.any(self.model.matrices.K))
         return np.array(
             [letter == "K" or (coloured and letter in "AC") for letter, _, _ in self.model.entries],

@@ -68,7 +68,7 @@ class Structure:
         return max(row.memory for row in self.rows)
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has, those that n outputs share counted as 1/n."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
         shared = np.bincount(np.concatenate(self.places), minlength=self.size)
         return np.array([float(np.sum(1.0 / shared[place])) for place in self.places])
 
