@@ -20,7 +20,7 @@ from inputdesign_cli.explore.processes import Process
 from inputdesign_cli.explore.sweep import Sweep, delay_ranges
 from inputdesign_cli.plant import Model
 
-# An error of simulation that is larger by less than this share, or by so many points, is as good, if it
+# An error of simulation that is larger by less than this factor, or these points, is as good, if it
 # explains almost as much of the variance of the output.
 _AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
 # The largest deviation of a parameter of the plant, in shares of its value.

@@ -16,7 +16,7 @@ from inputdesign_cli.plant.filtering import filtered
 _HIGHEST = 3
 # Of longer records means over stretches give a slope as well: a line is slow.
 _MOST_SAMPLES = 1500
-# A line counts that is so many deviations from none, and rises by that many times the scatter about it.
+# A line counts if its slope is _CERTAIN deviations from zero, and it rises by _RISES times its scatter.
 _CERTAIN, _RISES = 5.0, 1.0
 # A root of the noise that fades by fewer time constants within the records may be that of a random walk,
 # whose residuals look so beside all that was estimated.

@@ -27,7 +27,7 @@ NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgErro
 
 _BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
-# A mode that loses less than this over the whole record cannot be told from one on the stability limit.
+# A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 
 

@@ -34,9 +34,9 @@ from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.plant import Model, PolynomialModel
 
 _MOST_SAMPLES = 10_000
-# So many structures of each output are tried where the first cannot be estimated from the whole record.
+# Structures of each output that are tried if the first cannot be estimated from the whole record.
 _MOST_TRIED = 3
-# A line of each of so many records is estimated along; of more it counts as known.
+# Lines are estimated together with the model up to this number of records; beyond it they count as known.
 _MOST_LINES = 3
 
 

@@ -46,7 +46,7 @@ _MOST_SAMPLES = 4000
 _HIGHEST, _HIGHEST_ARX, _ARX_KEPT = 5, 8, 2
 # Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
 _PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
-# A dead time may settle so many samples beyond those of the sweep, and at so many times the longest one.
+# A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
 _SETTLES, _RUN_OFF = 5, 2
 
 

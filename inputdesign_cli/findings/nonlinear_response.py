@@ -60,17 +60,17 @@ class Distorted:
 
     @property
     def line(self) -> int:
-        """The line of the largest share."""
+        """Return the line of the largest share."""
         return int(np.argmax(self.shares))
 
     @property
     def share(self) -> float:
-        """The largest share."""
+        """Return the largest share."""
         return float(self.shares[self.line])
 
     @property
     def matters(self) -> bool:
-        """Whether it may decide on what is met."""
+        """Return whether the share is large enough to affect a verdict."""
         return self.share >= MATTERS
 
 

@@ -160,7 +160,7 @@ def _far(x: Array) -> NDArray[np.bool_]:
 
 
 def _alone(x: Array) -> NDArray[np.bool_]:
-    """Whether a value is far from the median of the five about it."""
+    """Return whether a value is far from the median of the five about it."""
     found = np.zeros(x.size, dtype=bool)
     if x.size >= _SHORTEST:
         off = np.abs(x[2:-2] - np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1))
@@ -192,7 +192,7 @@ def _caused(u: Array, y: Array) -> Array:
 
 
 def _unforeseen(x: Array, suspected: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the suspected values are far from the prediction by an autoregression of the others."""
+    """Return which of the suspected values are far from the prediction by an autoregression of the others."""
     order = min(_ORDER, x.size // (2 * _PER_LAG))
     spread = spread_of(x)
     if order == 0 or spread == 0.0 or not np.any(suspected):

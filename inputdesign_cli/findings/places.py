@@ -54,11 +54,11 @@ class Samples(Protocol):
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """The samples of each stretch without gaps."""
+        """Return the samples of each stretch without gaps."""
 
     @property
     def files(self) -> tuple[tuple[str, int], ...]:
-        """The name of each file and its samples."""
+        """Return the name of each file and its samples."""
 
     @property
     def recorded(self) -> Recorded | None:

@@ -34,7 +34,7 @@ _GROWTH = 1.35
 _FARTHEST = 400
 _AHEAD = 20
 _TRENDS, _WAVES = 3, 4
-# Of each residual at most one direction in so many is tried.
+# At most one direction per this number of residuals is tried.
 _SAMPLES_A_DIRECTION = 8
 
 Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feedback"]
@@ -209,7 +209,7 @@ def robust_white(
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
     trend = _trend(records, point.theta).white(white)
-    # Few regressors first: what many explain of right residuals correlates those that are left.
+    # Few regressors first: many explain a part of right residuals, which correlates the rest.
     if any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend]))):
         return None
     whitening = Whitening.of(white.without(columns).errors, records.lengths)
@@ -302,13 +302,13 @@ def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
 def _lagged(
     records: Records, x: NDArray[np.float64], lags: Sequence[int]
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Signals x (p, N, m) at every lag, (p, N, lags m), and the lag of each."""
+    """Return signals x (p, N, m) at every lag, (p, N, lags m), and the lag of each."""
     parts = [shifted(x.swapaxes(0, 1), lag, records.lengths).swapaxes(0, 1) for lag in lags]
     return np.concatenate(parts, axis=2), tuple(lag for lag in lags for _ in range(x.shape[2]))
 
 
 def _bins(first: int, last: int, most: int) -> list[tuple[int, int]]:
-    """Lags from `first` on, one by one and then in ever longer runs: first and one past the last."""
+    """Return lags from `first` on, one by one and then in ever longer runs: first and one past the last."""
     bins: list[tuple[int, int]] = []
     begin, width = first, 1.0
     while begin < last and len(bins) < most:

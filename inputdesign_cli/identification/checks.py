@@ -23,7 +23,7 @@ _SAMPLES_A_PARAMETER = 3
 
 
 def signal_name(letter: str, channel: int, channels: int) -> str:
-    """How the signal of a channel is called in messages: `u2`, or `u` where it is the only one."""
+    """Return how the signal of a channel is called in messages: `u2`, or `u` where it is the only one."""
     return letter if channels == 1 else f"{letter}{channel + 1}"
 
 

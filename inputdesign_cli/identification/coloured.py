@@ -39,11 +39,11 @@ class ColouredRecord(OverRecord):
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.structure.parameters)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Prediction errors (N, p) from rest, and psi (k, N, p)."""
+        """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
         model = self.structure.at(theta)
         raw, of_plant = self.record.errors_and_gradient(self._of_plant(theta))
         errors, psi = np.empty(raw.shape), np.zeros((self.size, *raw.shape))
@@ -63,7 +63,7 @@ class ColouredRecord(OverRecord):
         return self._through(theta, self.record.starts(self._of_plant(theta), free=free))
 
     def _through(self, theta: Array, raw: Sequence[Start]) -> tuple[Start, ...]:
-        """The starts of the plant filtered, with noise before the record."""
+        """Return the starts of the plant filtered, with noise before the record."""
         found = []
         for start, (D, C) in zip(raw, self.structure.at(theta).inverse_filters, strict=True):
             through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
@@ -73,7 +73,7 @@ class ColouredRecord(OverRecord):
         return tuple(found)
 
     def lateness(self, theta: Array) -> int:
-        """That of the plant."""
+        """Return the lateness of the plant's record."""
         return self.record.lateness(self._of_plant(theta))
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
@@ -82,7 +82,7 @@ class ColouredRecord(OverRecord):
         return np.concatenate([self.record.in_starts(free=free), own])
 
     def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """The derivatives of the starts: of C and D by central differences."""
+        """Return the derivatives of the starts: of C and D by central differences."""
         plant, of_plant = self._of_plant(theta), len(self.structure.plant.parameters)
         filters = self.structure.at(theta).inverse_filters
         found: dict[int, tuple[Start, ...]] = {}
@@ -104,17 +104,17 @@ class ColouredRecord(OverRecord):
         return [found[index] for index in indices]
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p): none; no instruments are used."""
+        """Return zeros (k, N, p): no instruments are used."""
         return np.zeros((self.size, *errors.shape))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): signals (N, m) through the inverse of each output's noise model."""
+        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
         raw = self.record.whitened(self._of_plant(theta), signals)
         filters = self.structure.at(theta).inverse_filters
         return np.array([filtered(*own, x, axis=0) for own, x in zip(filters, raw, strict=True)])
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with a stable predictor."""
+        """Return theta with a stable predictor."""
         first = len(self.structure.plant.parameters)
         out = theta.copy()
         out[:first] = self.record.stabilised(theta[:first])
@@ -126,7 +126,7 @@ class ColouredRecord(OverRecord):
 
     @cached_property
     def _monic(self) -> list[NDArray[np.int64]]:
-        """Where the coefficients of each C, and of each D that is estimated, stand in theta."""
+        """Return where the coefficients of each C, and of each D that is estimated, stand in theta."""
         groups: dict[tuple[str, tuple[tuple[int, int], ...]], list[int]] = {}
         for index, parameter in enumerate(self.structure.parameters):
             own = index >= len(self.structure.plant.parameters)
@@ -147,7 +147,7 @@ class ColouredKind(OfModel):
 
     @property
     def recent(self) -> int:
-        """The lag up to which the structure looks at the inputs."""
+        """Return the lag up to which the structure looks at the inputs."""
         return self.plant.recent
 
     @property
@@ -173,7 +173,7 @@ class ColouredKind(OfModel):
         return taken
 
     def record(self, u: Array, y: Array) -> ColouredRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
         return ColouredRecord(self.plant.record(u, y), self.model)
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
@@ -226,7 +226,7 @@ class ColouredKind(OfModel):
         )
 
     def holding(self, known: NDArray[np.bool_]) -> ColouredKind:
-        """The same; the plant keeps what it knows."""
+        """Return the kind whose plant keeps the known parameters."""
         return replace(self, plant=self.plant.holding(known[: len(self.model.plant.parameters)]))
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
@@ -265,5 +265,5 @@ def _of_plant(records: Records, plant: Kind) -> tuple[Record, ...]:
 
 
 def _clear(known: Array, signals: Array) -> Array:
-    """Signals (N, ..) through a polynomial, without the samples that it begins with."""
+    """Return signals (N, ..) through a polynomial, without the samples that it begins with."""
     return filtered(known, [1.0], signals, axis=0)[known.size - 1 :]

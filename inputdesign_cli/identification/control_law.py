@@ -15,7 +15,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import TransferMatrix
 
 _LAGS = (-2, -1, 1, 2)
-# Another lag holds where it leaves this share of what the signals as they are leave, and of the input itself.
+# Another lag holds if its error is below these shares of the error as logged, and of the input itself.
 _BETTER, _GOOD = 0.1, 0.3
 _FEWEST = 20
 
@@ -59,7 +59,7 @@ def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: S
 def _left(
     controller: TransferMatrix, i: int, parts: Sequence[tuple[Array, ...]], lags: Mapping[str, int]
 ) -> float:
-    """The rms of q u - q r + P y of an input over that of q u, the signals in `lags` moved."""
+    """Return the rms of q u - q r + P y of an input over that of q u, the signals in `lags` moved."""
     most = max(map(abs, _LAGS))
     P, q = controller.numerator[i], controller.denominator[i]
     memory = max(P.shape[1], len(q)) - 1

@@ -44,7 +44,7 @@ def cubes(
     *,
     repeats: int = 1,
 ) -> Cubes:
-    """From records (N, r) and (N, p) with odd harmonics (n,) that are silent.
+    """Return the cubes from records (N, r) and (N, p) with odd harmonics (n,) that are silent.
 
     Args:
         model: a rough G at the lines of `found` and at the silent ones, which the measured one is carried by.
@@ -69,12 +69,12 @@ def cubes(
 
 
 def _transforms(signal: Array, periods: Periods, repeats: int) -> ComplexArray:
-    """(blocks, periods, harmonics, channels) of all records together."""
+    """Return the transforms of all records (blocks, periods, harmonics, channels)."""
     return np.concatenate([periods.transforms(one) for one in np.split(signal, repeats)], axis=1)
 
 
 def _mean(signal: Array, periods: Periods, repeats: int) -> ComplexArray:
-    """(harmonics, channels, blocks) about the level."""
+    """Return mean transforms (harmonics, channels, blocks), with the level zero."""
     mean = np.moveaxis(_transforms(signal, periods, repeats).mean(axis=1), 0, -1)
     mean[0] = 0.0
     return mean
@@ -88,13 +88,13 @@ def _only(Y: ComplexArray, lines: NDArray[np.int_]) -> ComplexArray:
 
 
 def _cubed(X: ComplexArray, period: int) -> ComplexArray:
-    """The transforms of the cubes of signals, harmonics first."""
+    """Return the transforms of the cubes of signals, harmonics first."""
     signal = np.fft.irfft(X * period, period, axis=0)
     return np.asarray(np.fft.rfft(signal**3, axis=0) / period)
 
 
 def _through(G: ComplexArray, cubed: ComplexArray) -> list[ComplexArray]:
-    """For each of r inputs (n, p, blocks): what outputs have of its cube (n, r, blocks)."""
+    """Return the effect of the cube of each of r inputs on the outputs (n, p, blocks)."""
     return [G[:, :, j, None] * cubed[:, None, j] for j in range(cubed.shape[1])]
 
 

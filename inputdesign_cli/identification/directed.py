@@ -20,7 +20,7 @@ from inputdesign_cli.plant import Model
 
 # A parameter of whose effect the estimate explains all but this share is not tried.
 _EXPLAINED = 1e-6
-# A score of a larger probability is the last word. A mean of less than so many deviations is none.
+# A score of a larger probability is final. A mean below this number of deviations counts as zero.
 _OPEN, _LITTLE = 0.3, 0.1
 # Directions with a larger cosine are one.
 _SAME = 0.99
@@ -53,7 +53,7 @@ class Alternative:
 
     @property
     def of_structure(self) -> bool:
-        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        """Return whether the parameter belongs to a larger structure, not to a varying gain."""
         return self.fault in ("plant", "noise")
 
 
@@ -78,12 +78,12 @@ class Directed:
 
     @property
     def of_structure(self) -> bool:
-        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        """Return whether the parameter belongs to a larger structure, not to a varying gain."""
         return self.test.fault in ("plant", "noise")
 
     @property
     def lag(self) -> bool:
-        """Whether one of the parameters that act alike is a pole or a dead time of the plant."""
+        """Return whether one of the parameters that act alike is a pole or a dead time of the plant."""
         return any(alternative.lag for alternative in self.alternatives)
 
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:

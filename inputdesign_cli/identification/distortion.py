@@ -34,7 +34,7 @@ def response_error(
     added = _between(harmonics, odd.beyond, found.harmonics)
     of_inverse = kept * period * found.deviation**2 / found.noise[:, :, None]  # sum over blocks of |U^-1|^2
     at_lines = added[:, :, None] * of_inverse
-    # The power of the inputs behind each output, and of what is added as seen from there.
+    # The power of the inputs behind each output, and of the added part, referred to the inputs.
     gain = np.sum(np.abs(found.G) ** 2, axis=2)
     before = found.explained / gain
     seen = _between(found.harmonics, gain, harmonics)

@@ -99,7 +99,7 @@ class Estimate:
 
     @cached_property
     def information(self) -> Array:
-        """(k, k)."""
+        """Return the information matrix (k, k)."""
         return self.factor @ self.factor.T
 
     @cached_property
@@ -121,14 +121,14 @@ class Estimate:
 
     @property
     def failed(self) -> tuple[ScoreTest, ...]:
-        """The tests that refute the structure."""
+        """Return the tests that refute the structure."""
         return self.failed_within(1)
 
     @property
     def shifted(self) -> tuple[LevelShift, ...]:
-        """Where outputs shift, if nothing else that refutes the structure speaks more against it.
+        """Return the shifts of outputs, unless another refutation of the structure is more significant.
 
-        Tests of many signals that a shift upsets count by what they say once it is taken off.
+        Tests of many signals that a shift upsets count with the shift removed.
         """
         directed = tuple(one.test for one in self.directed)
         others = failed(self.tests, directed)
@@ -293,7 +293,7 @@ def noise_of(point: Point, own: Array) -> Array:
 
 
 def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Array) -> Array:
-    """The information of records about the parameters, in factors.
+    """Return the information of records about the parameters, in factors.
 
     Raises:
         SpecError: `not-exciting`.
@@ -302,7 +302,7 @@ def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Arr
 
 
 def _over_minima(names: tuple[str, ...], found: Search, factor: Array, noise: Array) -> Array:
-    """The information where minima beyond sampling instants are about as likely: of their mixture.
+    """Return the information where minima beyond sampling instants are about as likely: of their mixture.
 
     Each has the weight of its likelihood times the square root of the determinant of its covariance
     (Laplace's method, [tierney-kadane-1986]); the covariance is that of the mixture about the estimate.
@@ -351,5 +351,5 @@ def information_of(records: Records, point: Point, noise: Array) -> Array:
 
 
 def _weights(records: Records, noise: Array) -> Array:
-    """W (p, p), the inverse of the noise, which may be no more than rounding."""
+    """Return W (p, p), the inverse of the noise, which may be no more than rounding."""
     return inverses((noise + rounding(records))[None])[0][0]

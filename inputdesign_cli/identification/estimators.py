@@ -41,10 +41,10 @@ class Estimator(Protocol):
 
     @property
     def kind(self) -> Kind:
-        """What is estimated."""
+        """Return the structure that is estimated."""
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        """From many records; see the function of this name."""
+        """Estimate many records; see the function of this name."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Extension:
 
     @property
     def index(self) -> int:
-        """Where the new parameter stands in theta of the larger model."""
+        """Return where the new parameter stands in theta of the larger model."""
         return self.model.names.index(self.name)
 
     def against(self, records: Records) -> Alternative:
@@ -100,7 +100,7 @@ def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo 
 
 
 def new_name(larger: Model, model: Model) -> str:
-    """Of the one parameter that only the larger has."""
+    """Return the name of the one parameter that only the larger model has."""
     (name,) = set(larger.names) - set(model.names)
     return name
 
@@ -152,7 +152,7 @@ def larger_transfer_matrices(
 
 
 def _with(rows: Rows, i: int, j: int, entry: Array) -> Rows:
-    """The same table with another entry."""
+    """Return the table with another entry."""
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.start import Start
 
-# Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
+# Directions of the unknown starts below this size, columns scaled, are linearly dependent.
 _DEPENDENT = 1e-7
 _MOST_ROUNDS = 30
 # Normal equations of outputs whose errors are alike beyond this lose too many digits.
@@ -65,14 +65,14 @@ class _Basis:
     of_noise: float
 
     def slope(self, start: Start) -> float:
-        """The derivative of the determinant, `start` being that of the start."""
+        """Return the derivative of the determinant; `start` is the derivative of the start."""
         free, noise, disturbance = self._gradient
         found = np.sum(free * start.free) + np.sum(noise * start.noise)
         return 2.0 * float(found - np.sum(disturbance * start.disturbance))
 
     @cached_property
     def _gradient(self) -> tuple[Array, Array, Array]:
-        """Half the gradient of the determinant in the blocks of a start; in the last, its negative."""
+        """Return half the gradient of the determinant in the blocks of a start; in the last, its negative."""
         samples, known = self.span.shape
         of_responses = (self.directions @ self.inverse.T)[:samples].T
         return self.by @ of_responses[:known], of_responses[known:], self.by @ self.span.T
@@ -88,7 +88,7 @@ class _Block(NamedTuple):
 
     @property
     def samples(self) -> NDArray[np.int64]:
-        """The rows of the record; the others are of past noise."""
+        """Return the rows of the record; the others are of past noise."""
         return self.rows[: self.start.free.shape[1]]
 
 
@@ -105,12 +105,12 @@ class FreeStarts:
 
     @property
     def finite(self) -> bool:
-        """Whether all are."""
+        """Return whether all starts are finite."""
         return all(start.finite for start in self.starts)
 
     @property
     def any(self) -> bool:
-        """Whether anything is unknown."""
+        """Return whether anything is unknown."""
         return any(len(start.free) + len(start.noise) for start in self.starts)
 
     @property
@@ -134,7 +134,7 @@ class FreeStarts:
 
     @property
     def of_noise(self) -> float:
-        """The part of that which is due to past noise, whose unknowns have a density of their own."""
+        """Return the part of the determinant due to past noise; its unknowns have a density of their own."""
         return sum(block.basis.of_noise for block in self._blocks)
 
     def slopes(self, starts: Sequence[Start]) -> Array:
@@ -147,7 +147,7 @@ class FreeStarts:
 
     @property
     def parts(self) -> int:
-        """Of how many terms the determinant is the sum."""
+        """Return the number of terms of which the determinant is the sum."""
         return len(self.starts) * (1 + len(self.lengths))
 
     def combined(
@@ -228,7 +228,7 @@ class FreeStarts:
 
     @cached_property
     def _bases(self) -> dict[tuple[int, int], _Basis]:
-        """Records of one length have the same."""
+        """Return the basis for each length of record and each output."""
         return {
             (length, i): _orthonormal(start.cropped(length))
             for length in sorted(set(self.lengths))

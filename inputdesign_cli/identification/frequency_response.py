@@ -100,7 +100,7 @@ def frequency_response(
 
 
 def found_period(x: Array) -> int:
-    """Of a signal (N,) that repeats, at least twice; 0 of others."""
+    """Return the period of a signal (N,) that repeats at least twice, otherwise 0."""
     tolerance = REPEATS * float(np.abs(x).max())
     if x.size < 2:
         return 0
@@ -129,7 +129,7 @@ def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.in
 
 
 def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | None:
-    """One input whose signals repeat; the first of three periods or more is left to the transient."""
+    """Return the response to one repeated input; the first of three periods or more is transient."""
     times = len(y) // period
     periods = Periods(period, skip=int(times > 2))
     found = periodic_response(u, y, periods, excited_harmonics(x, periods))
@@ -191,13 +191,13 @@ def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse
 
 
 def _window(records: Sequence[tuple[Array, ...]]) -> int:
-    """How many lines of each record the parabolas are fitted to."""
+    """Return how many lines of each record the parabolas are fitted to."""
     unknowns = _PARABOLA * (records[0][1].shape[1] + len(records))
     return -(-(unknowns + _FREEDOM) // len(records)) + 1
 
 
 def _turns(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> bool:
-    """Whether a parabola cannot follow the phase of these delays."""
+    """Return whether a parabola cannot follow the phase of these delays."""
     longest = max(len(y) for *_, y in records)
     return bool(2.0 * np.pi * delays.max() * _window(records) / longest > _TURN)
 
@@ -231,20 +231,20 @@ def _delayed(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) ->
 
 
 def _leaves_less(one: FrequencyResponse, other: FrequencyResponse) -> bool:
-    """Whether what the inputs do not explain is less by the first."""
+    """Return whether the first response leaves less unexplained."""
     first, second = (np.mean(np.log(np.maximum(found.noise, 1e-300))) for found in (one, other))
     return bool(first <= second)
 
 
 def _transforms(*signals: Array) -> tuple[NDArray, ...]:
-    """The lines of a record (N,), and the transforms (N, channels) of its signals there."""
+    """Return the lines of a record (N,), and the transforms (N, channels) of its signals there."""
     samples = len(signals[0])
     lines = 2.0 * np.pi * np.arange(samples) / samples
     return lines, *(np.fft.fft(signal, axis=0) / np.sqrt(samples) for signal in signals)
 
 
 def _centres(samples: int) -> Array:
-    """Lines of a record, at most as many as can be looked at, evenly on a logarithmic axis."""
+    """Return lines of a record, at most as many as can be looked at, evenly on a logarithmic axis."""
     last = (samples - 1) // 2
     if last <= _MOST_FREQUENCIES:
         return np.asarray(2.0 * np.pi * np.arange(1, last + 1) / samples)

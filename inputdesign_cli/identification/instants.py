@@ -46,7 +46,7 @@ def beyond_instants(records: Records, found: Minimum) -> Minimum:
 
 
 def _of(one: Minimum, runs: NDArray[np.bool_]) -> Minimum:
-    """Some of the runs."""
+    """Return some of the runs."""
     return Minimum(one.theta[runs], one.cost[runs], one.hessian[runs], one.converged[runs], one.steps[runs])
 
 

@@ -23,7 +23,7 @@ from inputdesign_cli.levels import level
 
 # Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
 _SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125
-# So many are told.
+# The largest number of shifts that are reported.
 _MOST = 6
 # What is nearer to an end of a record is its start, or a few samples that are wrong.
 _FEWEST = 5
@@ -63,7 +63,7 @@ class LevelShift:
 
     @property
     def refutes(self) -> bool:
-        """Whether a model without it is refuted."""
+        """Return whether a model without it is refuted."""
         return self.alone and self.test.probability < level("level shift")
 
 
@@ -107,7 +107,7 @@ def _by_chance(statistics: Sequence[float], looks: int) -> float:
 
 
 def level_shift(records: Records, point: Point, white: White) -> LevelShift | None:
-    """The likeliest shift; None in records that are too short for any."""
+    """Return the likeliest shift; None in records that are too short for any."""
     found: list[tuple[float, int, int, float, bool, bool]] = []
     lags = _lags(max(records.lengths))
     steps = np.stack([_smooth(max(records.lengths), lag) for lag in lags], axis=1)
@@ -150,7 +150,7 @@ def _taken_off(records: Records, theta: Array, white: White, shift: LevelShift) 
 
 
 def _stretches(records: Records) -> Iterator[tuple[int, int]]:
-    """Where each record begins, and its samples; too short ones are passed over."""
+    """Return where each record begins, and its samples; too short ones are passed over."""
     begin = 0
     for length in records.lengths:
         if length > 2 * _FEWEST:
@@ -159,7 +159,7 @@ def _stretches(records: Records) -> Iterator[tuple[int, int]]:
 
 
 def _lags(samples: int) -> list[float]:
-    """None, then ever longer ones."""
+    """Return the lags to try: zero, then ever longer ones."""
     found = [0.0]
     lag = _SHORTEST
     while lag <= _SHARE * samples:
@@ -169,7 +169,7 @@ def _lags(samples: int) -> list[float]:
 
 
 def _smooth(samples: int, lag: float) -> Array:
-    """(samples,): a step at the first, behind a lag."""
+    """Return a step at the first sample behind a lag (samples,)."""
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
@@ -210,7 +210,7 @@ def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:
 
 
 def _line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
-    """The statistic of a line through one record of an output."""
+    """Return the statistic of a line through one record of an output."""
     signal = np.zeros((records.samples, 1))
     signal[begin : begin + length, 0] = np.linspace(-1.0, 1.0, length)
     column = _column(records, theta, white, signal, output)

@@ -43,11 +43,11 @@ class Moves:
 
     @property
     def largest(self) -> float:
-        """The largest estimated one."""
+        """Return the largest estimated move of G."""
         return float(np.max(self.estimated))
 
     def odds(self, probability: float) -> float:
-        """That the parameter is there and G is beyond what is admitted, if it is as likely there as not.
+        """Return the odds that the parameter exists and G exceeds the admissible error, from even prior odds.
 
         Args:
             probability: of an estimate as far from zero, if the parameter is not there.

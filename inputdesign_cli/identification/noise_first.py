@@ -21,7 +21,7 @@ from inputdesign_cli.identification.starts import noise_polynomials
 from inputdesign_cli.plant.filtering import filtered
 
 _ORDERS = ((0, 1), (1, 0), (1, 1), (0, 2), (2, 2))
-# Coefficients of the filter that makes residuals white: so many samples tell each, and no more are tried.
+# Coefficients of the filter that whitens residuals: samples needed for each, and the most that are tried.
 _SAMPLES_A_COEFFICIENT, _MOST = 20, 12
 
 Noise = tuple[Array, Array]

@@ -61,7 +61,7 @@ def period_drift(
 
 
 def line_of_periods(y: Array, periods: Periods) -> Array:
-    """(N, p): the lines about zero that the means of the periods of outputs (N, p) lie on."""
+    """Return the lines (N, p) about zero that fit the means of the periods of outputs (N, p)."""
     return _curve(*_along(y, np.arange(float(len(y))), periods, 1))
 
 

@@ -40,7 +40,7 @@ class Periods:
         return samples // (self.period * self.blocks)
 
     def kept(self, samples: int) -> int:
-        """Periods a block that count."""
+        """Return the number of periods per block that count."""
         return self.each(samples) - self.skip
 
     def transforms(self, signal: NDArray[np.float64]) -> ComplexArray:
@@ -81,7 +81,7 @@ class PeriodicResponse:
 
 
 def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
-    """The harmonics between 0 and pi at which some channel of x (N, r) has power."""
+    """Return the harmonics between 0 and pi at which some channel of x (N, r) has power."""
     size = np.abs(periods.transforms(x)).mean(axis=(0, 1)).max(axis=1)
     size = size[: (periods.period + 1) // 2]
     size[0] = 0.0

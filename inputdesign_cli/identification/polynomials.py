@@ -43,7 +43,7 @@ class PolynomialKind(OfModel):
 
     @property
     def recent(self) -> int:
-        """How far back the regressions look."""
+        """Return how far back the regressions look."""
         return self.structure.memory
 
     @property
@@ -57,11 +57,11 @@ class PolynomialKind(OfModel):
         return ~self.explaining
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has."""
+        """Return the number of parameters of each output (p,)."""
         return self.structure.own()
 
     def record(self, u: Array, y: Array) -> PolynomialRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
         return PolynomialRecord(self.structure, u, y)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
@@ -89,7 +89,7 @@ class PolynomialKind(OfModel):
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """What the inputs cause in the estimate, and what unknown starts explain."""
+        """Return the response of the estimate to the inputs, and the part that unknown starts explain."""
         return self.caused(found, y, lengths), self.model.at(found.point.theta).stable_outputs
 
 
@@ -139,7 +139,7 @@ def identify_polynomials(
 
 
 def fit_polynomials(model: PolynomialModel, u: ArrayLike, y: ArrayLike, *, start: ArrayLike) -> BatchEstimate:
-    """Prediction-error estimates of many records in one pass.
+    """Return prediction-error estimates of many records in one pass.
 
     Args:
         model: of which the structure is meant, see `identify_polynomials`.
@@ -187,7 +187,7 @@ def _starts_alone(
 
 
 def _one_by_one(structure: Structure, record: PredictionErrors, starts: list[Array]) -> Array:
-    """theta (k,) from each output alone: the information of all, added up."""
+    """Return theta (k,) from each output alone: the information of all, added up."""
     total, moment = np.zeros((structure.size, structure.size)), np.zeros(structure.size)
     for row, place, y, points in zip(structure.rows, structure.places, record.y, starts, strict=True):
         if not place.size:
@@ -206,7 +206,7 @@ def _one_by_one(structure: Structure, record: PredictionErrors, starts: list[Arr
 def _noise_and_information(
     structure: Structure, record: PredictionErrors, found: Minimum
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The covariance of e (runs, p, p) and the information of theta (runs, k, k) at the minima."""
+    """Return the covariance of e (runs, p, p) and the information of theta (runs, k, k) at the minima."""
     samples = record.y[0].shape[0]
     if len(structure.rows) == 1:  # the search has computed it already
         noise = _covariances(structure, found.cost[:, None, None], samples)

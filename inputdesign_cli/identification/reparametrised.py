@@ -41,7 +41,7 @@ class ReparametrisedRecord(OverRecord):
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.parametrisation.names)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -53,17 +53,17 @@ class ReparametrisedRecord(OverRecord):
         return errors, np.tensordot(here.jacobian, psi, axes=(0, 0))
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """Those at the coefficients."""
+        """Return the starts at the coefficients."""
         return self.record.starts(self.parametrisation.at(theta).coefficients, free=free)
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
-        """The parameters that move one."""
+        """Return the indices of the parameters that move a dead time."""
         rows = self.parametrisation.jacobian[self.record.dead_times]
         return np.flatnonzero(np.any(rows != 0.0, axis=0))
 
     def crossings(self, theta: Array) -> Array:
-        """The shortest steps of the parameters that move the dead times so."""
+        """Return the smallest steps of the parameters that move the dead times to their crossings."""
         here, late = self.parametrisation.at(theta), self.record.dead_times
         steps = self.record.crossings(here.coefficients)[:, :, late]
         if not steps.size:
@@ -72,11 +72,11 @@ class ReparametrisedRecord(OverRecord):
         return np.asarray(steps @ back.T)
 
     def lateness(self, theta: Array) -> int:
-        """That at the coefficients."""
+        """Return the lateness at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)
 
     def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """The derivatives of the starts with respect to these parameters, by the chain rule."""
+        """Return the derivatives of the starts with respect to these parameters, by the chain rule."""
         here = self.parametrisation.at(theta)
         slopes = here.jacobian[:, indices]
         moved = [c for c in self.record.in_starts(free=free).tolist() if np.any(slopes[c])]
@@ -141,7 +141,7 @@ class ReparametrisedKind(OfModel):
 
     @property
     def recent(self) -> int:
-        """The lag up to which the structure looks at the inputs."""
+        """Return the lag up to which the structure looks at the inputs."""
         return self.coefficients.recent
 
     @property
@@ -151,12 +151,12 @@ class ReparametrisedKind(OfModel):
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): the same."""
+        """Return the mask (k,) of parameters that move a whitening coefficient."""
         return np.any(self._moved[self.coefficients.whitening], axis=0)
 
     @cached_property
     def _moved(self) -> NDArray[np.bool_]:
-        """(K, k): which parameter moves which coefficient."""
+        """Return which parameter moves which coefficient (K, k)."""
         return self.model.parametrisation.moves
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
@@ -179,7 +179,7 @@ class ReparametrisedKind(OfModel):
         return of_all * (len(self.names) / max(float(np.sum(of_all)), 1.0))
 
     def record(self, u: Array, y: Array) -> ReparametrisedRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
         return ReparametrisedRecord(self.coefficients.record(u, y), self.model.parametrisation)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
@@ -232,6 +232,6 @@ class ReparametrisedKind(OfModel):
         return self.coefficients.simulated(self._of_coefficients(found), y, lengths)
 
     def _of_coefficients(self, found: Search) -> Search:
-        """The same search, its point given by the coefficients."""
+        """Return the search with its point given by the coefficients."""
         theta = self.model.parametrisation.at(found.point.theta).coefficients
         return replace(found, point=replace(found.point, theta=theta))

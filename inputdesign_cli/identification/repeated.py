@@ -20,14 +20,14 @@ import scipy
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.records import shifted
 
-# So many samples in a row have a correlation beyond this at another time by chance in one of 1e10 cases.
+# A row of _IN_A_ROW samples has a correlation beyond this at another time by chance in one of 1e10 cases.
 _IN_A_ROW, _FOLLOWS = 30, 0.9
 # Of the lags, those at which most errors follow each other.
 _LAGS = 8
 # Larger errors, in standard deviations, count as much: single spikes say nothing.
 _SPIKE = 3.0
 _ORDER = 20
-# Lags are fewer in a short record; in a long one so many samples tell their coefficients.
+# Lags are fewer in a short record; in a long one at most this number of samples is fitted.
 _SAMPLES_A_LAG, _MOST_FITTED = 10, 20_000
 NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
 
@@ -62,7 +62,7 @@ def repetition(errors: Array, inputs: Array | None = None, *, feedback: bool = F
 
 
 def _again(e: Array) -> Repetition | None:
-    """The longest stretch of white errors (samples, p) that comes again."""
+    """Return the longest stretch of white errors (samples, p) that repeats."""
     samples = len(e)
     around = scipy.fft.rfft(e, 2 * samples, axis=0)
     products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)

@@ -15,7 +15,7 @@ _FREQUENCIES = 60
 _LEAST_FREQUENCY = 1e-3
 # Below this probability G is not zero.
 _ZERO = 1e-3
-# Directions of G that are smaller than this, and what the parameters may leave of it.
+# Relative size below which directions of G count as dependent; share of G that may stay unexplained.
 _DEPENDENT, _LEFT = 1e-8, 1e-4
 
 

@@ -52,7 +52,7 @@ def rivals(records: Records, point: Point, found: Minimum) -> tuple[Rival, ...]:
 
 
 def spread_out(records: Records, points: Sequence[Point], most: int) -> list[int]:
-    """The numbers of the likeliest points, of near ones only the best."""
+    """Return the numbers of the likeliest points, of near ones only the best."""
     chosen: list[int] = []
     for number in np.argsort([point.cost for point in points], kind="stable"):
         point = points[number]
@@ -65,7 +65,7 @@ def spread_out(records: Records, points: Sequence[Point], most: int) -> list[int
 
 
 def distance(records: Records, point: Point, step: Array) -> float:
-    """The square of a `step` (k,) in standard deviations of the parameters at a point."""
+    """Return the square of a `step` (k,) in standard deviations of the parameters at a point."""
     unit = 1.0 if records.weights is not None else point.near.freedom / point.cost
     return unit * float(step @ point.hessian @ step)
 

@@ -120,7 +120,7 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
 
 
 def _newton(point: Point, held: NDArray[np.bool_]) -> tuple[Array, float]:
-    """The step (k,) of Gauss and Newton that leaves some parameters, and the gain that it promises."""
+    """Return the step (k,) of Gauss and Newton that leaves some parameters, and the gain that it promises."""
     free = np.flatnonzero(~held)
     scale = np.sqrt(np.maximum(np.diag(point.hessian)[free], 1e-300))
     step = np.zeros(held.size)
@@ -135,7 +135,7 @@ def _moved(records: Records, point: Point, step: Array) -> Point:
 
 
 def _beside(records: Records, point: Point, held: NDArray[np.bool_]) -> Point | None:
-    """A point of lower cost where a held parameter is a little more or less; None if there is none."""
+    """Return a point of lower cost where a held parameter is a little more or less; None if there is none."""
     variance = point.cost / point.errors.size
     for j in map(int, np.flatnonzero(held)):
         size = _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300))

@@ -41,7 +41,7 @@ class TransferKind(OfModel):
 
     @property
     def continuous(self) -> bool:
-        """Whether frequencies of the model are in rad per time unit: not behind a hold."""
+        """Return whether frequencies of the model are in rad per time unit: not behind a hold."""
         return not self.between.hold
 
     @property
@@ -85,7 +85,7 @@ class TransferKind(OfModel):
         )
 
     def holding(self, known: NDArray[np.bool_]) -> TransferKind:
-        """The same; dead times that are known are not looked for."""
+        """Return the kind with starts that keep known dead times."""
         held = {
             place: parameter.value
             for parameter, fixed in zip(self.model.parameters, known, strict=True)

@@ -17,7 +17,7 @@ from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
 from inputdesign_cli.plant.model import DELAY
 
-# A mode that loses less than this over the whole record cannot be told from one on the stability limit.
+# A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
@@ -27,7 +27,7 @@ _LEAST_DELAY = 1e-12
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:
-    """The samples of a record in which inputs before it act through a dead time; none without one."""
+    """Return the samples of a record in which inputs before it act through a dead time; none without one."""
     return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0
 
 
@@ -63,12 +63,12 @@ class TransferRecord:
 
     @property
     def samples(self) -> int:
-        """Number of samples N."""
+        """Return the number of samples N."""
         return len(self.y)
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.structure.parameters)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -119,7 +119,7 @@ class TransferRecord:
 
     @cached_property
     def dead_times(self) -> NDArray[np.int64]:
-        """Where the dead times stand in theta."""
+        """Return where the dead times stand in theta."""
         return np.flatnonzero([parameter.letter == DELAY for parameter in self.structure.parameters])
 
     def crossings(self, theta: Array) -> Array:
@@ -210,7 +210,7 @@ class TransferRecord:
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:
-        """Where the coefficients of each denominator stand in theta."""
+        """Return where the coefficients of each denominator stand in theta."""
         groups: dict[tuple[tuple[int, int], ...], list[int]] = {}
         for index, parameter in enumerate(self.structure.parameters):
             if parameter.letter == "a":

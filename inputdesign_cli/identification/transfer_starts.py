@@ -25,7 +25,7 @@ _CUTOFFS = 5
 _HIGHEST_ORDER = 8
 _ITERATIONS = 8
 _MOST_FREQUENCIES = 1000
-# Dead times are tried sample by sample up to so many, then each so much longer than the last.
+# Dead times are tried sample by sample up to _FINE samples, then in steps that grow by _GROWTH.
 _FINE, _GROWTH = 20, 1.2
 _SWEEPS, _MINIMA = 2, 6
 
@@ -107,7 +107,7 @@ class _Filtered:
     _columns: dict[tuple[int, int, float], Array] = field(default_factory=dict)
 
     def responses(self, output: int, delays: Mapping[Place, float], w: Array) -> dict[Place, ComplexArray]:
-        """The responses at `w` of the entries of a row without their dead times, by least squares."""
+        """Return the responses at `w` of the entries of a row without their dead times, by least squares."""
         matrix, target = self._regression(output, delays)
         solution, m = _regression(matrix, target), self._order(output)
         s = 1j * w / self.cutoff
@@ -120,7 +120,7 @@ class _Filtered:
         }
 
     def left(self, output: int, delays: Mapping[Place, float]) -> float:
-        """The share of the power of the target that the regression leaves."""
+        """Return the share of the power of the target that the regression leaves."""
         matrix, target = self._regression(output, delays)
         squared = float(np.sum((target - matrix @ _regression(matrix, target)) ** 2))
         return squared / max(float(np.sum(target**2)), 1e-300)

@@ -133,7 +133,7 @@ def _changes(name: str, x: Array) -> Iterator[_Tried]:
 
 
 def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
-    """The gain of samples x (N,), of mean zero and size one, depends on them."""
+    """Yield signals that stand for a gain that depends on samples x (N,), of mean zero and size one."""
     level, amplitude = (f"a gain of {name} that depends on its {what}" for what in ("level", "amplitude"))
     moves = np.concatenate([_last_moves(own) for own in np.split(x, np.cumsum(lengths)[:-1])])
     for of, phrase, f, gains in (

@@ -19,7 +19,7 @@ DEPENDENT = 1e-6
 """Signals of norm one of which less is left depend on the others."""
 # A relative variance of the noise so small changes probabilities of 0.001 by a few per cent of themselves.
 _WELL_KNOWN = 1e-3
-# At its limit is what cannot move so many standard deviations.
+# A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
 
 Echo = Callable[[Array], Array]
@@ -105,7 +105,7 @@ class White:
         return found
 
     def echoes(self, through: Echo) -> float:
-        """The mean of the score of a signal that is made of the residuals themselves.
+        """Return the mean of the score of a signal that is made of the residuals themselves.
 
         Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
         the mean -tr(Q^T T Q), for T, which looks back in time, has no trace.
@@ -165,7 +165,7 @@ class White:
         return self.residuals[: self.samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
 
     def without(self, columns: Array) -> White:
-        """Return the same where columns ((N + M) p, m) of unknown sizes explain residuals as starts do."""
+        """Return the estimate where columns ((N + M) p, m) explain residuals with free sizes, as starts do."""
         left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
         left = left[:, sizes > DEPENDENT]
         freedom = self.residuals.size / self.variance
