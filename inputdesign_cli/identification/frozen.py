@@ -1,7 +1,7 @@
 """Detect a sensor that stands still: its samples are equal although noise, or the input, would move them.
 
-An innovation of standard deviation s falls into a cell of width d, wherever it lies, with a probability of at
-most d f / s, where f is the largest density of usual noise. If that is small, a row of equal samples is
+An innovation of standard deviation s falls into a cell of width d with a probability of at most d f / s.
+Here f is the largest density of usual noise. If that is small, a row of equal samples is
 beyond chance. If rounding hides the noise, the model decides: it moves by more than a cell and its own errors
 while the sensor does not.
 """

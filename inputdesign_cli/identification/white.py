@@ -165,7 +165,7 @@ class White:
         return self.residuals[: self.samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
 
     def without(self, columns: Array) -> White:
-        """Return the estimate where columns ((N + M) p, m) explain residuals with free sizes, as starts do."""
+        """Return the estimate where columns ((N + M) p, m) of free sizes explain residuals like starts."""
         left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
         left = left[:, sizes > DEPENDENT]
         freedom = self.residuals.size / self.variance
