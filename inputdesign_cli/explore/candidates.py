@@ -20,7 +20,7 @@ from inputdesign_cli.explore.processes import Process
 from inputdesign_cli.explore.sweep import Sweep, delay_ranges
 from inputdesign_cli.plant import Model
 
-# An error of simulation that is larger by less than this share, or by so many points, is as good, if it
+# An error of simulation that is larger by less than this factor, or these points, is as good, if it
 # explains almost as much of the variance of the output.
 _AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
 # The largest deviation of a parameter of the plant, in shares of its value.
@@ -126,10 +126,10 @@ class Chosen:
 
 
 def ranked(usable: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """Return candidates, the one to take first, and those that simulate about as well as any.
+    """Return the candidates, the preferred one first, and the subset that simulates about equally well.
 
-    An input that answers the noise carries it, so that in a loop a wrong plant may simulate the output
-    better than the right one. Prediction errors do not err ([ljung-1999], Section 13.4).
+    In closed loop the input depends on the noise, so that a wrong plant may simulate the output better than
+    the right one. Prediction errors are free of this bias ([ljung-1999], Section 13.4).
     """
     error = min(100.0 - c.validation for c in usable)
     most, explained = max(_AS_GOOD * error, error + _POINTS), 1e4 - error**2

@@ -97,7 +97,7 @@ def _moves(some: Parts, whole: Parts) -> bool:
 
 
 def busiest(parts: Parts, most: int) -> list[tuple[Array, Array]]:
-    """Return at most so many samples: of long records the stretch in which the inputs move most."""
+    """Return at most `most` samples: of a long record the stretch in which the inputs move most."""
     share = most // len(parts)
     return [(u[at], y[at]) for u, y in parts for at in [_window(u, share if len(parts) > 1 else most)]]
 

@@ -1,7 +1,7 @@
-"""Find outputs that drift along one line through all records, beside what the inputs do.
+"""Find outputs that drift along one line through all records, in addition to the response to the inputs.
 
-Taking lines away from u and y, each alone, would not do: the response of the plant to the input has a line of
-its own.
+Lines that are removed from u and y separately are no remedy: the response of the plant to the input
+contains a line of its own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from inputdesign_cli.plant.filtering import filtered
 _HIGHEST = 3
 # Of longer records means over stretches give a slope as well: a line is slow.
 _MOST_SAMPLES = 1500
-# A line counts that is so many deviations from none, and rises by that many times the scatter about it.
+# A line counts if its slope is _CERTAIN deviations from zero, and it rises by _RISES times its scatter.
 _CERTAIN, _RISES = 5.0, 1.0
 # A root of the noise that fades by fewer time constants within the records may be that of a random walk,
 # whose residuals look so beside all that was estimated.
@@ -73,7 +73,7 @@ def _through(A: Array, samples: int) -> Array:
 
 
 def _means(x: Array, stretch: int) -> Array:
-    """Return means over stretches of so many samples, the last samples left out."""
+    """Return means over blocks of `stretch` samples; the samples after the last whole block are left out."""
     whole = len(x) // stretch * stretch
     return np.asarray(x[:whole].reshape(-1, stretch, x.shape[1]).mean(axis=1))
 

@@ -24,7 +24,7 @@ _CERTAIN, _EARLY = 1e-4, 1e-6
 _FOLLOWS = 1e-9
 # What is new in u and in y goes together beyond this correlation.
 _TOGETHER = 0.1
-# A jump of an input is so many times its usual news; as many samples, at least, compare jumps with the rest.
+# A jump is this multiple of an input's median innovation; fewest samples to compare jumps with the rest.
 _JUMP, _FEWEST = 6.0, 5
 Parts = Sequence[tuple[Array, Array]]
 

@@ -1,8 +1,8 @@
-"""How well a model explains records: by simulation from the inputs, and one step ahead.
+"""Compute how well a model explains records: by simulation from the inputs, and one step ahead.
 
-fit = 100 (1 - |y - y_hat| / |y - mean y|), the level and the state at the start of every record estimated
-along: of a simulation so that it is best, as those of an output-error model. Samples on which inputs from
-before a record still act through a delay are not counted: unknown inputs explain them, whatever the model.
+fit = 100 (1 - |y - y_hat| / |y - mean y|). The level and the state at the start of every record are estimated
+as well; for a simulation they minimise the output error. Inputs from before a record still act through a
+delay on its first samples. These samples are not counted: unknown inputs explain them, whatever the model.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NOT_COMPUTED = (SpecError, ArithmeticError, RuntimeWarning, np.linalg.LinAlgErro
 
 _BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
-# A mode that loses less than this over the whole record cannot be told from one on the stability limit.
+# A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 
 
@@ -51,8 +51,8 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
     """Return the fits of a sampled model to records u (n, r), y (n, p).
 
     Args:
-        late: of each record so many samples are left out. What delays of the model hold back beyond that
-            counts as not explained, so that models can be compared. None: what its own delays hold back.
+        late: number of samples left out of each record. Samples that longer delays of the model hold back
+            count as not explained, so that models can be compared. None: as its own delays require.
 
     Raises:
         TypeError: see `output_error_form`.
@@ -117,7 +117,7 @@ def by_chance(samples: int, unknowns: int, tried: int) -> float:
 
 
 def percent(errors: Array, varying: Array) -> tuple[float, ...]:
-    """Return the share of the rms of what varies (N, p) that errors (N, p) lack; -inf of no samples."""
+    """Return the fit in per cent: 1 minus the rms of errors (N, p) over that of `varying`; -inf if N is 0."""
     if not len(errors):
         return (-np.inf,) * errors.shape[1]
     with np.errstate(over="ignore"):
@@ -150,7 +150,7 @@ def begun(responses: NDArray[np.float64], left: Array) -> Array:
 
 
 def is_steady(model: Model, samples: int) -> bool:
-    """Return whether a plant is stable, its slowest mode fading within a record of so many samples."""
+    """Return whether a plant is stable and its slowest mode fades within `samples` samples."""
     return output_error_form(model).radius < 1.0 - _LEAST_DECAY / samples
 
 
@@ -159,7 +159,7 @@ def output_error_form(model: Model) -> Model:
     """Return the plant of a model, its A multiplied into every F, with white noise on the output.
 
     Raises:
-        TypeError: models of this kind have none here: those that are not sampled, and state space.
+        TypeError: the model is not sampled, or is a state-space model.
     """
     raise TypeError(f"{type(model).__name__} has no output-error form")
 

@@ -34,9 +34,9 @@ from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.plant import Model, PolynomialModel
 
 _MOST_SAMPLES = 10_000
-# So many structures of each output are tried where the first cannot be estimated from the whole record.
+# Structures of each output that are tried if the first cannot be estimated from the whole record.
 _MOST_TRIED = 3
-# A line of each of so many records is estimated along; of more it counts as known.
+# Lines are estimated together with the model up to this number of records; beyond it they count as known.
 _MOST_LINES = 3
 
 
@@ -93,7 +93,7 @@ class Found:
 
 
 def _steady(taken: Sequence[Candidate], model: Model, samples: int) -> bool:
-    """Return whether a plant is stable, as far as so many samples show; an integrator is what it says."""
+    """Return whether a plant is stable, as far as `samples` samples show, or integrates by its structure."""
     return is_steady(model, samples) or any(c.orders.integrates for c in taken)
 
 
@@ -287,10 +287,11 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
-    """Return models of single outputs, of structures of one kind, as one model.
+    """Return one model that joins models of single outputs with structures of one kind.
 
     Args:
-        inputs: of the whole; those that are `moving` are those of the single models. Plants in s have all.
+        inputs: number of inputs of the joint model. Sampled single models have the `moving` ones only,
+            process models have all.
     """
     processes = [(c.orders, c.model.theta) for c in taken if c.orders.physical is True]
     if processes:

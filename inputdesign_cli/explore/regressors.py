@@ -76,7 +76,7 @@ def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) ->
 
 
 def _independent(x: Array, delays: int) -> bool:
-    """Return whether so many delays of signals x (n, r), and a level, are linearly independent."""
+    """Return whether signals x (n, r) at lags 0 to `delays` - 1, and a level, are linearly independent."""
     columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
     columns = columns - columns.mean(axis=0)
     gram = columns.T @ columns

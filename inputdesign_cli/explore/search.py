@@ -1,6 +1,6 @@
-"""Find the structure that explains an output: estimated on one part of the record, judged on another.
+"""Find the structure that explains an output: estimated on one part of the record, validated on another.
 
-A sweep of regressions gives delays and orders. An autoregression of what it leaves whitens the noise, and a
+A sweep of regressions gives delays and orders. An autoregression of its residuals whitens the noise, and a
 second sweep of the whitened records gives starts. About a dozen structures are then estimated by output
 errors of the whitened records, which are prediction errors for that noise.
 """
@@ -46,7 +46,7 @@ _MOST_SAMPLES = 4000
 _HIGHEST, _HIGHEST_ARX, _ARX_KEPT = 5, 8, 2
 # Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
 _PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
-# A dead time may settle so many samples beyond those of the sweep, and at so many times the longest one.
+# A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
 _SETTLES, _RUN_OFF = 5, 2
 
 

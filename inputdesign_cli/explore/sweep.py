@@ -1,6 +1,6 @@
 """Choose delays and orders by linear regressions: output errors with one denominator for all inputs.
 
-The regressions are those of [steiglitz-mcbride-1965]. The products of all lags of y and u, through 1/F, give
+The regressions follow [steiglitz-mcbride-1965]. The products of all lags of y and u, through 1/F, give
 the errors of every delay at once. Levels, drift and the state at the start of each record are projected out.
 Before a record the inputs count as what they are at its beginning.
 """
@@ -68,9 +68,9 @@ class Sweep:
     longest: int
 
     def best(self, samples: int) -> Regression:
-        """Return the regression that BIC prefers, of those with the fewest poles that integrate.
+        """Return the regression with the lowest BIC among the ones with the fewest integrating poles.
 
-        Noise that wanders looks like the free response of integrators.
+        Wandering noise looks like the free response of integrators.
         """
         return min(
             self.by_order.values(), key=lambda one: (lingering(one.F, self.longest), one.criterion(samples))
@@ -385,7 +385,7 @@ def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:
 
 
 def lingering(polynomial: Array, samples: int) -> int:
-    """Return how many roots hardly fade within so many samples, as if they integrated."""
+    """Return how many roots hardly fade within `samples` samples, as if they integrated."""
     return int(np.sum(np.roots(polynomial).real > 1.0 - _FADES / samples))
 
 

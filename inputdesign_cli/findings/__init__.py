@@ -19,6 +19,6 @@ def kinds() -> dict[str, FindingKind]:
 
 
 def explanations() -> dict[str, Explanation]:
-    """Return what every code means, those of errors first and those of findings after them."""
+    """Return the explanation of every code: errors first, then findings."""
     found = {code: Explanation(kind.title, kind.text, kind.remedy) for code, kind in kinds().items()}
     return {**error_codes.explanations(), **found}

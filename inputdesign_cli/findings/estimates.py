@@ -12,7 +12,7 @@ from inputdesign_cli.outcome.model_words import predictor_of
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 
-# A first residual beyond so many standard deviations is named.
+# A first residual beyond this number of standard deviations is reported.
 _SEEN_AT_ONCE = 3.0
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
 

@@ -18,11 +18,11 @@ from inputdesign_cli.finding import Finding, FindingKind, Severity
 from inputdesign_cli.identification.checks import signal_name
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
-# What others leave of an input, in shares of its power, where minima that exchange their effects are many.
+# Unexplained share of an input's power, by the others, below which minima that swap effects are many.
 _FOLLOWS = 0.02
 # A parameter is not determined at all where it deviates by more than this share of its value.
 _OPEN = 100.0
-# A time constant of so many longest records is a line in each.
+# A time constant beyond this multiple of the longest record looks like a line in each.
 _LONGER = 10.0
 # The static gain is as good as none below this share of the largest one; what falls to this share of its peak
 # has a resonance.

@@ -18,7 +18,7 @@ from inputdesign_cli.outcome import Nominal
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Model
 
-# Farther apart than this share of the larger of the two, and than so many r_u, G is that of another plant.
+# If G differs by more than this share of the larger one, and this multiple of r_u, the plant is another.
 _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
 # The probability that a normal variable is farther than five standard deviations from its mean.
 _FIVE_DEVIATIONS = 5.733e-7
@@ -62,11 +62,11 @@ class _Apart:
 
 @dataclass(frozen=True)
 class Distance:
-    """How far an estimate lies from the plant of the spec.
+    """The distance of an estimate from the plant of the spec.
 
     Attributes:
         listed: the parameters that are farthest, with their values and deviations.
-        worst: where G differs most; None where nothing has r_u.
+        worst: where G differs most; None if no error of G has an r_u.
     """
 
     nominal: Nominal
@@ -168,7 +168,7 @@ def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
 
 
 def of_first_part(distance: Distance) -> list[Finding]:
-    """Return the same where an experiment in parts begins: a poor first estimate is why it goes in parts."""
+    """Return a note if the first of several parts finds a plant far from the spec's, as it may."""
     found = distance.nominal
     if found.probability > level("far from nominal"):
         return []

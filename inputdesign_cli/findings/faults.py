@@ -10,7 +10,7 @@ from inputdesign_cli.identification import Estimate, Frozen, frozen, shifted, sp
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import TransferMatrix
 
-# Of so many samples in a hundred a sensor that stands still biases a model; spikes where it explains less.
+# Share of samples above which a frozen sensor biases a model; fit (%) below which spikes do.
 _BIASING, _HALF = 0.02, 50.0
 
 SPIKES = FindingKind(

@@ -42,7 +42,7 @@ def larger_noise(model: Model, probability: float | None) -> list[Finding]:
 
 
 def _orders(model: Model) -> str:
-    """Return which polynomials were estimated, such as `C of order 1 and D of order 2 were`."""
+    """Return a phrase with the estimated polynomials, for example `C of order 1 and D of order 2 were`."""
     noise = blocks_of(model)["noise"]
     orders = []
     for letter in ("C", "D"):

@@ -47,8 +47,8 @@ def left_out(
     """Return the step of preparation that leaves shifts out of a log.
 
     Args:
-        samples: where the samples that the shifts count stand in the log.
-        short: how many samples went with them, since what stood beside them was too short.
+        samples: positions in the log of the samples by which the shifts are numbered.
+        short: how many more samples were left out, since the parts next to the shifts were too short.
     """
     rows = np.arange(len(log.y)) if log.recorded is None else log.recorded.rows
     what, runs = _described(shifts, log, rows, samples, time_unit)

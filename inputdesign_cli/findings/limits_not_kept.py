@@ -41,10 +41,10 @@ def limits_not_kept(
     """Return a finding for each limit that the excitation does not keep.
 
     Args:
-        limits: those of the spec.
+        limits: the limits in the spec.
         samples: the length of the experiment.
         power: of the excitation, by channel.
-        signal: what is said of its record; None without one.
+        signal: the statements about its record; None without one.
     """
     single = [] if signal is None else _single_samples(limits, signal)
     return [*_powers(limits, power), *single, *_length(limits, samples)]

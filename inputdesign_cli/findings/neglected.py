@@ -1,7 +1,8 @@
-"""How far G would move if the model had one parameter more, in units of the admissible error.
+"""Compute how far G would move if the model had an additional parameter, relative to the admissible error.
 
-r_u is the error of a right model. That of a wrong one shows only as far as the record excites it. So beside
-a verdict stands how far one more parameter would move G, to first order, and how far it may with these data.
+r_u is the error of a right model. The error of a wrong model shows only as far as the record excites it.
+So a verdict comes with how far an additional parameter would move G, to first order, and how far it may
+with these data.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class Neglected:
 def neglected(
     model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array
 ) -> list[Neglected]:
-    """Return the parameters that were tried and do not refute `model`; none where no error of G is admitted.
+    """Return the tried parameters that do not refute `model`; an empty list if no error of G is specified.
 
     Args:
         information: (k, k), by which r_u is judged.

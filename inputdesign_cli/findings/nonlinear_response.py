@@ -45,12 +45,13 @@ NONLINEAR = FindingKind(
 
 @dataclass(frozen=True)
 class Distorted:
-    """The change of a response by a nonlinearity of odd degree, at most, over what is admitted.
+    """The largest change of a response by a nonlinearity of odd degree, over the admissible error.
 
     Attributes:
         shares: (L,), at every line.
         probability: that noise alone has as much at the silent lines.
-        cubed: the signal, such as u1, whose cube the silent lines resemble; empty where power alone speaks.
+        cubed: the signal, for example u1, whose cube the silent lines resemble; empty if the shares rest on
+            the power alone.
     """
 
     shares: Array
@@ -59,24 +60,24 @@ class Distorted:
 
     @property
     def line(self) -> int:
-        """The line of the largest share."""
+        """Return the line of the largest share."""
         return int(np.argmax(self.shares))
 
     @property
     def share(self) -> float:
-        """The largest share."""
+        """Return the largest share."""
         return float(self.shares[self.line])
 
     @property
     def matters(self) -> bool:
-        """Whether it may decide on what is met."""
+        """Return whether the share is large enough to affect a verdict."""
         return self.share >= MATTERS
 
 
 def distorted(
     silent: Mapping[str, SilentLines], shares: Array, cube: Cubes, of_cube: Callable[[Array], Array]
 ) -> Distorted | None:
-    """Return the error of G over what is admitted (L,); None where odd lines have no more than noise.
+    """Return the error of G over the admissible one (L,); None if odd lines contain no more than noise.
 
     Args:
         shares: by the power at silent lines.

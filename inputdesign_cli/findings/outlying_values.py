@@ -160,7 +160,7 @@ def _far(x: Array) -> NDArray[np.bool_]:
 
 
 def _alone(x: Array) -> NDArray[np.bool_]:
-    """Whether a value is far from the median of the five about it."""
+    """Return whether a value is far from the median of the five about it."""
     found = np.zeros(x.size, dtype=bool)
     if x.size >= _SHORTEST:
         off = np.abs(x[2:-2] - np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1))
@@ -192,7 +192,7 @@ def _caused(u: Array, y: Array) -> Array:
 
 
 def _unforeseen(x: Array, suspected: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the suspected values are far from the prediction by an autoregression of the others."""
+    """Return which of the suspected values are far from the prediction by an autoregression of the others."""
     order = min(_ORDER, x.size // (2 * _PER_LAG))
     spread = spread_of(x)
     if order == 0 or spread == 0.0 or not np.any(suspected):
@@ -220,9 +220,9 @@ def _usual_solution(columns: Array, wanted: Array) -> Array:
 
 
 def beyond_precision(name: str, x: Array) -> tuple[int, str, str] | None:
-    """Return the value of a signal x (n,), NaN where missing, whose square leaves double precision.
+    """Return the row of a value in x (n,) whose square leaves double precision, with message and hint.
 
-    With its message and hint; None where all squares stay within it, relative to each other too.
+    x is NaN where samples are missing. Return None if all squares stay in range, also relative to each other.
     """
     row, lost = int(np.nanargmax(np.abs(x))), absurd(x)
     size = abs(float(x[row]))

@@ -18,7 +18,7 @@ _LISTED = 12
 
 
 class Recorded(Protocol):
-    """Outputs as they stand in the files; see `Recorded` of the data."""
+    """Outputs as the files contain them; see `Recorded` of the data."""
 
     @property
     def rows(self) -> NDArray[np.int64]:
@@ -46,7 +46,7 @@ class Samples(Protocol):
 
     @property
     def r(self) -> Array | None:
-        """(samples, r), the reference of a loop; None where it is not known."""
+        """Return the reference of a loop (samples, r), or None if it is not known."""
 
     @property
     def time(self) -> Array:
@@ -54,11 +54,11 @@ class Samples(Protocol):
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """The samples of each stretch without gaps."""
+        """Return the samples of each stretch without gaps."""
 
     @property
     def files(self) -> tuple[tuple[str, int], ...]:
-        """The name of each file and its samples."""
+        """Return the name of each file and its samples."""
 
     @property
     def recorded(self) -> Recorded | None:

@@ -50,12 +50,12 @@ def columns_against_spec(
     outputs: int,
     columns: Mapping[str, str],
 ) -> list[Finding]:
-    """Say which columns the plant does not have, and which are in another unit than the spec states.
+    """Return findings for columns that the plant does not have, or that have another unit than the spec.
 
     Args:
         header: the names of all columns.
         channels: name and unit of u1, .. and y1, .. in the spec.
-        columns: by channel, those that the user names.
+        columns: by channel, the column that the user names.
     """
     counts, found = {"u": inputs, "y": outputs}, []
     numbered = [name.strip().lower() for name in header if _NUMBERED.fullmatch(name.strip().lower())]

@@ -57,7 +57,7 @@ NONLINEAR = FindingKind(
     "Use the range of the input that the model is for, or give as u what the actuator really does.",
 )
 
-# What drifts makes other tests fail, and what is missing in G those of the noise.
+# Drift makes other tests fail; an error of G makes tests of the noise fail.
 OF_MANY = {
     "drift": (
         DRIFT,
@@ -131,7 +131,7 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
 
 
 def _where(model: Model, test: ScoreTest) -> str:
-    """Which of several channels, as u2 acts on y1."""
+    """Return a phrase for the channels in which a test fails most; empty for a single one."""
     if model.outputs == model.inputs == 1:
         return ""
     output, source = f"y{test.output + 1}", test.source + 1
@@ -142,6 +142,6 @@ def _where(model: Model, test: ScoreTest) -> str:
 
 
 def _or_else(others: Sequence[Alternative]) -> str:
-    """Parameters whose effect is nearly the same on these data."""
+    """Return a phrase for parameters whose effect is nearly the same on these data; empty without any."""
     listed = ", ".join(other.phrase for other in others)
     return f"; nearly the same on these data: {listed}" if others else ""

@@ -47,7 +47,7 @@ def _of_plant(plant: Mapping[str, Plain]) -> str:
 
 
 def _lag_more(stated: Mapping[str, Plain]) -> str:
-    """What engineers write of a plant by names, and one more lag, to begin the search with."""
+    """Return the advice that writes a plant given by gain and time constants with an additional lag."""
     kept = ", ".join(stated)
     if not all(isinstance(value, (int, float)) for value in stated.values()):
         return f"write entries by numerator and denominator, with one more lag, in place of {kept}"

@@ -211,7 +211,7 @@ def _beyond(
 def _furthest(
     model: Model, other: Model, error: OnModelError, size: Callable[[OnModelError, Array], Array]
 ) -> tuple[float, float]:
-    """The largest difference of G over its `size`, and its frequency."""
+    """Return the largest difference of G over its `size`, and its frequency."""
     w = error.grid
     apart = np.linalg.norm(error.concerned(other.plant_at(w) - model.plant_at(w)), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -74,7 +74,7 @@ def stopped_at_ends(model: Model, estimate: Estimate) -> list[Finding]:
 
 
 def _beside(theta: Array, index: int, step: float) -> Iterator[Array]:
-    """theta with one parameter a little less, and a little more."""
+    """Return theta with one parameter a little less, and a little more."""
     for sign in (-1.0, 1.0):
         moved = theta.copy()
         moved[index] += sign * step

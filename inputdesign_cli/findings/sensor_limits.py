@@ -72,7 +72,7 @@ def _grid(x: Array, levels: Array) -> tuple[float, float]:
 
 
 def _on_grid(gaps: Array, step: float) -> tuple[float, float]:
-    """The step that suits the gaps best, near to one, and the probability that all suit it as well."""
+    """Return the step that suits the gaps best, near to one, and the probability that all suit it as well."""
     for _ in range(_REFINED):
         whole = np.round(gaps / step)
         step = float(whole @ gaps / (whole @ whole))

@@ -1,14 +1,14 @@
-"""Is the model right? Score tests of regressors that the model does without ([engle-1984]).
+"""Test whether the model is right, by scores of regressors that the model does without ([engle-1984]).
 
-A supplier proposes regressors: past inputs, past residuals, slow trends; `directed.py` has those of one
-parameter more. What the parameters and unknown starts can explain is taken off them first, so that the
-statistic is chi-squared whatever was estimated. Past residuals lack what was estimated as well: where unknown
-starts are many, as in a record with gaps, that alone correlates residuals, and it is what scores are
-compared with. In a narrow band the noise is known no better than its model there, and a statistic follows F
-instead ([satterthwaite-1946]).
+A supplier proposes regressors: past inputs, past residuals, slow trends; `directed.py` proposes single
+parameters. The part that parameters and unknown starts can explain is taken off first, so that the statistic
+is chi-squared whatever was estimated. Past residuals lack the estimated part as well. If unknown starts are
+many, as in a record with gaps, that alone correlates residuals. Scores are compared with this correlation.
+In a narrow band the noise is known no better than its model there, and a statistic follows F instead
+([satterthwaite-1946]).
 
-All of this holds for the right noise. Where the stated noise is refuted, residuals and regressors are made
-white by filters that are estimated along.
+All of this holds for the right noise. If the stated noise model is refuted, residuals and regressors are
+whitened by filters that are estimated as well.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _GROWTH = 1.35
 _FARTHEST = 400
 _AHEAD = 20
 _TRENDS, _WAVES = 3, 4
-# Of each residual at most one direction in so many is tried.
+# At most one direction per this number of residuals is tried.
 _SAMPLES_A_DIRECTION = 8
 
 Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feedback"]
@@ -46,8 +46,8 @@ class ScoreTest:
 
     Attributes:
         name: of the test.
-        fault: what is wrong where it fails.
-        probability: of a statistic as large, with so many degrees of freedom, if the model is right; see
+        fault: what is wrong if it fails.
+        probability: of a statistic as large, with `freedom` degrees of freedom, if the model is right; see
             `White.probability`.
         lag: of past inputs or residuals, where they explain most; of trends None.
         output: of which residuals are explained most; `source`, by which input or other residual.
@@ -117,15 +117,15 @@ def score_tests(
     echoes: Echoes | None = None,
     robust: White | None = None,
 ) -> tuple[ScoreTest, ...]:
-    """Return the tests of many signals.
+    """Return the score tests of past inputs, past residuals and trends.
 
     Args:
         white: the estimate in the units of its noise.
         recent: the lag up to which the structure looks at the inputs.
-        feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
-        echoes: what past errors add to the gradients of parameters, where they add anything; None where that
-            is not known: then scores are compared with zero.
-        robust: the estimate with residuals that were made white, for all but past residuals.
+        feedback: whether u(t) depends on y(t); then past inputs begin with u(t - 1).
+        echoes: what past errors add to the gradients of parameters, if anything. None: unknown; scores are
+            then compared with zero.
+        robust: the estimate with whitened residuals, for all regressors but past residuals.
     """
     tests = []
     of_inputs = caused(records, point.theta, recent, feedback=feedback)
@@ -164,10 +164,10 @@ def failed(
     shifts: Sequence[ScoreTest] = (),
     looks: int = 1,
 ) -> tuple[ScoreTest, ...]:
-    """Return those that refute the model, each at its share of the level of its group (Bonferroni).
+    """Return the tests that refute the model, each at its share of the level of its group (Bonferroni).
 
     Args:
-        looks: how often they are asked as data come in; the looks share the level as well.
+        looks: how often the tests are repeated as data come in; the looks share the level as well.
     """
     groups = ((directed, "one parameter"), (tests, "many signals"), (shifts, "level shift"))
     return tuple(
@@ -189,13 +189,13 @@ def robust_white(
     echoes: Echoes | None,
     more: Sequence[NDArray[np.float64]],
 ) -> White | None:
-    """Return the estimate with its residuals made white; None where their stated model is not refuted.
+    """Return the estimate with whitened residuals, or None if the stated noise model is not refuted.
 
-    A plant that is not the model colours residuals as well. So what all regressors explain is taken off
-    before the noise is judged, and what inputs explain before it is estimated.
+    A wrong plant colours residuals as well. So the part that all regressors explain is taken off before the
+    noise is judged. The part that inputs explain is taken off before the noise is estimated.
 
     Args:
-        less: `white` once level shifts are taken off; the rest as of `score_tests`.
+        less: `white` once level shifts are taken off; for the rest see `score_tests`.
         more: columns (N, p) of single parameters.
     """
 
@@ -209,7 +209,7 @@ def robust_white(
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
     trend = _trend(records, point.theta).white(white)
-    # Few regressors first: what many explain of right residuals correlates those that are left.
+    # Few regressors first: many explain a part of right residuals, which correlates the rest.
     if any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend]))):
         return None
     whitening = Whitening.of(white.without(columns).errors, records.lengths)
@@ -302,13 +302,13 @@ def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
 def _lagged(
     records: Records, x: NDArray[np.float64], lags: Sequence[int]
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Signals x (p, N, m) at every lag, (p, N, lags m), and the lag of each."""
+    """Return signals x (p, N, m) at every lag, (p, N, lags m), and the lag of each."""
     parts = [shifted(x.swapaxes(0, 1), lag, records.lengths).swapaxes(0, 1) for lag in lags]
     return np.concatenate(parts, axis=2), tuple(lag for lag in lags for _ in range(x.shape[2]))
 
 
 def _bins(first: int, last: int, most: int) -> list[tuple[int, int]]:
-    """Lags from `first` on, one by one and then in ever longer runs: first and one past the last."""
+    """Return lags from `first` on, one by one and then in ever longer runs: first and one past the last."""
     bins: list[tuple[int, int]] = []
     begin, width = first, 1.0
     while begin < last and len(bins) < most:
@@ -321,7 +321,7 @@ def _bins(first: int, last: int, most: int) -> list[tuple[int, int]]:
 def _summed(
     records: Records, x: NDArray[np.float64], bins: Sequence[tuple[int, int]]
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """The same of sums over runs of lags."""
+    """Return sums of signals x (p, N, m) over runs of lags, and the first lag of each run."""
     pieces = np.split(x, np.cumsum(records.lengths)[:-1], axis=1)
     total = np.concatenate([np.cumsum(piece, axis=1) for piece in pieces], axis=1).swapaxes(0, 1)
 

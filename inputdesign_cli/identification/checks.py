@@ -1,4 +1,4 @@
-"""What data must be like to determine a model, channel by channel, and what they leave undetermined."""
+"""Check that data determine a model, channel by channel, and name undetermined parameters."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _SAMPLES_A_PARAMETER = 3
 
 
 def signal_name(letter: str, channel: int, channels: int) -> str:
-    """How the signal of a channel is called in messages: `u2`, or `u` where it is the only one."""
+    """Return how the signal of a channel is called in messages: `u2`, or `u` where it is the only one."""
     return letter if channels == 1 else f"{letter}{channel + 1}"
 
 
 def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1) -> None:
-    """Enough samples of the outputs for so many parameters and a predictor that looks `memory` back.
+    """Check that there are enough samples for `parameters` parameters and a predictor with this `memory`.
 
     Raises:
         SpecError: `too-few-samples`.
@@ -91,7 +91,7 @@ def check_noisy(variances: Array, y: Array) -> None:
 
 
 def check_apart(covariance: Array) -> None:
-    """No output's residuals are those of the others: `covariance` (p, p) can be inverted.
+    """Check that no output's residuals follow from the others: `covariance` (p, p) can be inverted.
 
     Raises:
         SpecError: `noise-free-data`.
@@ -111,19 +111,19 @@ def check_apart(covariance: Array) -> None:
 
 
 def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array) -> Array:
-    """L (k, k), lower triangular, with M = L L^T the information of the data.
+    """Return L (k, k), lower triangular, with M = L L^T the information matrix of the data.
 
     Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
-    common and mean no lack of excitation. So M is never formed, and directions count as untold only where the
-    gradients themselves are rounding.
+    common and mean no lack of excitation. So M is never formed, and directions count as undetermined only
+    if the gradients themselves are rounding.
 
     Args:
         theta: (k,), where the search ended.
         rows: gradients in white units, (samples, k).
-        again: the same with other rounding.
+        again: these gradients with other rounding.
 
     Raises:
-        SpecError: `not-exciting`, with the parameters that the data cannot tell apart.
+        SpecError: `not-exciting`, with the parameters that the data cannot distinguish.
     """
     factor, untold = triangular_factor(rows)
     if not untold.size:

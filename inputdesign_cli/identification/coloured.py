@@ -1,8 +1,8 @@
-"""Estimates of models with noise that is coloured besides, or drifts: see `plant.coloured`.
+"""Estimate models with additional coloured noise, or with drift: see `plant.coloured`.
 
-The records are those of the plant; their prediction errors and all that depends on them go through
-D (1 - q^-1) / C. Starts of the plant are made from differences where the noise drifts, those of C and D from
-what the plant leaves.
+The records belong to the plant. Their prediction errors, and all that depends on them, go through
+D (1 - q^-1) / C. Starts of the plant are made from differences if the noise drifts. Starts of C and D are
+made from the residuals of the plant.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class ColouredRecord(OverRecord):
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.structure.parameters)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Prediction errors (N, p) from rest, and psi (k, N, p)."""
+        """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
         model = self.structure.at(theta)
         raw, of_plant = self.record.errors_and_gradient(self._of_plant(theta))
         errors, psi = np.empty(raw.shape), np.zeros((self.size, *raw.shape))
@@ -59,11 +59,11 @@ class ColouredRecord(OverRecord):
         return errors, psi
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """What the past adds to those of the plant, filtered, and by noise before the record through C/D."""
+        """Return the starts of the plant, filtered, and the effect of noise before the record through C/D."""
         return self._through(theta, self.record.starts(self._of_plant(theta), free=free))
 
     def _through(self, theta: Array, raw: Sequence[Start]) -> tuple[Start, ...]:
-        """The starts of the plant filtered, with noise before the record."""
+        """Return the starts of the plant filtered, with noise before the record."""
         found = []
         for start, (D, C) in zip(raw, self.structure.at(theta).inverse_filters, strict=True):
             through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
@@ -73,16 +73,16 @@ class ColouredRecord(OverRecord):
         return tuple(found)
 
     def lateness(self, theta: Array) -> int:
-        """That of the plant."""
+        """Return the lateness of the plant's record."""
         return self.record.lateness(self._of_plant(theta))
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of the plant, and C and D."""
+        """Return the parameters on which the starts depend: in the plant, and all of C and D."""
         own = np.arange(len(self.structure.plant.parameters), self.size)
         return np.concatenate([self.record.in_starts(free=free), own])
 
     def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """The derivatives of the starts: of C and D by central differences."""
+        """Return the derivatives of the starts: of C and D by central differences."""
         plant, of_plant = self._of_plant(theta), len(self.structure.plant.parameters)
         filters = self.structure.at(theta).inverse_filters
         found: dict[int, tuple[Start, ...]] = {}
@@ -104,17 +104,17 @@ class ColouredRecord(OverRecord):
         return [found[index] for index in indices]
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p): none; no instruments are used."""
+        """Return zeros (k, N, p): no instruments are used."""
         return np.zeros((self.size, *errors.shape))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): signals (N, m) through the inverse of each output's noise model."""
+        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
         raw = self.record.whitened(self._of_plant(theta), signals)
         filters = self.structure.at(theta).inverse_filters
         return np.array([filtered(*own, x, axis=0) for own, x in zip(filters, raw, strict=True)])
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with a stable predictor."""
+        """Return theta with a stable predictor."""
         first = len(self.structure.plant.parameters)
         out = theta.copy()
         out[:first] = self.record.stabilised(theta[:first])
@@ -126,7 +126,7 @@ class ColouredRecord(OverRecord):
 
     @cached_property
     def _monic(self) -> list[NDArray[np.int64]]:
-        """Where the coefficients of each C, and of each D that is estimated, stand in theta."""
+        """Return where the coefficients of each C, and of each D that is estimated, stand in theta."""
         groups: dict[tuple[str, tuple[tuple[int, int], ...]], list[int]] = {}
         for index, parameter in enumerate(self.structure.parameters):
             own = index >= len(self.structure.plant.parameters)
@@ -147,17 +147,17 @@ class ColouredKind(OfModel):
 
     @property
     def recent(self) -> int:
-        """The lag up to which the structure looks at the inputs."""
+        """Return the lag up to which the structure looks at the inputs."""
         return self.plant.recent
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
-        """(k,): those of the plant."""
+        """Return `explaining` of the plant, with False for C and D (k,)."""
         return np.concatenate([self.plant.explaining, np.zeros(self._own, dtype=bool)])
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those of the plant, and C and D."""
+        """Return `whitening` of the plant, with True for C and D (k,)."""
         return np.concatenate([self.plant.whitening, np.ones(self._own, dtype=bool)])
 
     @property
@@ -165,7 +165,7 @@ class ColouredKind(OfModel):
         return len(self.model.own_parameters)
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has; those that several share count by their share."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
         taken = self.plant.own()
         for parameter in self.model.own_parameters:
             rows = [i for i, _ in parameter.places]
@@ -173,11 +173,11 @@ class ColouredKind(OfModel):
         return taken
 
     def record(self, u: Array, y: Array) -> ColouredRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
         return ColouredRecord(self.plant.record(u, y), self.model)
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Those of C and D; what the plant has of its own is not known behind filters."""
+        """Return the echoes of C and D, or None if the plant has its own: filtered, they are not known."""
         model, first = self.model.at(theta), len(self.model.plant.parameters)
         if self.plant.echoes(theta[:first], lengths) != ():
             return None
@@ -189,7 +189,7 @@ class ColouredKind(OfModel):
         return tuple(found)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Those of the plant, each with C and D from what it leaves, and the `given` one."""
+        """Return the starts of the plant, each with C and D from its residuals, and the `given` one."""
         first = len(self.model.plant.parameters)
         known = reduce(np.convolve, {tuple(p): p for p in self.model.fixed}.values())
         found = self.plant.starts(
@@ -204,7 +204,7 @@ class ColouredKind(OfModel):
         )
 
     def _noise(self, parts: Sequence[Part], theta: Array) -> Array:
-        """C and D from what the plant leaves of the first part; those common to outputs by their mean."""
+        """Return C and D from the plant's residuals in the first part; shared ones are means over outputs."""
         u, y = parts[0]
         errors, _ = self.plant.record(u, y).errors_and_gradient(theta)
         if not np.all(np.isfinite(errors)):
@@ -226,11 +226,11 @@ class ColouredKind(OfModel):
         )
 
     def holding(self, known: NDArray[np.bool_]) -> ColouredKind:
-        """The same; the plant keeps what it knows."""
+        """Return the kind whose plant keeps the known parameters."""
         return replace(self, plant=self.plant.holding(known[: len(self.model.plant.parameters)]))
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Those of the plant; the tests of many signals look at C and D."""
+        """Return the extensions of the plant; the tests of many signals look at C and D."""
         here = self.model.at(theta)
         of_plant = theta[: len(self.model.plant.parameters)]
         return tuple(
@@ -242,7 +242,7 @@ class ColouredKind(OfModel):
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """As the plant tells, of the errors and starts before they were filtered."""
+        """Return the simulation of the plant, by the errors and starts before they were filtered."""
         theta = found.point.theta[: len(self.model.plant.parameters)]
         shaped = self.model.at(found.point.theta).shaped
         at = np.cumsum(found.records.lengths)[:-1]
@@ -265,5 +265,5 @@ def _of_plant(records: Records, plant: Kind) -> tuple[Record, ...]:
 
 
 def _clear(known: Array, signals: Array) -> Array:
-    """Signals (N, ..) through a polynomial, without the samples that it begins with."""
+    """Return signals (N, ..) through a polynomial, without the samples that it begins with."""
     return filtered(known, [1.0], signals, axis=0)[known.size - 1 :]

@@ -1,7 +1,7 @@
-"""Do logged signals obey the controller that is known, u = r - C y, sample by sample?
+"""Test whether logged signals obey the known controller, u = r - C y, sample by sample.
 
-An input that is logged a sample late biases what is estimated in a loop, and no residual tells: the model
-takes the shift for a delay. The controller does tell, where the reference was logged too.
+An input that is logged a sample late biases estimates in closed loop. No residual shows it: the model takes
+the shift for a delay. The controller shows it if the reference was logged too.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant import TransferMatrix
 
 _LAGS = (-2, -1, 1, 2)
-# Another lag holds where it leaves this share of what the signals as they are leave, and of the input itself.
+# Another lag holds if its error is below these shares of the error as logged, and of the input itself.
 _BETTER, _GOOD = 0.1, 0.3
 _FEWEST = 20
 
@@ -24,8 +24,8 @@ _FEWEST = 20
 class Shift:
     """Signals `letter` of input `channel` obey the controller `lag` samples later (earlier, if negative).
 
-    `left` is what the law leaves of each as it is logged, and `then` when shifted: rms, over that of the
-    input.
+    `left` is the rms error of the control law as logged, `then` the one after the shift. Both are relative to
+    the rms of the input.
     """
 
     letter: str
@@ -59,7 +59,7 @@ def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: S
 def _left(
     controller: TransferMatrix, i: int, parts: Sequence[tuple[Array, ...]], lags: Mapping[str, int]
 ) -> float:
-    """The rms of q u - q r + P y of an input over that of q u, the signals in `lags` moved."""
+    """Return the rms of q u - q r + P y of an input over that of q u, the signals in `lags` moved."""
     most = max(map(abs, _LAGS))
     P, q = controller.numerator[i], controller.denominator[i]
     memory = max(P.shape[1], len(q)) - 1

@@ -1,9 +1,9 @@
-"""What a cube within a plant does to a measured frequency response, told by lines that were not excited.
+"""Estimate what a cube within a plant does to a measured frequency response, from lines not excited.
 
-The power at silent lines alone does not tell what a nonlinearity changes at excited ones: of signals of low
-peaks it leaves little there, and the gain changes all the same. Where the nonlinearity is static, at an
-input or at the output, its cubic part is known but for a factor, from the signal itself. What the outputs
-have at silent lines in phase with it tells the factor, and so the change at every excited line.
+The power at silent lines alone does not determine what a nonlinearity changes at excited ones. Signals of
+low peaks leave little power there, and the gain changes all the same. If the nonlinearity is static, at an
+input or at the output, the signal itself gives its cubic part up to a factor. The part of the outputs at
+silent lines in phase with it gives the factor, and so the change at every excited line.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from inputdesign_cli.identification.periodic_response import PeriodicResponse, P
 
 @dataclass(frozen=True)
 class Cubes:
-    """The cube that explains most of what each of p outputs has at silent lines.
+    """The cube that explains most of the power of each of p outputs at silent lines.
 
     Attributes:
-        error: (L, p, r): what it changes of G at the excited lines.
+        error: (L, p, r): its change of G at the excited lines.
         probability: (p,): that noise alone looks as much like one of the cubes.
         source: (p,): the input (from zero) that is cubed, or -1: the output.
     """
@@ -44,7 +44,7 @@ def cubes(
     *,
     repeats: int = 1,
 ) -> Cubes:
-    """From records (N, r) and (N, p) with odd harmonics (n,) that are silent.
+    """Return the cubes from records (N, r) and (N, p) with odd harmonics (n,) that are silent.
 
     Args:
         model: a rough G at the lines of `found` and at the silent ones, which the measured one is carried by.
@@ -69,32 +69,32 @@ def cubes(
 
 
 def _transforms(signal: Array, periods: Periods, repeats: int) -> ComplexArray:
-    """(blocks, periods, harmonics, channels) of all records together."""
+    """Return the transforms of all records (blocks, periods, harmonics, channels)."""
     return np.concatenate([periods.transforms(one) for one in np.split(signal, repeats)], axis=1)
 
 
 def _mean(signal: Array, periods: Periods, repeats: int) -> ComplexArray:
-    """(harmonics, channels, blocks) about the level."""
+    """Return mean transforms (harmonics, channels, blocks), with the level zero."""
     mean = np.moveaxis(_transforms(signal, periods, repeats).mean(axis=1), 0, -1)
     mean[0] = 0.0
     return mean
 
 
 def _only(Y: ComplexArray, lines: NDArray[np.int_]) -> ComplexArray:
-    """The same with nothing beside these lines, where there is noise alone."""
+    """Return Y at these lines, and zero at all others, which contain noise alone."""
     kept = np.zeros_like(Y)
     kept[lines] = Y[lines]
     return kept
 
 
 def _cubed(X: ComplexArray, period: int) -> ComplexArray:
-    """The transforms of the cubes of signals, harmonics first."""
+    """Return the transforms of the cubes of signals, harmonics first."""
     signal = np.fft.irfft(X * period, period, axis=0)
     return np.asarray(np.fft.rfft(signal**3, axis=0) / period)
 
 
 def _through(G: ComplexArray, cubed: ComplexArray) -> list[ComplexArray]:
-    """For each of r inputs (n, p, blocks): what outputs have of its cube (n, r, blocks)."""
+    """Return the effect of the cube of each of r inputs on the outputs (n, p, blocks)."""
     return [G[:, :, j, None] * cubed[:, None, j] for j in range(cubed.shape[1])]
 
 

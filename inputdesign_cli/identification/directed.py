@@ -20,7 +20,7 @@ from inputdesign_cli.plant import Model
 
 # A parameter of whose effect the estimate explains all but this share is not tried.
 _EXPLAINED = 1e-6
-# A score of a larger probability is the last word. A mean of less than so many deviations is none.
+# A score of a larger probability is final. A mean below this number of deviations counts as zero.
 _OPEN, _LITTLE = 0.3, 0.1
 # Directions with a larger cosine are one.
 _SAME = 0.99
@@ -28,18 +28,18 @@ _SAME = 0.99
 
 @dataclass(frozen=True)
 class Alternative:
-    """The model with one parameter more, which is zero in the model.
+    """The model with one additional parameter, which is zero in the model.
 
     Attributes:
         name: of the parameter; `phrase`, what it is, for a sentence.
-        fault: what is wrong where it is missing.
+        fault: what is wrong if it is missing.
         column: (N, p), minus the derivative of the prediction errors with respect to it.
         slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
             each state that a plant may be in.
         lag: whether it is a pole or a dead time of the plant.
-        echo: what past errors add to `column`; None where they add nothing.
-        estimated: makes the larger model from the same data, and the statistic of its likelihood ratio; None
-            where there is none.
+        echo: what past errors add to `column`; None if they add nothing.
+        estimated: returns the larger model from the same data, and the statistic of its likelihood ratio;
+            None if no larger model is estimated.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Alternative:
 
     @property
     def of_structure(self) -> bool:
-        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        """Return whether the parameter belongs to a larger structure, not to a varying gain."""
         return self.fault in ("plant", "noise")
 
 
@@ -78,12 +78,12 @@ class Directed:
 
     @property
     def of_structure(self) -> bool:
-        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        """Return whether the parameter belongs to a larger structure, not to a varying gain."""
         return self.test.fault in ("plant", "noise")
 
     @property
     def lag(self) -> bool:
-        """Whether one of the parameters that act alike is a pole or a dead time of the plant."""
+        """Return whether one of the parameters that act alike is a pole or a dead time of the plant."""
         return any(alternative.lag for alternative in self.alternatives)
 
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:
@@ -105,11 +105,11 @@ _Tried = tuple[Alternative, Array, Array]
 def directed_tests(
     white: White, alternatives: Sequence[Alternative], parameters: int, echoes: Echoes | None = None
 ) -> tuple[Directed, ...]:
-    """Return the test of every alternative; those that these data cannot distinguish share one.
+    """Return the test of every alternative; alternatives that these data cannot distinguish share one.
 
     Args:
         parameters: k of the model.
-        echoes: what past errors add to the gradients of parameters; None where that is not known.
+        echoes: what past errors add to the gradients of parameters; None if that is not known.
     """
     groups: list[list[_Tried]] = []
     for alternative in alternatives:

@@ -15,7 +15,7 @@ from inputdesign_cli.arrays import Array
 
 # Directions of which less than this share of the knowledge is of one side only are the other's alone.
 _OF_ONE_SIDE = 1e-9
-# Two estimates from the same data agree to this share of a deviation, and of what they know.
+# Two estimates from the same data agree to this share of a deviation, and of their information.
 _THE_SAME = 1e-3
 # An estimate of data among these knows no more than they do; one that knows far less may be stated modestly.
 _LEAST_SHARE, _MOST_SHARE = 0.2, 0.6
@@ -30,21 +30,21 @@ class Earlier:
 
     @property
     def rows(self) -> Array:
-        """(k, k): R with R^T R the information."""
+        """Return R (k, k) with R^T R the information."""
         scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         values, vectors = np.linalg.eigh(self.information / np.outer(scale, scale))
         return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale)
 
     def slope(self, theta: Array) -> Array:
-        """(k,): half the gradient of q."""
+        """Return half the gradient (k,) of q."""
         return np.asarray(self.information @ (theta - self.theta))
 
     def q(self, theta: Array) -> float:
-        """How far theta is away, squared, in standard deviations."""
+        """Return the squared distance of theta in standard deviations."""
         return float(np.sum((self.rows @ (theta - self.theta)) ** 2))
 
     def is_of_these_data(self, theta: Array, factor: Array) -> bool:
-        """Whether it is the estimate from the data with which it counts: half of all, and nothing moves.
+        """Return whether the estimate is of these data: it has half of the information and moves nothing.
 
         Other data of the same length have another input or another noise, and move theta by a deviation.
 
@@ -57,7 +57,7 @@ class Earlier:
         return bool(np.all(np.abs(shares - 0.5) < _THE_SAME) and away < _THE_SAME * np.sqrt(len(theta)))
 
     def agreement(self, theta: Array, factor: Array) -> float:
-        """The probability that two estimates of one system differ as much as this one and that of the data.
+        """Return the probability that two estimates of one system differ as much as this one and the data's.
 
         Args:
             theta: (k,), the estimate from both.
@@ -67,9 +67,9 @@ class Earlier:
         return float(scipy.special.chdtrc(directions, statistic)) if directions else 1.0
 
     def likeness(self, theta: Array, factor: Array) -> float:
-        """The probability that estimates from different data agree as closely as this and that of the data.
+        """Return the probability that estimates from different data agree as closely as this and the data's.
 
-        Of a record that is given again, rounded, or with a few rows less, it is small.
+        It is small for a record that is given again, rounded, or with a few rows less.
 
         Args:
             theta, factor: see `agreement`.
@@ -78,7 +78,7 @@ class Earlier:
         return float(scipy.special.chdtr(directions, statistic)) if directions else 1.0
 
     def _apart(self, theta: Array, factor: Array, least: float, most: float) -> tuple[float, int]:
-        """How far the two are apart, squared, in deviations of their difference, and in how many directions.
+        """Return the squared distance of the two, in deviations of their difference, and its dimension.
 
         Args:
             least, most: of the knowledge in a direction that counts, the share that is of this one.

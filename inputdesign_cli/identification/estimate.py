@@ -45,25 +45,26 @@ class Estimate:
         errors: (samples, p) prediction errors at theta.
         converged: whether the search settled; `steps` that it took, from the best of `starts`.
         fit: output by output, per cent of the rms of y (its mean taken off) that the model's simulation
-            explains; None where the model is unstable and cannot be simulated.
+            explains; None if the model is unstable and cannot be simulated.
         simulated: (samples, p), what the inputs and the start of each record cause in the model.
         free: whether unknown starts and levels were estimated along with theta.
         rest_refuted: whether the records say that they do not begin at rest about zero.
         first: (records, p), the first residuals if each record began at rest about zero.
-        agreement: the probability that an earlier estimate differs as much as the one that counts along; None
-            where there is none.
-        likeness: the probability that one from other data agrees as closely; None where there is none.
+        agreement: the probability that an earlier estimate, which is combined with the data, differs as
+            much; None without one.
+        likeness: the probability that one from other data agrees as closely; None without one.
         lengths: the samples of each of the records, which follow each other.
         rivals: other minima that explain the data nearly as well.
         alike: of several experiments, the probability that each differs as much from the others.
-        repeated: where errors come again, as those of samples that are given twice.
+        repeated: where errors repeat, as for samples that are given twice.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
-        tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
+        tests: of the structure, and `directed` of one additional parameter; `failed` are the ones that
+            refute it.
         shift: where an output most likely shifts, whatever the inputs do; None in too short records.
         shifts: all that refute the structure; `beside_shifts`, `tests` once they are taken off.
-        coloured: whether the noise has more structure than its model; all tests but those of past residuals
-            are then made with residuals that were made white.
+        coloured: whether the noise has more structure than its model; all tests except of past residuals are
+            then made with whitened residuals.
         future: in open loop, whether the future of each input explains errors.
     """
 
@@ -98,7 +99,7 @@ class Estimate:
 
     @cached_property
     def information(self) -> Array:
-        """(k, k)."""
+        """Return the information matrix (k, k)."""
         return self.factor @ self.factor.T
 
     @cached_property
@@ -109,25 +110,25 @@ class Estimate:
 
     @property
     def all_tests(self) -> tuple[ScoreTest, ...]:
-        """Those of many signals, those of one parameter more, and that of level shifts."""
+        """Return the tests of many signals, of one additional parameter, and of level shifts."""
         shifts = () if self.shift is None else (self.shift.test,)
         return (*self.tests, *(one.test for one in self.directed), *shifts)
 
     @property
     def answering(self) -> tuple[ScoreTest, ...]:
-        """Those of inputs that answer the outputs, or that come after their answer."""
+        """Return the tests of inputs that depend on past outputs, or are logged later than their effect."""
         return tuple(test for test in self.future if test.probability * len(self.future) < level("feedback"))
 
     @property
     def failed(self) -> tuple[ScoreTest, ...]:
-        """The tests that refute the structure."""
+        """Return the tests that refute the structure."""
         return self.failed_within(1)
 
     @property
     def shifted(self) -> tuple[LevelShift, ...]:
-        """Where outputs shift, if nothing else that refutes the structure speaks more against it.
+        """Return the shifts of outputs, unless another refutation of the structure is more significant.
 
-        Tests of many signals that a shift upsets count by what they say once it is taken off.
+        Tests of many signals that a shift upsets count with the shift removed.
         """
         directed = tuple(one.test for one in self.directed)
         others = failed(self.tests, directed)
@@ -146,11 +147,11 @@ class Estimate:
 
     @property
     def failed_besides(self) -> tuple[ScoreTest, ...]:
-        """The tests that refute the structure beside shifts, which upset those of one parameter."""
+        """Return the tests that refute the structure once shifts, which upset other tests, are removed."""
         return failed(self.beside_shifts) if self.shifted else self.failed
 
     def failed_within(self, looks: int) -> tuple[ScoreTest, ...]:
-        """Those where data come in and are looked at so often: a right model seldom fails at any look."""
+        """Return the tests that refute the model in one of `looks` looks; a right one seldom fails in any."""
         shifts = () if self.shift is None or not self.shift.alone else (self.shift.test,)
         return failed(self.tests, tuple(one.test for one in self.directed), shifts, looks)
 
@@ -201,20 +202,20 @@ def concluded(
     feedback: bool,
     echoes: Echoes | None,
 ) -> Estimate:
-    """The estimate with its covariance and the tests of its residuals.
+    """Return the estimate with its covariance and the tests of its residuals.
 
     Args:
         names: (k,).
         found: where the search ended.
         y: (samples, p), the outputs as measured.
-        simulated: (samples, p), see `Estimate`; `stable` tells which of the outputs can be simulated.
+        simulated: (samples, p), see `Estimate`; `stable`: which outputs can be simulated.
         own: (p,) how many parameters each output has; shared ones count in parts.
-        in_noise: number of parameters that make residuals look whiter: those of A, C and D.
-        in_plant: number of parameters that take directions of past inputs away: those of B and F.
+        in_noise: number of parameters that make residuals look whiter, in A, C and D.
+        in_plant: number of parameters that take directions of past inputs away, in B and F.
         recent: the lag up to which the structure looks at the inputs.
         alternatives: the parameters that might be missing.
         experiments: the samples of each experiment.
-        feedback: whether u(t) answers y(t).
+        feedback: whether u(t) depends on y(t).
         echoes: what past errors add to the gradients of parameters.
 
     Raises:
@@ -292,7 +293,7 @@ def noise_of(point: Point, own: Array) -> Array:
 
 
 def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Array) -> Array:
-    """The information of records about the parameters, in factors.
+    """Return the information of records about the parameters, in factors.
 
     Raises:
         SpecError: `not-exciting`.
@@ -301,7 +302,7 @@ def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Arr
 
 
 def _over_minima(names: tuple[str, ...], found: Search, factor: Array, noise: Array) -> Array:
-    """The information where minima beyond sampling instants are about as likely: of their mixture.
+    """Return the information where minima beyond sampling instants are about as likely: of their mixture.
 
     Each has the weight of its likelihood times the square root of the determinant of its covariance
     (Laplace's method, [tierney-kadane-1986]); the covariance is that of the mixture about the estimate.
@@ -350,5 +351,5 @@ def information_of(records: Records, point: Point, noise: Array) -> Array:
 
 
 def _weights(records: Records, noise: Array) -> Array:
-    """W (p, p), the inverse of the noise, which may be no more than rounding."""
+    """Return W (p, p), the inverse of the noise, which may be no more than rounding."""
     return inverses((noise + rounding(records))[None])[0][0]

@@ -41,10 +41,10 @@ class Estimator(Protocol):
 
     @property
     def kind(self) -> Kind:
-        """What is estimated."""
+        """Return the structure that is estimated."""
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        """From many records; see the function of this name."""
+        """Estimate many records; see the function of this name."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,9 @@ class _Recorded:
 
 @singledispatch
 def estimator(model: Model, step: float) -> Estimator:
-    """What estimates models of this kind from samples `step` apart; those in discrete time know theirs.
+    """Return the estimator for models of this kind, from samples `step` apart.
+
+    Models in discrete time have their own step.
 
     Raises:
         TypeError: none is registered.
@@ -126,15 +128,15 @@ def identify(
     near: bool = False,
     ramp: bool = False,
 ) -> Estimate:
-    """The structure of `model` estimated from one record, or jointly from several.
+    """Estimate the structure of `model` from one record, or jointly from several.
 
     Args:
-        model: its orders, zero entries, common polynomials and known parameters are those of the estimate;
-            its other numbers are not used.
+        model: gives the orders, zero entries, common polynomials and known parameters; its other numbers
+            are not used.
         u, y: (samples, r), (samples, p).
         step: time between samples of a plant in continuous time.
         start: (k,), tried besides starts that are made from the data.
-        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; otherwise its start and its level are unknown and
             estimated along. None: as the data say.
@@ -163,7 +165,7 @@ def identify(
 
 
 def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:
-    """The same of many records in one pass, each from its one start, without checks.
+    """Estimate many records in one pass, each from a single start, without checks.
 
     Args:
         model, step: see `identify`.
@@ -183,7 +185,9 @@ def information_of_data(
     free: bool = False,
     earlier: Earlier | None = None,
 ) -> Array:
-    """(k, k): what records tell of a model at its own parameters and noise, whether or not they fit best.
+    """Return the information matrix (k, k) of records at a model's own parameters and noise.
+
+    The parameters need not fit best.
 
     Args:
         model, u, y, step, lengths, earlier: see `identify`.

@@ -23,15 +23,15 @@ _LAGS = ("a", "f", DELAY)
 
 @dataclass(frozen=True)
 class Extension:
-    """One more parameter, against records.
+    """An additional parameter, to be tested against records.
 
     Attributes:
-        model: the larger model, whose new parameter is zero; of a model in other parameters than its
-            coefficients, that of the coefficients.
+        model: the larger model, whose new parameter is zero. If the model has other parameters than its
+            coefficients, this is the model of the coefficients.
         name: of the new parameter; `what` it is.
         record: makes the record of samples u (N, r), y (N, p) that the larger structure is to explain.
         nested: whether that structure has no further freedom than the one parameter.
-        through: made for the lengths of records, what past errors (N, p) add to the gradient; None where
+        through: made for the lengths of records, what past errors (N, p) add to the gradient; None if
             they add nothing.
     """
 
@@ -44,7 +44,7 @@ class Extension:
 
     @property
     def index(self) -> int:
-        """Where the new parameter stands in theta of the larger model."""
+        """Return where the new parameter stands in theta of the larger model."""
         return self.model.names.index(self.name)
 
     def against(self, records: Records) -> Alternative:
@@ -100,16 +100,16 @@ def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo 
 
 
 def new_name(larger: Model, model: Model) -> str:
-    """Of the one parameter that only the larger has."""
+    """Return the name of the one parameter that only the larger model has."""
     (name,) = set(larger.names) - set(model.names)
     return name
 
 
 def larger_polynomials(model: PolynomialModel, *, feedback: bool) -> Iterator[tuple[PolynomialModel, str]]:
-    """One more coefficient in B, F (or A), C and D each, or a delay of one sample less; and which it is.
+    """Yield models with a further coefficient in B, F (or A), C or D, or a shorter delay, and its name.
 
     Args:
-        feedback: whether u(t) answers y(t), so that it cannot act at once.
+        feedback: whether u(t) depends on y(t), so that it cannot act at once.
     """
     for i, j in model.active:
         B, F = model.B[i][j], model.F[i][j]
@@ -134,10 +134,10 @@ def larger_polynomials(model: PolynomialModel, *, feedback: bool) -> Iterator[tu
 def larger_transfer_matrices(
     model: ContinuousModel, *, feedback: bool
 ) -> Iterator[tuple[ContinuousModel, str]]:
-    """One more zero in each entry where it stays proper, or a dead time where there is none; and which it is.
+    """Yield models with a zero more in a proper entry, or a dead time if it has none, and its name.
 
     Args:
-        feedback: whether u(t) answers y(t), so that it cannot act at once.
+        feedback: whether u(t) depends on y(t), so that it cannot act at once.
     """
     none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
     model = replace(model, delay=model.delay or none)
@@ -152,7 +152,7 @@ def larger_transfer_matrices(
 
 
 def _with(rows: Rows, i: int, j: int, entry: Array) -> Rows:
-    """The same table with another entry."""
+    """Return the table with another entry."""
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )

@@ -36,16 +36,16 @@ class Stream:
         self.length = length
 
     def now(self, name: str) -> Array:
-        """The present block of a signal."""
+        """Return the present block of a signal."""
         return self.delayed(name, 0)
 
     def delayed(self, name: str, lag: int) -> Array:
-        """x(t - lag) over the present block."""
+        """Return x(t - lag) over the present block."""
         first = self._history - lag
         return self._signal(name)[first : first + self.length]
 
     def enter(self, name: str, block: Array) -> None:
-        """The present block of a signal from outside."""
+        """Return the present block of a signal from outside."""
         self.now(name)[:] = block
 
     def multiply(self, name: str, source: str, coefficients: Array) -> None:

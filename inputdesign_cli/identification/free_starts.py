@@ -1,12 +1,12 @@
-"""Starts that nobody knows, eliminated from prediction errors (variable projection, and its determinant).
+"""Eliminate unknown starts from prediction errors (variable projection, and its determinant).
 
-Each acts on one output of one record alone. Their responses are made orthonormal there; only the weights of
-the errors tie the outputs together.
+Each start acts on one output of one record alone. Its responses are made orthonormal there; only the weights
+of the errors couple the outputs.
 
-The likelihood is that of what the starts leave open, [harville-1977]: unknowns are integrated over, not only
-estimated, which the determinant stands for. Without it a noise model with a zero on the unit circle, which
-forgets no start, would explain short records too well. Directions of what free unknowns cause before the
-inverse of the noise model are made orthonormal first, so that the measure is not one of the parameters.
+The likelihood is the restricted one, [harville-1977]. The unknowns are integrated over, not only estimated,
+which adds the determinant. Without it a noise model with a zero on the unit circle, which forgets no start,
+would explain short records too well. Responses to free unknowns before the inverse of the noise model are
+made orthonormal first, so that the measure does not depend on the parameters.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.start import Start
 
-# Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
+# Directions of the unknown starts below this size, columns scaled, are linearly dependent.
 _DEPENDENT = 1e-7
 _MOST_ROUNDS = 30
 # Normal equations of outputs whose errors are alike beyond this lose too many digits.
@@ -47,13 +47,13 @@ class Elimination(NamedTuple):
 
 @dataclass(frozen=True)
 class _Basis:
-    """What one start of N samples can explain: orthonormal directions (N + n, m + n).
+    """Orthonormal directions (N + n, m + n) of all errors that one start of N samples can explain.
 
     Attributes:
         coefficients: (K, m + n), of its unknowns for each direction.
         span: (N, m), of the disturbance that free unknowns cause, orthonormal; `by` (K, m) of these.
         inverse: of the factor R of Z = Q R, Z being the responses to directions of `span` and past noise.
-        determinant: log det Z^T Z; `of_noise`, the same of past noise alone.
+        determinant: log det Z^T Z; `of_noise`, the one of past noise alone.
     """
 
     directions: Array
@@ -65,14 +65,14 @@ class _Basis:
     of_noise: float
 
     def slope(self, start: Start) -> float:
-        """The derivative of the determinant, `start` being that of the start."""
+        """Return the derivative of the determinant; `start` is the derivative of the start."""
         free, noise, disturbance = self._gradient
         found = np.sum(free * start.free) + np.sum(noise * start.noise)
         return 2.0 * float(found - np.sum(disturbance * start.disturbance))
 
     @cached_property
     def _gradient(self) -> tuple[Array, Array, Array]:
-        """Half the gradient of the determinant in the blocks of a start; in the last, its negative."""
+        """Return half the gradient of the determinant in the blocks of a start; in the last, its negative."""
         samples, known = self.span.shape
         of_responses = (self.directions @ self.inverse.T)[:samples].T
         return self.by @ of_responses[:known], of_responses[known:], self.by @ self.span.T
@@ -88,13 +88,13 @@ class _Block(NamedTuple):
 
     @property
     def samples(self) -> NDArray[np.int64]:
-        """The rows of the record; the others are of past noise."""
+        """Return the rows of the record; the others are of past noise."""
         return self.rows[: self.start.free.shape[1]]
 
 
 @dataclass(frozen=True)
 class FreeStarts:
-    """The starts of records of these `lengths`; those of the longest, output by output.
+    """The starts of records of these `lengths`; `starts` has the longest record's, output by output.
 
     Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
     as large as an error each, they are errors of their own.
@@ -105,12 +105,12 @@ class FreeStarts:
 
     @property
     def finite(self) -> bool:
-        """Whether all are."""
+        """Return whether all starts are finite."""
         return all(start.finite for start in self.starts)
 
     @property
     def any(self) -> bool:
-        """Whether anything is unknown."""
+        """Return whether anything is unknown."""
         return any(len(start.free) + len(start.noise) for start in self.starts)
 
     @property
@@ -120,7 +120,7 @@ class FreeStarts:
 
     @cached_property
     def unknowns(self) -> int:
-        """Number m of free unknowns, those that are the same as others left out."""
+        """Return the number m of free unknowns, without linearly dependent ones."""
         return sum(block.basis.span.shape[1] for block in self._blocks)
 
     @cached_property
@@ -134,11 +134,11 @@ class FreeStarts:
 
     @property
     def of_noise(self) -> float:
-        """The part of that which is due to past noise, whose unknowns have a density of their own."""
+        """Return the part of the determinant due to past noise; its unknowns have a density of their own."""
         return sum(block.basis.of_noise for block in self._blocks)
 
     def slopes(self, starts: Sequence[Start]) -> Array:
-        """(parts,): the derivatives of the terms of the determinant, given those of the starts."""
+        """Return the derivatives (parts,) of the determinant's terms from the derivatives of the starts."""
         zeros = [float(start.zeros) for start in starts]
         own = {
             (length, i): basis.slope(starts[i].cropped(length)) for (length, i), basis in self._bases.items()
@@ -147,7 +147,7 @@ class FreeStarts:
 
     @property
     def parts(self) -> int:
-        """Of how many terms the determinant is the sum."""
+        """Return the number of terms of which the determinant is the sum."""
         return len(self.starts) * (1 + len(self.lengths))
 
     def combined(
@@ -228,7 +228,7 @@ class FreeStarts:
 
     @cached_property
     def _bases(self) -> dict[tuple[int, int], _Basis]:
-        """Records of one length have the same."""
+        """Return the basis for each length of record and each output."""
         return {
             (length, i): _orthonormal(start.cropped(length))
             for length in sorted(set(self.lengths))
@@ -248,7 +248,7 @@ class FreeStarts:
 
 
 def _orthonormal(start: Start) -> _Basis:
-    """The directions of one start, those of free unknowns that are the same as others left out."""
+    """Return the directions of one start, without linearly dependent free unknowns."""
     norm = np.linalg.norm(start.disturbance, axis=1)
     scale = np.where(norm > 0.0, norm, np.inf)  # a start that no output shows is left at zero
     span, s, V = np.linalg.svd(start.disturbance.T / scale, full_matrices=False)

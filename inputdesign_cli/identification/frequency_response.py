@@ -1,10 +1,10 @@
-"""The frequency response of a plant from data alone, without a model, and how far to trust it.
+"""Estimate the frequency response of a plant from data alone, without a model, and its uncertainty.
 
-From inputs that repeat, line by line: the mean of the periods, and their scatter ([pintelon-schoukens-2012],
-Section 2.5). From others by a local polynomial: around each frequency, responses and the leakage of start and
-end are parabolas, fitted to a few lines of the Fourier transforms (the same, Section 7.3). A parabola does
-not follow the phase of a long dead time: where one is known, inputs are delayed by it first. Signals x from
-outside, such as the reference of a loop, are instruments: G is the response to x of y over that of u.
+If the inputs repeat, it follows line by line from mean and scatter of the periods ([pintelon-schoukens-2012],
+Section 2.5). Otherwise a local polynomial is used (Section 7.3): around each frequency, responses and the
+leakage of start and end are parabolas, fitted to a few lines of the Fourier transforms. A parabola does not
+follow the phase of a long dead time: if one is known, inputs are delayed by it first. Signals x from outside,
+for example the reference of a loop, are instruments: G is the response of y to x over the response of u.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class FrequencyResponse:
         frequency: (n,), rad/sample.
         G: (n, p, r).
         radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
-        noise: (n, p): the spectrum of what the inputs do not explain; that of white noise is its variance.
+        noise: (n, p): the spectrum of the unexplained part of y; for white noise it is the variance.
         coherence: (n, p): the share of the spectrum of y that the inputs explain.
         method: how it was estimated.
     """
@@ -76,14 +76,13 @@ def frequency_response(
     lengths: Sequence[int] | None = None,
     delays: Callable[[int], NDArray[np.int64]] | None = None,
 ) -> FrequencyResponse | None:
-    """From records that follow each other; None where they are too short or excite no frequency enough.
+    """Return the response from consecutive records; None if they are too short or excite no frequency enough.
 
     Args:
         u, y: (N, r), (N, p).
-        x: (N, r), what excites from outside; None: u itself, which then must not answer y.
-        delays: of records of so many samples, those by which inputs are thought to act late, (p, r). They
-            are tried where they turn the phase fast, and kept where they leave less unexplained; not with
-            signals from outside.
+        x: (N, r), the external excitation; None: u itself, which then must not depend on y.
+        delays: gives presumed delays of the inputs (p, r) for records of a number of samples. They are tried
+            if they turn the phase fast, and kept if less remains unexplained; not with external signals.
     """
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
@@ -101,7 +100,7 @@ def frequency_response(
 
 
 def found_period(x: Array) -> int:
-    """Of a signal (N,) that repeats, at least twice; 0 of others."""
+    """Return the period of a signal (N,) that repeats at least twice, otherwise 0."""
     tolerance = REPEATS * float(np.abs(x).max())
     if x.size < 2:
         return 0
@@ -130,7 +129,7 @@ def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.in
 
 
 def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | None:
-    """One input whose signals repeat; the first of three periods or more is left to the transient."""
+    """Return the response to one repeated input; the first of three periods or more is transient."""
     times = len(y) // period
     periods = Periods(period, skip=int(times > 2))
     found = periodic_response(u, y, periods, excited_harmonics(x, periods))
@@ -159,7 +158,7 @@ def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
 
 
 def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
-    """What periods of so many samples gave, with discs of confidence."""
+    """Return the response from periods of `period` samples, with discs of confidence."""
     return FrequencyResponse(
         2.0 * np.pi * found.harmonics / period,
         found.G,
@@ -192,13 +191,13 @@ def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse
 
 
 def _window(records: Sequence[tuple[Array, ...]]) -> int:
-    """How many lines of each record the parabolas are fitted to."""
+    """Return how many lines of each record the parabolas are fitted to."""
     unknowns = _PARABOLA * (records[0][1].shape[1] + len(records))
     return -(-(unknowns + _FREEDOM) // len(records)) + 1
 
 
 def _turns(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> bool:
-    """Whether a parabola cannot follow the phase of these delays."""
+    """Return whether a parabola cannot follow the phase of these delays."""
     longest = max(len(y) for *_, y in records)
     return bool(2.0 * np.pi * delays.max() * _window(records) / longest > _TURN)
 
@@ -232,20 +231,20 @@ def _delayed(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) ->
 
 
 def _leaves_less(one: FrequencyResponse, other: FrequencyResponse) -> bool:
-    """Whether what the inputs do not explain is less by the first."""
+    """Return whether the first response leaves less unexplained."""
     first, second = (np.mean(np.log(np.maximum(found.noise, 1e-300))) for found in (one, other))
     return bool(first <= second)
 
 
 def _transforms(*signals: Array) -> tuple[NDArray, ...]:
-    """The lines of a record (N,), and the transforms (N, channels) of its signals there."""
+    """Return the lines of a record (N,), and the transforms (N, channels) of its signals there."""
     samples = len(signals[0])
     lines = 2.0 * np.pi * np.arange(samples) / samples
     return lines, *(np.fft.fft(signal, axis=0) / np.sqrt(samples) for signal in signals)
 
 
 def _centres(samples: int) -> Array:
-    """Lines of a record, at most as many as can be looked at, evenly on a logarithmic axis."""
+    """Return lines of a record, at most as many as can be looked at, evenly on a logarithmic axis."""
     last = (samples - 1) // 2
     if last <= _MOST_FREQUENCIES:
         return np.asarray(2.0 * np.pi * np.arange(1, last + 1) / samples)
@@ -256,10 +255,10 @@ def _centres(samples: int) -> Array:
 def _at(
     w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int, terms: int
 ) -> tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
-    """G (p, r) and its radius, noise and coherence (p,) at w; None where inputs cannot be told apart.
+    """Return G (p, r), its radius, noise and coherence (p,) at w; None if inputs are not separable.
 
     Args:
-        terms: of the polynomials.
+        terms: the number of terms of the polynomials.
     """
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):

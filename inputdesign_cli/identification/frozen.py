@@ -1,9 +1,9 @@
-"""Does a sensor stand still? Then samples are equal where noise, or the input, would move them.
+"""Detect a sensor that stands still: its samples are equal although noise, or the input, would move them.
 
-An innovation of standard deviation s falls into a cell of width d, wherever it lies, with a probability of at
-most d f / s, where f is the largest density of usual noise. So many equal samples in a row are beyond chance
-where that is small. Where rounding hides the noise, the model tells: it moves by more than a cell and its own
-errors while the sensor does not.
+An innovation of standard deviation s falls into a cell of width d with a probability of at most d f / s.
+Here f is the largest density of usual noise. If that is small, a row of equal samples is
+beyond chance. If rounding hides the noise, the model decides: it moves by more than a cell and its own errors
+while the sensor does not.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _ROUNDING = 6.0 / 12.0
 # A measured input that rests may flicker by a step of its rounding, which moves no output: this share of its
 # standard deviation says nothing.
 _MOVES = 0.1
-# The errors of a simulation hardly span so many of their robust standard deviations.
+# The errors of a simulation rarely span this number of their robust standard deviations.
 _SPAN = 8.0
 
 
@@ -50,7 +50,7 @@ def frozen(
     simulated: Array,
     lengths: Sequence[int],
 ) -> list[Frozen]:
-    """The stretches in which an output stands still while an input moves, output by output.
+    """Return the stretches in which an output stands still while an input moves, output by output.
 
     Args:
         held: (samples, p), whether the sample is that before, as recorded.
@@ -89,7 +89,7 @@ def resolution_of(y: Array) -> Array:
 
 
 def _likely(errors: Array, d: float) -> float:
-    """The largest probability that a sample falls into the cell of the last one."""
+    """Return the largest probability that a sample falls into the cell of the last one."""
     if errors.size < _FEW or not np.any(errors):
         return 1.0
     white = whitened(errors)

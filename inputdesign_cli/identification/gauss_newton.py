@@ -26,7 +26,7 @@ _TRUSTED = 0.25
 # Rounding of a sum of squares: a cost that rises by less has not risen.
 _ROUNDING = 1e-12
 _RIDGE = 1e-14
-# Looked at every so many steps: a run that took less than this off -2 log likelihood, and less than this
+# Checked after every _WATCHED steps: a run that took less than this off -2 log likelihood, and less than this
 # share of what its next step promises, is stuck. Where that is next to nothing, only rounding stops it.
 _WATCHED = 10
 _STUCK, _SHARE = 0.05, 0.01
@@ -38,7 +38,7 @@ class Problem(Protocol):
 
     @property
     def errors(self) -> int:
-        """Number of prediction errors of a run."""
+        """Return the number of prediction errors of a run."""
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
         """Cost (runs,), half its Hessian to first order (runs, k, k), minus half its gradient (runs, k).
@@ -47,10 +47,10 @@ class Problem(Protocol):
         """
 
     def stabilised(self, theta: Array) -> Array:
-        """theta (runs, k), moved where its predictor would be unstable; a copy."""
+        """Return theta (runs, k), moved where its predictor would be unstable; a copy."""
 
     def kept(self, runs: NDArray[np.bool_]) -> Self:
-        """The same problem with some of its runs only."""
+        """Return the same problem with some of its runs only."""
 
 
 @dataclass(frozen=True)

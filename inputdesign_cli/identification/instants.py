@@ -1,7 +1,7 @@
-"""Minima on the other side of sampling instants, which dead times pass.
+"""Find minima on the other side of sampling instants, which dead times pass.
 
-There the likelihood has a kink, and may have a minimum between any two instants, as likely as the best and
-within a few standard deviations of it. None of them alone tells how far the parameters are known.
+There the likelihood has a kink. It may have a minimum between any two instants, as likely as the best and
+within a few standard deviations of it. No single minimum shows how far the parameters are known.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _RIDGE = 1e-9
 
 
 def beyond_instants(records: Records, found: Minimum) -> Minimum:
-    """The same with minima that are found beyond the instants next to dead times, until none is better."""
+    """Return `found` with minima beyond the sampling instants next to dead times, until none is better."""
     for _ in range(_ROUNDS):
         best = best_run(found)
         point = evaluate(records, found.theta[best])
@@ -46,12 +46,12 @@ def beyond_instants(records: Records, found: Minimum) -> Minimum:
 
 
 def _of(one: Minimum, runs: NDArray[np.bool_]) -> Minimum:
-    """Some of the runs."""
+    """Return some of the runs."""
     return Minimum(one.theta[runs], one.cost[runs], one.hessian[runs], one.converged[runs], one.steps[runs])
 
 
 def _both(one: Minimum, other: Minimum) -> Minimum:
-    """The runs of the one, then those of the other."""
+    """Return the runs of `one`, then the runs of `other`."""
     return Minimum(
         np.concatenate([one.theta, other.theta]),
         np.concatenate([one.cost, other.cost]),
@@ -62,9 +62,10 @@ def _both(one: Minimum, other: Minimum) -> Minimum:
 
 
 def minima_beside(records: Records, point: Point, found: Minimum) -> tuple[tuple[Point, float], ...]:
-    """Minima near the best `point` and about as likely, each with what it has more in -2 log likelihood.
+    """Return minima near the best `point` and about as likely, each with its excess in -2 log likelihood.
 
-    Those of models with dead times, from which kinks part the best one; what is far from it is a rival.
+    Only models with dead times have them: kinks separate them from the best one. A minimum far from it is a
+    rival.
     """
     if not records.dead_times.size or point.cost <= 0.0:
         return ()

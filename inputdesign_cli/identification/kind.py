@@ -44,54 +44,54 @@ class Kind(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """(k,): of the parameters."""
+        """Return the names (k,) of the parameters."""
 
     @property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
 
     @property
     def continuous(self) -> bool:
-        """Whether frequencies of the model are in rad per time unit."""
+        """Return whether frequencies of the model are in rad per time unit."""
 
     @property
     def recent(self) -> int:
-        """The lag up to which the structure looks at the inputs."""
+        """Return the lag up to which the structure looks at the inputs."""
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
-        """(k,): the parameters that take directions of past inputs away from residuals."""
+        """Return the mask (k,) of the parameters that take directions of past inputs away from residuals."""
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those that make residuals look whiter."""
+        """Return the mask (k,) of the parameters that make residuals look whiter."""
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has; those that n outputs share count as 1/n."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
 
     def record(self, u: Array, y: Array) -> Record:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Where to begin: points made from records at rest about zero, and the `given` one (k,)."""
+        """Return starting points: made from records at rest about zero, and the `given` one (k,)."""
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
-        """The same, with starts that keep the known (k,) of its parameters where they know how to."""
+        """Return the kind with starts that keep `known` parameters (k,), if its starts can do that."""
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """What the structure at theta (k,) would become by one parameter more.
+        """Return the extensions of the structure at theta (k,) by one parameter.
 
         Args:
-            feedback: whether u(t) answers y(t).
+            feedback: whether u(t) depends on y(t).
         """
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """What past errors add to the gradients at theta (k,), in records of these lengths; None: unknown."""
+        """Return what past errors add to gradients at theta (k,), in records of `lengths`; None: unknown."""
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """(N, p), what inputs and starts cause in the estimate, and which outputs can be simulated."""
+        """Return the effect of inputs and starts (N, p), and which outputs can be simulated."""
 
 
 def identify_records(
@@ -109,13 +109,13 @@ def identify_records(
     near: bool = False,
     ramp: bool = False,
 ) -> Estimate:
-    """The maximum-likelihood estimate of a structure from one record, or jointly from several.
+    """Return the maximum-likelihood estimate of a structure from one record, or jointly from several.
 
     Args:
-        kind: of which names, orders and delays are those of the estimate; numbers are not used.
+        kind: gives names, orders and delays; its numbers are not used.
         u, y: (N, r), (N, p).
         start: (k,), tried besides starts that are made from the data.
-        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
         earlier: an estimate from other data, which counts along.
@@ -174,7 +174,7 @@ def identify_records(
 
 
 def fit_records(records: Sequence[Records], start: Array, steps: Array, own: Array) -> BatchEstimate:
-    """The estimates of many runs, each from its one start (k,), without checks.
+    """Return the estimates of many runs, each from its one start (k,), without checks.
 
     Args:
         records: one a run.
@@ -194,10 +194,10 @@ def fit_records(records: Sequence[Records], start: Array, steps: Array, own: Arr
 
 
 def fit_batches(kind: Kind, u: ArrayLike, y: ArrayLike, start: ArrayLike) -> BatchEstimate:
-    """The same, of records as arrays.
+    """Estimate many records, given as arrays, each from a single start and without checks.
 
     Args:
-        kind: of which the structure is meant.
+        kind: gives the structure.
         u: (N, r) common to all runs, or (runs, N, r).
         y: (runs, N, p).
         start: (k,) for all runs, or (runs, k).

@@ -12,13 +12,13 @@ from inputdesign_cli.plant import PolynomialModel
 
 
 def is_arx(model: PolynomialModel) -> bool:
-    """Whether least squares is the prediction-error estimate: C, D and F are 1."""
+    """Return whether least squares is the prediction-error estimate: C, D and F are 1."""
     each = [*model.C, *model.D, *(f for row in model.F for f in row)]
     return not any(np.any(p[1:]) for p in each)
 
 
 def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
-    """theta (runs, k), outputs weighted with the inverse covariance of e.
+    """Return theta (runs, k), outputs weighted with the inverse covariance of e.
 
     Args:
         model: an ARX model of which the structure and the covariance are meant.
@@ -52,7 +52,7 @@ def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
 
 
 def estimated_polynomials(model: PolynomialModel, theta: Array) -> tuple[Array, Array]:
-    """A (runs, p, l) and B (runs, p, r, m) of estimates (runs, k), ascending in q^-1."""
+    """Return A (runs, p, l) and B (runs, p, r, m) of estimates (runs, k), ascending in q^-1."""
     A = np.zeros((len(theta), model.outputs, max(a.size for a in model.A)))
     A[:, :, 0] = 1.0
     B = np.zeros((len(theta), model.outputs, model.inputs, max(b.size for row in model.B for b in row)))

@@ -1,9 +1,9 @@
-"""Does an output shift and stay where it is, though no input does that, as after a change of load?
+"""Detect an output that shifts and stays there without a cause in the inputs, as after a change of load.
 
-What shifts is a step, or one that a lag makes smooth, from any sample on until the record ends
-([tsay-1988]). Scores of all of them are correlations of the residuals with one response: a test for every
-sample costs no more than a few transforms. A test of trends, which shares its power among many signals,
-hardly notices what has happened once; and what the estimate makes of it is another gain and slower dynamics.
+The shift is a step, or a step smoothed by a lag, from any sample on until the record ends ([tsay-1988]).
+Scores of all of them are correlations of the residuals with one response: a test for every sample costs no
+more than a few transforms. A test of trends shares its power among many signals, and hardly notices a single
+event. The estimate takes the shift for another gain and slower dynamics.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from inputdesign_cli.levels import level
 
 # Time constants of the lags, in samples, each so much longer than the last, to this share of the record.
 _SHORTEST, _GROWTH, _SHARE = 4.0, 4.0, 0.125
-# So many are told.
+# The largest number of shifts that are reported.
 _MOST = 6
 # What is nearer to an end of a record is its start, or a few samples that are wrong.
 _FEWEST = 5
@@ -46,8 +46,8 @@ class LevelShift:
         begins, ends: between these samples it likely begins and has settled, the last left out.
         rises: whether the output is larger after it.
         test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-        score: the statistic of the score, which is smaller; so many `looks` it was the largest of.
-        alone: whether it explains more than a line through its record does, or single samples beside it do.
+        score: the statistic of the score, which is smaller; it is the largest of `looks` statistics.
+        alone: whether it explains more than a line through its record, or single samples next to it.
     """
 
     output: int
@@ -63,7 +63,7 @@ class LevelShift:
 
     @property
     def refutes(self) -> bool:
-        """Whether a model without it is refuted."""
+        """Return whether a model without it is refuted."""
         return self.alone and self.test.probability < level("level shift")
 
 
@@ -92,7 +92,7 @@ def level_shifts(
 
 
 def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
-    """The probability of so many shifts together, by the likelihood ratio and by the score."""
+    """Return the probability that all these shifts are chance, by the likelihood ratio and by the score."""
     looks = shifts[0].looks
     return (
         _by_chance([shift.test.statistic for shift in shifts], looks),
@@ -101,13 +101,13 @@ def chance_of_shifts(shifts: Sequence[LevelShift]) -> tuple[float, float]:
 
 
 def _by_chance(statistics: Sequence[float], looks: int) -> float:
-    """That of a sum of statistics, each the largest of so many."""
+    """Return the probability of a sum of statistics as large, each the largest of `looks`."""
     size = len(statistics)
     return min(float(looks) ** size * float(scipy.special.chdtrc(size, sum(statistics))), 1.0)
 
 
 def level_shift(records: Records, point: Point, white: White) -> LevelShift | None:
-    """The likeliest shift; None in records that are too short for any."""
+    """Return the likeliest shift; None in records that are too short for any."""
     found: list[tuple[float, int, int, float, bool, bool]] = []
     lags = _lags(max(records.lengths))
     steps = np.stack([_smooth(max(records.lengths), lag) for lag in lags], axis=1)
@@ -150,7 +150,7 @@ def _taken_off(records: Records, theta: Array, white: White, shift: LevelShift) 
 
 
 def _stretches(records: Records) -> Iterator[tuple[int, int]]:
-    """Where each record begins, and its samples; too short ones are passed over."""
+    """Return where each record begins, and its samples; too short ones are passed over."""
     begin = 0
     for length in records.lengths:
         if length > 2 * _FEWEST:
@@ -159,7 +159,7 @@ def _stretches(records: Records) -> Iterator[tuple[int, int]]:
 
 
 def _lags(samples: int) -> list[float]:
-    """None, then ever longer ones."""
+    """Return the lags to try: zero, then ever longer ones."""
     found = [0.0]
     lag = _SHORTEST
     while lag <= _SHARE * samples:
@@ -169,7 +169,7 @@ def _lags(samples: int) -> list[float]:
 
 
 def _smooth(samples: int, lag: float) -> Array:
-    """(samples,): a step at the first, behind a lag."""
+    """Return a step at the first sample behind a lag (samples,)."""
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
@@ -210,7 +210,7 @@ def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:
 
 
 def _line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
-    """The statistic of a line through one record of an output."""
+    """Return the statistic of a line through one record of an output."""
     signal = np.zeros((records.samples, 1))
     signal[begin : begin + length, 0] = np.linspace(-1.0, 1.0, length)
     column = _column(records, theta, white, signal, output)

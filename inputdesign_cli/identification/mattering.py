@@ -1,9 +1,9 @@
-"""Which of the parameters that a model lacks speak against what is promised of it: |error of G| <= r_adm.
+"""Select the parameters that a model lacks and that speak against its accuracy: |error of G| <= r_adm.
 
-Of a larger structure it is not enough that the parameter is beyond chance, nor needed: the odds count that it
-is there and that G, which then moves by what is estimated and is known no better than it is, is beyond r_adm.
-The evidence for the parameter is the Bayes factor of a normal estimate ([kass-raftery-1995]); beforehand the
-parameter is normal about zero, of such a size that it moves G by about r_adm.
+It is neither enough nor necessary that the parameter is beyond chance. The odds count that it exists and that
+G is beyond r_adm, after the estimated move and with its uncertainty. The evidence for the parameter is the
+Bayes factor of a normal estimate ([kass-raftery-1995]). A priori the parameter is normal about zero, of a
+size that moves G by about r_adm.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ class Moves:
 
     @property
     def largest(self) -> float:
-        """The largest estimated one."""
+        """Return the largest estimated move of G."""
         return float(np.max(self.estimated))
 
     def odds(self, probability: float) -> float:
-        """That the parameter is there and G is beyond what is admitted, if it is as likely there as not.
+        """Return the odds that the parameter exists and G exceeds the admissible error, from even prior odds.
 
         Args:
             probability: of an estimate as far from zero, if the parameter is not there.
@@ -67,7 +67,7 @@ class Moves:
 
 
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
-    """The numbers of those that speak against a verdict."""
+    """Return the indices of the parameters that speak against a verdict."""
     # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
     # G by more than is admitted, at a level that is shared among all that would. What is not a number is no
     # promise: it is compared so that it speaks against one.

@@ -21,7 +21,7 @@ from inputdesign_cli.identification.starts import noise_polynomials
 from inputdesign_cli.plant.filtering import filtered
 
 _ORDERS = ((0, 1), (1, 0), (1, 1), (0, 2), (2, 2))
-# Coefficients of the filter that makes residuals white: so many samples tell each, and no more are tried.
+# Coefficients of the filter that whitens residuals: samples needed for each, and the most that are tried.
 _SAMPLES_A_COEFFICIENT, _MOST = 20, 12
 
 Noise = tuple[Array, Array]
@@ -63,7 +63,7 @@ class Whitening:
 
     @classmethod
     def of(cls, errors: Array, lengths: tuple[int, ...]) -> Whitening:
-        """Return those of residuals (N, p): autoregressions, of the orders that BIC prefers."""
+        """Return the filters for residuals (N, p): autoregressions, of the orders that BIC prefers."""
         return cls(tuple(_autoregression(v, lengths) for v in errors.T), lengths)
 
     def through(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,34 +24,34 @@ class OfModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """(k,): of the parameters."""
+        """Return the names (k,) of the parameters."""
         return self.model.names
 
     @property
     def outputs(self) -> int:
-        """Number of outputs p."""
+        """Return the number of outputs p."""
         return self.model.outputs
 
     @property
     def continuous(self) -> bool:
-        """Whether frequencies of the model are in rad per time unit."""
+        """Return whether frequencies of the model are in rad per time unit."""
         return self.model.continuous
 
     @property
     def recent(self) -> int:
-        """No lag but that of the present: all others act through poles."""
+        """Return lag 0: inputs of all other lags act through poles."""
         return 0
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
-        """The same."""
+        """Return the kind unchanged."""
         return self
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """None: the noise is white, and gradients are of inputs alone."""
+        """Return no echoes: the noise is white, and gradients are of inputs alone."""
         return ()
 
     def caused(self, found: Search, y: Array, lengths: Sequence[int] | None) -> Array:
-        """(N, p): what the inputs cause in the estimate, and what unknown starts explain."""
+        """Return the response (N, p) to the inputs, and the part that unknown starts explain."""
         fitted = self.model.at(found.point.theta)
         records, begun = found.records, found.point.near.begun
         with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
@@ -77,14 +77,14 @@ class OverRecord:
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
-        """Those of the other, whose parameters come first."""
+        """Return the dead times of the inner record, whose parameters come first."""
         return self.record.dead_times
 
     def crossings(self, theta: Array) -> Array:
-        """Those of the other."""
+        """Return the crossings of the inner record, with zeros for further parameters."""
         own = self.record.crossings(theta[: self.record.size])
         return np.pad(own, ((0, 0), (0, 0), (0, theta.size - self.record.size)))
 
     def remembering(self, late: int) -> Self:
-        """The same, with a record that does."""
+        """Return the record with free responses of its inner record, which last `late` samples."""
         return replace(self, record=self.record.remembering(late))

@@ -20,7 +20,7 @@ _OF_ONE_SIDE = 1e-6
 
 
 def of_one_system(point: Point, noise: Array, experiments: Sequence[int]) -> tuple[float, ...]:
-    """The probability that each experiment differs from the others as much, if all are of one system.
+    """Return the probability that each experiment differs from the others as much, if all are of one system.
 
     Args:
         point: the joint estimate.

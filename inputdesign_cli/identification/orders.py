@@ -34,7 +34,7 @@ class Block:
 
     @property
     def source(self) -> str:
-        """The signal of which the columns of psi are delays."""
+        """Return the signal of which the columns of psi are delays."""
         return f"{self.letter}{self.entry}" if self.letter in "bf" else self.letter
 
 
@@ -50,7 +50,7 @@ class Polynomials:
 
     @property
     def order(self) -> int:
-        """The highest of all orders."""
+        """Return the highest of all orders."""
         return max(p.shape[1] for p in (self.A, self.C, self.D, *self.B, *self.F)) - 1
 
 
@@ -58,7 +58,7 @@ class Polynomials:
 class OutputOrders:
     """Orders of one output: A y = sum_j (B_j / F_j) u_j + (C / D) e; entries that are zero are left out.
 
-    theta is ordered as a1.., the coefficients of B entry by entry, c1.., d1.., those of F.
+    theta is ordered as a1.., the coefficients of B entry by entry, c1.., d1.., the coefficients of F.
     """
 
     a: int
@@ -68,7 +68,7 @@ class OutputOrders:
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """The polynomials in the order of theta; those without free coefficients, too."""
+        """Return the polynomials in the order of theta; those without free coefficients, too."""
         parts = [("a", 0, range(1, self.a + 1))]
         parts += [("b", e, range(x.delay, x.b + 1)) for e, x in enumerate(self.entries)]
         parts += [("c", 0, range(1, self.c + 1)), ("d", 0, range(1, self.d + 1))]
@@ -81,21 +81,21 @@ class OutputOrders:
 
     @cached_property
     def by_letter(self) -> dict[str, tuple[Block, ...]]:
-        """The blocks of each polynomial; of A, C and D one."""
+        """Return the blocks of each polynomial; of A, C and D one."""
         return {letter: tuple(b for b in self.blocks if b.letter == letter) for letter in "abcdf"}
 
     @property
     def size(self) -> int:
-        """Number of parameters."""
+        """Return the number of parameters."""
         return self.blocks[-1].columns.stop
 
     @property
     def memory(self) -> int:
-        """How far back the regression looks, recursions aside."""
+        """Return how far back the regression looks, recursions aside."""
         return max([self.a, *(entry.b for entry in self.entries)])
 
     def polynomials(self, theta: Array) -> Polynomials:
-        """theta (runs, k) as polynomials."""
+        """Return theta (runs, k) as polynomials."""
 
         def of(letter: str) -> tuple[Array, ...]:
             parts = []

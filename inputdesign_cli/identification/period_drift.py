@@ -1,8 +1,8 @@
-"""Drifts of outputs beside inputs that repeat, told by the means of whole periods.
+"""Estimate drifts of outputs under repeated inputs, from the means of whole periods.
 
-A ramp is the same in every period, but for its level: their scatter does not see it, and it adds to all
-lines, excited or not, as a nonlinearity does. The means of the periods tell it, in which a plant that has
-settled has nothing else than noise.
+A ramp is the same in every period, but for its level. The scatter of the periods does not show it. It adds to
+all lines, excited or not, as a nonlinearity does. The means of the periods show it: without drift they vary
+by noise alone once the plant has settled.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ class PeriodDrift:
 def period_drift(
     y: Array, time: Array, periods: Periods, noise: Array, *, repeats: int = 1
 ) -> PeriodDrift | None:
-    """What outputs (N, p) drift beyond chance, each record by itself; None where nothing does.
+    """Return the drift of outputs (N, p) beyond chance, record by record, or None if nothing drifts.
 
-    The mean of a period has the variance Phi(0) / period. A degree counts where the means have more of the
-    orthogonal polynomial of that degree than chance leaves with 1e-4 for all outputs, records and degrees.
+    The mean of a period has the variance Phi(0) / period. A degree counts if the means have more of the
+    orthogonal polynomial of that degree than chance has with 1e-4 for all outputs, records and degrees.
 
     Args:
         time: (N,), at which samples were taken, in any unit.
@@ -61,7 +61,7 @@ def period_drift(
 
 
 def line_of_periods(y: Array, periods: Periods) -> Array:
-    """(N, p): the lines about zero that the means of the periods of outputs (N, p) lie on."""
+    """Return the lines (N, p) about zero that fit the means of the periods of outputs (N, p)."""
     return _curve(*_along(y, np.arange(float(len(y))), periods, 1))
 
 

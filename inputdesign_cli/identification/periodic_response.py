@@ -36,11 +36,11 @@ class Periods:
     skip: int = 0
 
     def each(self, samples: int) -> int:
-        """Whole periods a block of a record of so many samples."""
+        """Return the number of whole periods per block in a record of `samples` samples."""
         return samples // (self.period * self.blocks)
 
     def kept(self, samples: int) -> int:
-        """Periods a block that count."""
+        """Return the number of periods per block that count."""
         return self.each(samples) - self.skip
 
     def transforms(self, signal: NDArray[np.float64]) -> ComplexArray:
@@ -63,12 +63,12 @@ class Periods:
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """G (L, p, r) at harmonics, and what the scatter of the periods says of it.
+    """G (L, p, r) at harmonics, with its uncertainty from the scatter of the periods.
 
     Attributes:
         deviation: (L, p, r): standard deviations of the entries, |error|^2 being their variance.
-        noise: (L, p): the spectrum of the noise; that of white noise is its variance.
-        explained: (L, p): mean squares of what the inputs explain, a line.
+        noise: (L, p): the spectrum of the noise; for white noise it is the variance.
+        explained: (L, p): mean squares of the part that the inputs explain, per line.
         freedom: degrees of freedom of each variance, counted as complex numbers.
     """
 
@@ -81,7 +81,7 @@ class PeriodicResponse:
 
 
 def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
-    """The harmonics between 0 and pi at which some channel of x (N, r) has power."""
+    """Return the harmonics between 0 and pi at which some channel of x (N, r) has power."""
     size = np.abs(periods.transforms(x)).mean(axis=(0, 1)).max(axis=1)
     size = size[: (periods.period + 1) // 2]
     size[0] = 0.0
@@ -128,9 +128,9 @@ def response_at(U: ComplexArray, Y: ComplexArray) -> ComplexArray:
 def periodic_response(
     u: Array, y: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
 ) -> PeriodicResponse | None:
-    """From a record (N, r) and (N, p) with as many blocks as inputs; None where lines cannot be told apart.
+    """Return G from u (N, r) and y (N, p), with a block per input; None if inputs are not separable.
 
-    Two periods or more count.
+    Two periods or more are needed.
 
     Args:
         repeats: how many records of equal length with the same input follow each other.

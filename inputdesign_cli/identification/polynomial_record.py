@@ -31,16 +31,16 @@ class PolynomialRecord:
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return self.structure.size
 
     @cached_property
     def problem(self) -> PredictionErrors:
-        """The same as a problem of one run, from rest."""
+        """Return the record as a problem of one run, from rest."""
         return self.structure.problem(self.u[None], self.y[None])
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Prediction errors (N, p) from rest, and psi (k, N, p)."""
+        """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
         errors, psi = np.empty(self.y.shape), np.zeros((self.size, *self.y.shape))
         for i, (row, place) in enumerate(zip(self.structure.rows, self.structure.places, strict=True)):
             e, own = errors_and_gradient(row, theta[None, place], self.problem.u, self.problem.y[i])
@@ -48,13 +48,13 @@ class PolynomialRecord:
         return errors, psi
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """What the past of each output adds.
+        """Return the starts, output by output.
 
-        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j, which is off by impulses where y and u
-        before the record are missing, by impulses through 1/F_j where the state of an entry is, and by a step
-        through it where the level of its input is: of a stable F_j the others make that up, of one that
-        integrates or nearly does they cannot. From rest only y is missing, which noise has moved, and only if
-        the predictor remembers it beyond its order.
+        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j. This sum is off by impulses if y and u
+        before the record are missing. It is off by impulses through 1/F_j if the state of an entry is,
+        and by a step through it if the level of its input is. For a stable F_j the others make up for the
+        step, but not if F_j integrates or nearly does. From rest only y is missing, which noise has moved.
+        That matters only if the predictor remembers y beyond its order.
         """
         return tuple(
             _start(row, theta[place], len(self.y), free=free)
@@ -62,25 +62,25 @@ class PolynomialRecord:
         )
 
     def lateness(self, theta: Array) -> int:
-        """As many as B looks back further than F."""
+        """Return by how many samples B looks back further than F."""
         entries = (entry for row in self.structure.rows for entry in row.entries)
         return max([0, *(entry.b - entry.f for entry in entries)])
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
-        """None: delays are whole samples, and known."""
+        """Return no indices: delays are whole samples, and known."""
         return np.zeros(0, dtype=np.int64)
 
     def crossings(self, theta: Array) -> Array:
-        """None."""
+        """Return no steps."""
         return np.zeros((0, 2, self.size))
 
     def remembering(self, late: int) -> Self:
-        """The same: the delay is known, and among what the filters remember."""
+        """Return the record unchanged: the filters remember known delays."""
         return self
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of C and D; of F as well if the states are free."""
+        """Return the indices of the coefficients of C and D; of F as well if the states are free."""
         found = [
             place[block.columns]
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
@@ -109,11 +109,11 @@ class PolynomialRecord:
         return found
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p): nothing; no instruments are used."""
+        """Return zeros (k, N, p): no instruments are used."""
         return np.zeros((self.size, *errors.shape))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): signals (N, m) through D/C of each output."""
+        """Return signals (N, m) through D/C of each output (p, N, m)."""
         found = []
         for row, place in zip(self.structure.rows, self.structure.places, strict=True):
             p = row.polynomials(theta[None, place])
@@ -121,7 +121,7 @@ class PolynomialRecord:
         return np.array(found)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with the roots of C, D and F in the unit circle."""
+        """Return theta with the roots of C, D and F in the unit circle."""
         return self.problem.stabilised(theta[None])[0]
 
 

@@ -1,8 +1,8 @@
-"""Prediction-error estimates of polynomial models in q^-1, and of their noise.
+"""Compute prediction-error estimates of polynomial models in q^-1, and of their noise.
 
-The covariance of e is estimated along with theta: the estimate minimises the determinant of the residuals'
-covariance, so that each residual is weighed by what the others tell of it ([ljung-1999], Sections
-7.2 and 15.2). With one output it is the sum of squares.
+The covariance of e is estimated along with theta. The estimate minimises the determinant of the residuals'
+covariance, which weighs each residual by its dependence on the others ([ljung-1999], Sections 7.2 and 15.2).
+With one output it is the sum of squares.
 """
 
 from __future__ import annotations
@@ -43,25 +43,25 @@ class PolynomialKind(OfModel):
 
     @property
     def recent(self) -> int:
-        """How far back the regressions look."""
+        """Return how far back the regressions look."""
         return self.structure.memory
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
-        """(k,): those of B and F."""
+        """Return the mask (k,) of the coefficients of B and F."""
         return np.array([parameter.letter in "bf" for parameter in self.model.parameters], dtype=bool)
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those of A, C and D."""
+        """Return the mask (k,) of the coefficients of A, C and D."""
         return ~self.explaining
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has."""
+        """Return the number of parameters of each output (p,)."""
         return self.structure.own()
 
     def record(self, u: Array, y: Array) -> PolynomialRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
         return PolynomialRecord(self.structure, u, y)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
@@ -73,7 +73,7 @@ class PolynomialKind(OfModel):
         return Starts(points, np.zeros(len(points), dtype=np.int64), max(tried for _, tried in found))
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """One more coefficient in any of the polynomials."""
+        """Return the extensions by a further coefficient in any of the polynomials."""
         found = []
         for larger, what in larger_polynomials(self.model.at(theta), feedback=feedback):
             name, record = new_name(larger, self.model), partial(PolynomialRecord, Structure.of(larger))
@@ -81,7 +81,7 @@ class PolynomialKind(OfModel):
         return tuple(found)
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Those of the coefficients of A, C and D."""
+        """Return the echoes of the coefficients of A, C and D."""
         model = self.model.at(theta)
         found = ((k, echo_of(model, name, lengths)) for k, name in enumerate(model.names))
         return tuple((k, through) for k, through in found if through is not None)
@@ -89,7 +89,7 @@ class PolynomialKind(OfModel):
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """What the inputs cause in the estimate, and what unknown starts explain."""
+        """Return the response of the estimate to the inputs, and the part that unknown starts explain."""
         return self.caused(found, y, lengths), self.model.at(found.point.theta).stable_outputs
 
 
@@ -105,19 +105,18 @@ def identify_polynomials(
     rest: bool | None = None,
     earlier: Earlier | None = None,
 ) -> Estimate:
-    """Prediction-error estimate from one record; in closed loop the direct method.
+    """Return the prediction-error estimate from one record; in closed loop by the direct method.
 
-    Each output is first estimated alone, from several starts (`start` among them if given). What outputs
-    share is then weighed by how well each knows it, and the search for all of them begins there and at
-    `start`. Without C, D and F (ARX) this is least squares, generalised by the covariance of e.
+    Each output is first estimated alone, from several starts (`start` among them if given). Shared
+    parameters are then averaged, weighed by the information of each output. The joint search begins there
+    and at `start`. Without C, D and F (ARX) this is least squares, generalised by the covariance of e.
 
     Args:
-        model: its orders and delays, zero entries and common polynomials are those of the estimate; its
-            numbers mean nothing.
+        model: gives the orders and delays, zero entries and common polynomials; its numbers are not used.
         u, y: (samples, r), (samples, p).
         start: (k,).
         noise: the covariance of e (p, p) if it is known; it is then not estimated.
-        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
         earlier: an estimate from other data, which counts along.
@@ -140,7 +139,7 @@ def identify_polynomials(
 
 
 def fit_polynomials(model: PolynomialModel, u: ArrayLike, y: ArrayLike, *, start: ArrayLike) -> BatchEstimate:
-    """Prediction-error estimates of many records in one pass.
+    """Return prediction-error estimates of many records in one pass.
 
     Args:
         model: of which the structure is meant, see `identify_polynomials`.
@@ -182,13 +181,13 @@ def _starts(structure: Structure, record: PredictionErrors, start: Array | None)
 def _starts_alone(
     row: OutputOrders, place: NDArray[np.int64], record: PredictionErrors, y: Array, start: Array | None
 ) -> Array:
-    """(points, own k): those of one output, by itself."""
+    """Return the starting points (points, own k) of one output alone."""
     points = starting_points(row, [x[:, 0] for x in record.u], y[:, 0])
     return points if start is None else np.concatenate([start[None, place], points])
 
 
 def _one_by_one(structure: Structure, record: PredictionErrors, starts: list[Array]) -> Array:
-    """theta (k,) from each output alone: the information of all, added up."""
+    """Return theta (k,) from each output alone: the information of all, added up."""
     total, moment = np.zeros((structure.size, structure.size)), np.zeros(structure.size)
     for row, place, y, points in zip(structure.rows, structure.places, record.y, starts, strict=True):
         if not place.size:
@@ -207,7 +206,7 @@ def _one_by_one(structure: Structure, record: PredictionErrors, starts: list[Arr
 def _noise_and_information(
     structure: Structure, record: PredictionErrors, found: Minimum
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The covariance of e (runs, p, p) and the information of theta (runs, k, k) at the minima."""
+    """Return the covariance of e (runs, p, p) and the information of theta (runs, k, k) at the minima."""
     samples = record.y[0].shape[0]
     if len(structure.rows) == 1:  # the search has computed it already
         noise = _covariances(structure, found.cost[:, None, None], samples)

@@ -20,7 +20,7 @@ _BLOCK = 32
 
 
 def block_length(samples: int, runs: int, order: int) -> int:
-    """How many samples pass at a time where filters have at most this `order`."""
+    """Return how many samples pass at a time where filters have at most this `order`."""
     return samples if runs < FEW else max(_BLOCK, order)
 
 
@@ -63,7 +63,7 @@ def stream(
 
 
 def _sources(row: OutputOrders, flow: Stream, p: Polynomials) -> None:
-    """The signals of which the columns of psi are delays; see `Block.source`."""
+    """Return the signals of which the columns of psi are delays; see `Block.source`."""
     for e, entry in enumerate(row.entries):
         flow.divide(f"u/CF{e}", f"u/F{e}", p.C)
         flow.multiply(f"b{e}", f"u/CF{e}", p.D)
@@ -80,7 +80,7 @@ def _sources(row: OutputOrders, flow: Stream, p: Polynomials) -> None:
 
 
 def prediction_errors(row: OutputOrders, theta: Array, u: Sequence[Array], y: Array) -> Array:
-    """epsilon (samples, runs) for theta (runs, k)."""
+    """Return epsilon (samples, runs) for theta (runs, k)."""
     out = np.empty(y.shape)
     length = block_length(y.shape[0], y.shape[1], row.polynomials(theta).order)
     for part, errors, _ in stream(row, theta, u, y, length, gradient=False):
@@ -91,7 +91,7 @@ def prediction_errors(row: OutputOrders, theta: Array, u: Sequence[Array], y: Ar
 def errors_and_gradient(
     row: OutputOrders, theta: Array, u: Sequence[Array], y: Array
 ) -> tuple[Array, NDArray[np.float64]]:
-    """epsilon (samples, runs) and psi (k, samples, runs)."""
+    """Return epsilon (samples, runs) and psi (k, samples, runs)."""
     out, psi = np.empty(y.shape), np.empty((row.size, *y.shape))
     length = block_length(y.shape[0], y.shape[1], row.polynomials(theta).order)
     for part, errors, columns in stream(row, theta, u, y, length):

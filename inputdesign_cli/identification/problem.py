@@ -54,33 +54,33 @@ class PredictionErrors:
 
     @classmethod
     def single(cls, row: OutputOrders, u: Sequence[Array], y: Array) -> PredictionErrors:
-        """Of one output alone: the sum of squared prediction errors."""
+        """Return the problem of one output alone: the sum of squared prediction errors."""
         return cls((row,), (np.arange(row.size),), tuple(u), (y,))
 
     def repeated(self, starts: int) -> PredictionErrors:
-        """The same record, (samples, 1) signals, for a search from several starts."""
+        """Return the record, (samples, 1) signals, repeated for a search from several starts."""
         u, y = (tuple(np.repeat(x, starts, axis=1) for x in signals) for signals in (self.u, self.y))
         return replace(self, u=u, y=y)
 
     @cached_property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return 1 + max(int(place.max(initial=-1)) for place in self.places)
 
     @property
     def errors(self) -> int:
-        """Number of prediction errors of a run."""
+        """Return the number of prediction errors of a run."""
         return len(self.y) * self.y[0].shape[0]
 
     def kept(self, runs: NDArray[np.bool_]) -> PredictionErrors:
-        """The same with some of the runs only."""
+        """Return the problem with some of the runs only."""
         u, y = (tuple(x[:, runs] for x in signals) for signals in (self.u, self.y))
         return replace(self, u=u, y=y)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta (runs, k) with the roots of C, D and F mirrored into the unit circle where they leave it.
+        """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
 
-        Roots of F that are exactly one are those of integrators, and stay.
+        Roots of F that are exactly one belong to integrators, and stay.
         """
         theta = theta.copy()
         for letter, columns in self._monic:
@@ -103,7 +103,7 @@ class PredictionErrors:
         return cost, hessian, slope
 
     def sums(self, theta: Array) -> Sums:
-        """What the cost and its derivatives are made of."""
+        """Return the sums from which the cost and its derivatives are computed."""
         p, m = len(self.rows), len(self._owner)
         samples, runs = self.y[0].shape
         own = [theta[:, place] for place in self.places]
@@ -125,14 +125,14 @@ class PredictionErrors:
         return Sums(_whole(found), np.ascontiguousarray(np.moveaxis(slopes, -1, 0)), _whole(products))
 
     def gathered(self, sums: Sums, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
-        """psi^T W psi (runs, k, k) and psi^T W epsilon (runs, k) for weights (runs, p, p)."""
+        """Return psi^T W psi (runs, k, k) and psi^T W epsilon (runs, k) for weights (runs, p, p)."""
         owner, spread = self._owner, self._spread
         products = sums.products * weights[:, owner[:, None], owner[None, :]]
         slopes = np.sum(sums.slopes * weights[:, owner, :], axis=2)
         return spread.T @ products @ spread, slopes @ spread
 
     def _weighed(self, errors: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]]:
-        """Cost (runs,) and the weights (runs, p, p) of its derivatives."""
+        """Return cost (runs,) and the weights (runs, p, p) of its derivatives."""
         p = len(self.rows)
         if self.weights is not None:
             weights = np.broadcast_to(self.weights, errors.shape)
@@ -156,7 +156,7 @@ class PredictionErrors:
 
     @cached_property
     def _monic(self) -> tuple[tuple[str, NDArray[np.int64]], ...]:
-        """The letters of C, D and F, and where the coefficients of each stand in theta."""
+        """Return the letters of C, D and F, and where the coefficients of each stand in theta."""
         found = {
             (letter, tuple(place[block.columns].tolist()))
             for row, place in zip(self.rows, self.places, strict=True)
@@ -168,7 +168,7 @@ class PredictionErrors:
 
 
 def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
-    """The inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
+    """Return the inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
 
     Through correlations, since outputs may differ by orders of magnitude; a singular correlation is raised
     to rounding, and one that has overflowed has an infinite determinant.
@@ -189,6 +189,6 @@ def _dot(left: Array, right: Array) -> Array:
 
 
 def _whole(lower: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Symmetric matrices (runs, m, m) from their lower triangles (m, m, runs)."""
+    """Return symmetric matrices (runs, m, m) from their lower triangles (m, m, runs)."""
     moved = np.ascontiguousarray(np.moveaxis(lower, -1, 0))
     return moved + np.swapaxes(np.tril(moved, -1), 1, 2)

@@ -28,11 +28,11 @@ _EXACT = 1e-20
 
 @dataclass(frozen=True)
 class Point:
-    """Records at theta (k,): their errors and gradient, W (p, p), cost.
+    """Errors, gradient, weights W (p, p) and cost of records at theta (k,).
 
     Attributes:
-        known: (k, k), half the Hessian of what is known from an earlier estimate and of what integrating over
-            unknown starts adds; `towards` (k,), minus half the gradient.
+        known: (k, k), half the Hessian of the terms of an earlier estimate and of integrating over unknown
+            starts; `towards` (k,), minus half their gradient.
     """
 
     theta: Array
@@ -54,23 +54,23 @@ class Point:
 
     @property
     def slope(self) -> Array:
-        """(k,): minus half the gradient of the cost."""
+        """Return minus half the gradient (k,) of the cost."""
         near = self.near
         return np.asarray(self._weighed(near.all_psi) @ near.all_errors.ravel() + self.towards)
 
     @property
     def hessian(self) -> Array:
-        """(k, k): half that of the cost, to first order."""
+        """Return half the Hessian (k, k) of the cost, to first order."""
         every = self.near.all_psi
         return np.asarray(self._weighed(every) @ every.reshape(len(every), -1).T + self.known)
 
     def against(self, regressors: NDArray[np.float64]) -> Array:
-        """(k, k): the same with regressors phi (k, N, p) in place of one psi; none of past noise."""
+        """Return `hessian` (k, k) with regressors phi (k, N, p) for one psi, and without past noise."""
         return np.asarray(self._weighed(self.psi) @ regressors.reshape(len(regressors), -1).T + self.known)
 
     @property
     def of_errors(self) -> Point:
-        """The same without what is known besides the errors."""
+        """Return the point without the terms that do not come from the errors."""
         return replace(self, known=np.zeros_like(self.known), towards=np.zeros_like(self.towards))
 
     def _weighed(self, psi: NDArray[np.float64]) -> Array:
@@ -78,12 +78,12 @@ class Point:
 
 
 def rounding(records: Records) -> Array:
-    """(p, p): a covariance of errors so small that they are rounding."""
+    """Return a covariance (p, p) of errors so small that they are rounding."""
     return _EXACT * np.diag(np.mean(records.y**2, axis=0))
 
 
 def evaluate(records: Records, theta: Array) -> Point:
-    """The cost of records; infinite where it overflows, zero where all errors are rounding."""
+    """Return the cost of records; infinite where it overflows, zero where all errors are rounding."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         near = records.at(theta)
         S = near.all_errors.T @ near.all_errors / records.samples
@@ -104,7 +104,7 @@ def evaluate(records: Records, theta: Array) -> Point:
 
 
 def _with_known(records: Records, point: Point) -> Point:
-    """A point of the data with what is known besides: of the starts, and from an earlier estimate."""
+    """Return a point with the terms of unknown starts and of an earlier estimate."""
     near, earlier = point.near, records.earlier
     q, towards, known = near.determinant, -near.slope, near.curvature
     if earlier is not None:
@@ -134,20 +134,20 @@ class RecordProblem:
 
     @property
     def errors(self) -> int:
-        """Number of output errors of a run."""
+        """Return the number of output errors of a run."""
         return self.records[0].y.size
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
-        """Cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k)."""
+        """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k)."""
         points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
         hessian = np.array([point.hessian for point in points])
         slope = np.array([point.slope for point in points])
         return np.array([point.cost for point in points]), hessian, slope
 
     def stabilised(self, theta: Array) -> Array:
-        """theta (runs, k) with stable poles."""
+        """Return theta (runs, k) with stable poles."""
         return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
 
     def kept(self, runs: NDArray[np.bool_]) -> RecordProblem:
-        """The same problem with some of its runs only."""
+        """Return the same problem with some of its runs only."""
         return RecordProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))

@@ -38,45 +38,45 @@ class Record(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
+        """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """Of each output what the past of the record adds to its prediction errors.
+        """Return for each output the effect of the past of the record on its prediction errors.
 
         Args:
             free: whether level and states are unknown; else the plant is at rest at zero, and noise is not.
         """
 
     def lateness(self, theta: Array) -> int:
-        """The samples after which inputs from before the record no longer act but through the states."""
+        """Return the samples in which inputs from before the record act by other ways than the states."""
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
-        """The parameters that move dead times: there the cost has kinks."""
+        """Return the parameters that move dead times: there the cost has kinks."""
 
     def crossings(self, theta: Array) -> Array:
-        """(m, 2, k): steps of a dead time to sampling instants, kinks of the cost, and half a sample on."""
+        """Return steps (m, 2, k) of a dead time to sampling instants (kinks of the cost), and beyond."""
 
     def remembering(self, late: int) -> Self:
-        """The same, with free responses of inputs before it that act for so many samples."""
+        """Return the record with free responses to inputs before it, which act for `late` samples."""
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """The parameters on which the starts depend."""
+        """Return the parameters on which the starts depend."""
 
     def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """The derivatives of the starts with respect to each of these."""
+        """Return the derivatives of the starts with respect to each of these."""
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p): what measured outputs in place of the model's add to psi."""
+        """Return the change of psi (k, N, p) if measured outputs replace the model's."""
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): signals (N, m) through the inverse of each output's noise model."""
+        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with a stable predictor."""
+        """Return theta with a stable predictor."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Linearised:
 
     @classmethod
     def at_rest(cls, errors: Array, psi: NDArray[np.float64]) -> Linearised:
-        """Without unknown starts."""
+        """Return the errors and gradient without unknown starts."""
         k, p = len(psi), errors.shape[1]
         begun, slope, curvature = np.zeros_like(errors), np.zeros(k), np.zeros((k, k))
         past, directions = np.zeros((0, p)), np.zeros((errors.size, 0))
@@ -120,7 +120,7 @@ class Linearised:
 
     @property
     def freedom(self) -> int:
-        """Number of errors that levels and states leave."""
+        """Return the number of errors that levels and states leave."""
         return self.errors.size - self.unknowns
 
     @property
@@ -154,12 +154,12 @@ class Records:
     ramp: bool = False
 
     def begun_freely(self, late: int) -> Records:
-        """The same, each begun in an unknown state, after unknown inputs that act for `late` samples."""
+        """Return the records, each begun in an unknown state after `late` samples of unknown inputs."""
         parts = tuple(part.remembering(late) for part in self.parts)
         return replace(self, parts=parts, free=True, late=late)
 
     def lateness(self, theta: Array) -> int:
-        """The longest of all parts."""
+        """Return the largest lateness of all parts."""
         return max(part.lateness(theta) for part in self.parts)
 
     @property
@@ -183,21 +183,21 @@ class Records:
 
     @property
     def samples(self) -> int:
-        """Their number N."""
+        """Return the number of samples N."""
         return len(self.y)
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return self.parts[0].size
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
-        """The samples of each part."""
+        """Return the samples of each part."""
         return tuple(len(part.y) for part in self.parts)
 
     def at(self, theta: Array) -> Linearised:
-        """Prediction errors and their gradient, the unknown starts eliminated."""
+        """Return prediction errors and their gradient, the unknown starts eliminated."""
         found = [part.errors_and_gradient(theta) for part in self.parts]
         errors = np.concatenate([e for e, _ in found])
         psi = np.concatenate([gradient for _, gradient in found], axis=1)
@@ -233,7 +233,7 @@ class Records:
         )
 
     def gradient(self, theta: Array, index: int) -> Array:
-        """(N, p): minus the derivative of the errors by one parameter, past noise being as estimated."""
+        """Return minus the derivative (N, p) of the errors by a parameter; past noise stays as estimated."""
         found = [part.errors_and_gradient(theta) for part in self.parts]
         psi = np.concatenate([gradient[index] for _, gradient in found])
         starts = self._starts(theta)
@@ -245,7 +245,7 @@ class Records:
 
     @cached_property
     def _longest(self) -> Record:
-        """The past acts on all records alike; on shorter ones for fewer samples."""
+        """Return the longest record: the past acts on all alike, on shorter ones for fewer samples."""
         return max(self.parts, key=lambda part: len(part.y))
 
     def _starts(self, theta: Array) -> FreeStarts:
@@ -272,7 +272,7 @@ class Records:
 
     @property
     def _line(self) -> Array:
-        """(N, 1) of the longest record: what drifts evenly."""
+        """Return a line (N, 1) through the longest record."""
         return np.linspace(-1.0, 1.0, len(self._longest.y))[:, None]
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
@@ -288,12 +288,12 @@ class Records:
         return np.concatenate(found, axis=1)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with a stable predictor."""
+        """Return theta with a stable predictor."""
         return self._longest.stabilised(theta)
 
 
 def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
-    """x(t - lag) along the first axis; zero before each part begins."""
+    """Return x(t - lag) along the first axis; zero before each part begins."""
     out = np.zeros_like(x)
     begin = 0
     for length in lengths:
@@ -304,17 +304,17 @@ def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
 
 
 def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[tuple[Array, Array]]:
-    """The signals of each record; None: of the only one."""
+    """Return the signals of each record; None: of the only one."""
     at = np.cumsum(lengths or [len(y)])[:-1]
     return list(zip(np.split(u, at), np.split(y, at), strict=True))
 
 
 def longest(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
-    """The longest records, of which starting points are made: at most three, of similar lengths."""
+    """Return the longest records, of which starting points are made: at most three, of similar lengths."""
     ranked = sorted(parts, key=lambda part: -len(part[1]))[:_MOST_STARTED]
     return [part for part in ranked if 2 * len(part[1]) >= len(ranked[0][1])]
 
 
 def centred(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
-    """The same without their means."""
+    """Return the records without their means."""
     return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts]

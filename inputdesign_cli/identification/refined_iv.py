@@ -33,7 +33,7 @@ _SETTLED = 1e-2
 
 
 def refine(records: Records, start: Point) -> tuple[Point, int]:
-    """The likeliest point of the iteration from `start`, and how many steps were made."""
+    """Return the likeliest point of the iteration from `start`, and how many steps were made."""
     best, point, since, steps = start, start, 0, 0
     while steps < _MOST_ITERATIONS and np.isfinite(point.cost):
         regressors = point.psi - records.noise_in_regressors(point.theta, point.errors)

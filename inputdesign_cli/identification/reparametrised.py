@@ -1,8 +1,8 @@
-"""Estimates of a model in other parameters than its coefficients, of which some may be known.
+"""Estimate a model in other parameters than its coefficients, some of which may be known.
 
-The records are those of the coefficients, their gradients follow by the chain rule. Starts are estimates of
-all coefficients, brought back to the parameters by least squares weighed by what the records tell of them: in
-the limit of many samples that is an efficient estimate already.
+The records belong to the coefficients; gradients follow by the chain rule. Starts are estimates of all
+coefficients, brought back to the parameters by least squares weighed by the information matrix. In the limit
+of many samples that is an efficient estimate already.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class ReparametrisedRecord(OverRecord):
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.parametrisation.names)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -53,17 +53,17 @@ class ReparametrisedRecord(OverRecord):
         return errors, np.tensordot(here.jacobian, psi, axes=(0, 0))
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """Those at the coefficients."""
+        """Return the starts at the coefficients."""
         return self.record.starts(self.parametrisation.at(theta).coefficients, free=free)
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
-        """The parameters that move one."""
+        """Return the indices of the parameters that move a dead time."""
         rows = self.parametrisation.jacobian[self.record.dead_times]
         return np.flatnonzero(np.any(rows != 0.0, axis=0))
 
     def crossings(self, theta: Array) -> Array:
-        """The shortest steps of the parameters that move the dead times so."""
+        """Return the smallest steps of the parameters that move the dead times to their crossings."""
         here, late = self.parametrisation.at(theta), self.record.dead_times
         steps = self.record.crossings(here.coefficients)[:, :, late]
         if not steps.size:
@@ -72,11 +72,11 @@ class ReparametrisedRecord(OverRecord):
         return np.asarray(steps @ back.T)
 
     def lateness(self, theta: Array) -> int:
-        """That at the coefficients."""
+        """Return the lateness at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)
 
     def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """The derivatives of the starts with respect to these parameters, by the chain rule."""
+        """Return the derivatives of the starts with respect to these parameters, by the chain rule."""
         here = self.parametrisation.at(theta)
         slopes = here.jacobian[:, indices]
         moved = [c for c in self.record.in_starts(free=free).tolist() if np.any(slopes[c])]
@@ -91,7 +91,7 @@ class ReparametrisedRecord(OverRecord):
         return [tuple(Start(*(b[k] for b in blocks)) for blocks in weighed) for k in range(len(indices))]
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those that move a coefficient on which the starts depend."""
+        """Return the indices of parameters that move a coefficient on which the starts depend."""
         moved = self.parametrisation.moves[self.record.in_starts(free=free)]
         return np.flatnonzero(np.any(moved, axis=0))
 
@@ -134,33 +134,33 @@ class ReparametrisedRecord(OverRecord):
 
 @dataclass(frozen=True)
 class ReparametrisedKind(OfModel):
-    """The structure of `model`, whose coefficients are those of the structure `coefficients`; see `Kind`."""
+    """The structure of `model`, whose coefficients have the structure `coefficients`; see `Kind`."""
 
     model: Reparametrised
     coefficients: Kind
 
     @property
     def recent(self) -> int:
-        """The lag up to which the structure looks at the inputs."""
+        """Return the lag up to which the structure looks at the inputs."""
         return self.coefficients.recent
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
-        """(k,): those that move such a coefficient."""
+        """Return the mask (k,) of parameters that move an explaining coefficient."""
         return np.any(self._moved[self.coefficients.explaining], axis=0)
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): the same."""
+        """Return the mask (k,) of parameters that move a whitening coefficient."""
         return np.any(self._moved[self.coefficients.whitening], axis=0)
 
     @cached_property
     def _moved(self) -> NDArray[np.bool_]:
-        """(K, k): which parameter moves which coefficient."""
+        """Return which parameter moves which coefficient (K, k)."""
         return self.model.parametrisation.moves
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Those of the coefficients, by the chain rule."""
+        """Return the echoes of the coefficients, by the chain rule."""
         here = self.model.parametrisation.at(theta)
         of_all = self.coefficients.echoes(here.coefficients, lengths)
         if of_all is None:
@@ -179,11 +179,11 @@ class ReparametrisedKind(OfModel):
         return of_all * (len(self.names) / max(float(np.sum(of_all)), 1.0))
 
     def record(self, u: Array, y: Array) -> ReparametrisedRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
         return ReparametrisedRecord(self.coefficients.record(u, y), self.model.parametrisation)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Those of all coefficients, brought back to the parameters, and the `given` one."""
+        """Return the starts of all coefficients, brought back to the parameters, and the `given` one."""
         found = self.coefficients.holding(~np.any(self._moved, axis=1)).starts(parts, None)
         about = Records(tuple(self.coefficients.record(*part) for part in parts))
         points = [self._brought_back(evaluate(about, theta)) for theta in found.points]
@@ -195,7 +195,7 @@ class ReparametrisedKind(OfModel):
         )
 
     def _brought_back(self, point: Point) -> Array:
-        """The parameters (k,) whose coefficients are nearest to those of a point."""
+        """Return the parameters (k,) whose coefficients are nearest to a point, weighed by its Hessian."""
         at = self.model.parametrisation
         if not np.isfinite(point.cost):
             return at.theta
@@ -220,7 +220,7 @@ class ReparametrisedKind(OfModel):
         return np.asarray(found.x * unit, dtype=float)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Those of the coefficients."""
+        """Return the extensions of the coefficients."""
         coefficients = self.model.parametrisation.at(theta).coefficients
         found = self.coefficients.extensions(coefficients, feedback=feedback)
         return tuple(replace(extension, nested=False) for extension in found)
@@ -228,10 +228,10 @@ class ReparametrisedKind(OfModel):
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """As the coefficients tell."""
+        """Return the simulation of the coefficients."""
         return self.coefficients.simulated(self._of_coefficients(found), y, lengths)
 
     def _of_coefficients(self, found: Search) -> Search:
-        """The same search, its point given by the coefficients."""
+        """Return the search with its point given by the coefficients."""
         theta = self.model.parametrisation.at(found.point.theta).coefficients
         return replace(found, point=replace(found.point, theta=theta))

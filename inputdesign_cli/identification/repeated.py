@@ -1,13 +1,13 @@
-"""Were samples recorded once and given twice? Then prediction errors of different times follow each other.
+"""Detect samples that were recorded once and given twice: their prediction errors repeat.
 
-Errors of different times are independent if the model is right, and so is every other copy of the noise: only
-the same noise, also where it was rounded, shifted or scaled, comes again. Where the model is wrong errors are
-coloured, and slow ones follow each other by chance; and inputs that come again bring the same errors. So what
-past errors and the inputs explain is taken off first, by an autoregression with inputs.
+If the model is right, errors of different times are independent. Only a copy of the same noise, even rounded,
+shifted or scaled, repeats. If the model is wrong, errors are coloured, and slow ones follow each other by
+chance. Inputs that repeat bring the same errors, too. So the part that past errors and the inputs explain is
+taken off first, by an autoregression with inputs.
 
-A controller makes u(t) from y(t), so that u(t) tells e(t): what is left beside it are steps of the reference,
-which come again. In a loop only past inputs count, therefore. Without one u(t) may act at once; since a loop
-may be unknown, samples are given twice if they come again both beside u(t) and without it.
+A controller makes u(t) from y(t), so that u(t) contains e(t). A regression on u(t) then leaves steps of the
+reference, which repeat. So in a loop only past inputs count. Without a loop u(t) may act at once. Since a
+loop may be unknown, samples are given twice only if they repeat both with u(t) as regressor and without it.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ import scipy
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.records import shifted
 
-# So many samples in a row have a correlation beyond this at another time by chance in one of 1e10 cases.
+# A row of _IN_A_ROW samples has a correlation beyond this at another time by chance in one of 1e10 cases.
 _IN_A_ROW, _FOLLOWS = 30, 0.9
 # Of the lags, those at which most errors follow each other.
 _LAGS = 8
 # Larger errors, in standard deviations, count as much: single spikes say nothing.
 _SPIKE = 3.0
 _ORDER = 20
-# Lags are fewer in a short record; in a long one so many samples tell their coefficients.
+# Lags are fewer in a short record; in a long one at most this number of samples is fitted.
 _SAMPLES_A_LAG, _MOST_FITTED = 10, 20_000
 NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
 
@@ -42,11 +42,11 @@ class Repetition:
 
 
 def repetition(errors: Array, inputs: Array | None = None, *, feedback: bool = False) -> Repetition | None:
-    """The longest stretch of errors (samples, p) that comes again; None where none does.
+    """Return the longest stretch of errors (samples, p) that repeats, or None if none does.
 
     Args:
         inputs: (samples, r), of the same times.
-        feedback: Whether the inputs were made from the outputs.
+        feedback: whether the inputs were made from the outputs.
     """
     spread = np.median(np.abs(errors), axis=0) / NORMAL
     samples = len(errors)
@@ -62,7 +62,7 @@ def repetition(errors: Array, inputs: Array | None = None, *, feedback: bool = F
 
 
 def _again(e: Array) -> Repetition | None:
-    """The longest stretch of white errors (samples, p) that comes again."""
+    """Return the longest stretch of white errors (samples, p) that repeats."""
     samples = len(e)
     around = scipy.fft.rfft(e, 2 * samples, axis=0)
     products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)
@@ -74,7 +74,7 @@ def _again(e: Array) -> Repetition | None:
 
 
 def whitened(x: Array) -> Array:
-    """What an autoregression leaves of a signal (N,), by the equations of Yule and Walker."""
+    """Return the residuals of an autoregression of a signal (N,), by the equations of Yule and Walker."""
     order = min(_ORDER, x.size // 10)
     x = x - x.mean()
     products = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, 2 * x.size)) ** 2, 2 * x.size)[: order + 1]

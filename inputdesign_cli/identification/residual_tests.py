@@ -1,6 +1,6 @@
-"""Is what the model leaves unexplained white, and free of the past input? [ljung-1999], Section 16.6.
+"""Test whether residuals are white, and independent of past inputs. [ljung-1999], Section 16.6.
 
-Of several outputs all channels are tested at once, in units of the residuals' own covariance.
+For several outputs all channels are tested at once, in units of the residuals' own covariance.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class ResidualTest:
 def whiteness(
     errors: Array, *, lags: int = 25, fitted: int = 0, lengths: Sequence[int] | None = None
 ) -> ResidualTest:
-    """Correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
+    """Return correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
 
     The portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978], to which it reduces for
     one output.

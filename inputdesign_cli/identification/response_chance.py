@@ -15,7 +15,7 @@ _FREQUENCIES = 60
 _LEAST_FREQUENCY = 1e-3
 # Below this probability G is not zero.
 _ZERO = 1e-3
-# Directions of G that are smaller than this, and what the parameters may leave of it.
+# Relative size below which directions of G count as dependent; share of G that may stay unexplained.
 _DEPENDENT, _LEFT = 1e-8, 1e-4
 
 
@@ -44,7 +44,7 @@ def like_nothing_elsewhere(
 
 
 def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
-    """The outputs (from zero) of a model whose row of G cannot be told from zero.
+    """Return the outputs (from zero) of a model whose row of G does not differ from zero significantly.
 
     Args:
         step: between samples, in the unit of time of the model.
@@ -53,14 +53,14 @@ def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> li
 
 
 def driving_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
-    """The inputs (from zero) of a model whose column of G cannot be told from zero."""
+    """Return the inputs (from zero) of a model whose column of G does not differ from zero significantly."""
     return _like_nothing(model, estimate, step, [(slice(None), j) for j in range(model.inputs)])
 
 
 def chance_of_response(model: Model, estimate: Estimate, other: Model, step: float = 1.0) -> float | None:
-    """The probability, if an estimate is right but for chance, of a G as far from its own as another model's.
+    """Return the probability that by chance alone an estimated G is as far from another model's G.
 
-    None where G is infinite, or no step of the parameters changes it.
+    Return None if G is infinite, or no step of the parameters changes it.
     """
     w = _frequencies(step)
     with np.errstate(all="ignore"):
@@ -72,7 +72,7 @@ def chance_of_response(model: Model, estimate: Estimate, other: Model, step: flo
 def _like_nothing(
     model: Model, estimate: Estimate, step: float, parts: Sequence[tuple[int | slice, int | slice]]
 ) -> list[int]:
-    """The numbers of the parts of G that cannot be told from zero, and are not known to be zero."""
+    """Return the indices of parts of G not significantly different from zero, and not known to be zero."""
     w = _frequencies(step)
     with np.errstate(all="ignore"):
         gradient, G = model.plant_gradient(w), model.plant_at(w)
@@ -96,10 +96,10 @@ def _stacked(G: ComplexArray) -> Array:
 
 
 def _chance(estimate: Estimate, change: Array, away: Array, *, wholly: bool) -> float | None:
-    """The probability, if the estimate is right but for chance, of G that differs from it by `away` (m,).
+    """Return the probability that G differs from the estimate by `away` (m,) through chance alone.
 
-    The statistic is that of Wald: the least that a step of the parameters takes to get there, as far as any
-    does, `change` (k, m) being the gradient of G. None where none leads there `wholly`.
+    The Wald statistic is the smallest step of the parameters that moves G there, as far as any step can.
+    `change` (k, m) is the gradient of G. Return None if the step must lead there `wholly` and none does.
     """
     if not all(np.all(np.isfinite(x)) for x in (change, away)):
         return None

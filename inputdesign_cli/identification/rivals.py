@@ -1,7 +1,7 @@
-"""Other minima that explain the data nearly as well as the best one.
+"""Find other minima that explain the data nearly as well as the best one.
 
-A dead time that was excited at a few frequencies is known only up to whole periods; near-equal minima then
-stand far apart, and the covariance tells of one of them alone.
+A dead time that was excited at a few frequencies is known only up to whole periods. Near-equal minima then
+stand far apart, and the covariance describes one of them alone.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def rivals(records: Records, point: Point, found: Minimum) -> tuple[Rival, ...]:
 
 
 def spread_out(records: Records, points: Sequence[Point], most: int) -> list[int]:
-    """The numbers of the likeliest points, of near ones only the best."""
+    """Return the numbers of the likeliest points, of near ones only the best."""
     chosen: list[int] = []
     for number in np.argsort([point.cost for point in points], kind="stable"):
         point = points[number]
@@ -65,7 +65,7 @@ def spread_out(records: Records, points: Sequence[Point], most: int) -> list[int
 
 
 def distance(records: Records, point: Point, step: Array) -> float:
-    """The square of a `step` (k,) in standard deviations of the parameters at a point."""
+    """Return the square of a `step` (k,) in standard deviations of the parameters at a point."""
     unit = 1.0 if records.weights is not None else point.near.freedom / point.cost
     return unit * float(step @ point.hessian @ step)
 
@@ -76,7 +76,7 @@ def is_near(records: Records, point: Point, theta: Array, excess: float) -> bool
 
 
 def excess_of(records: Records, point: Point, cost: float) -> float:
-    """What parameters of a `cost` have more in -2 log likelihood than those of a point."""
+    """Return by how much -2 log likelihood at parameters of a `cost` exceeds its value at a point."""
     if records.weights is not None:
         return cost - point.cost
     return point.near.freedom * float(np.log(cost / point.cost))

@@ -64,13 +64,13 @@ class Search:
 def search(
     records: Records, points: Array, *, starts: int, before: Array | int = 0, quick: int | None = None
 ) -> Search:
-    """The likeliest of what Gauss and Newton find from `points` (n, k).
+    """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k).
 
     Args:
         starts: how many points were looked at.
         before: (n,) steps that have been made from each.
-        quick: only so many steps from each, and none where these gain nothing that matters; kinks may stop
-            it, and no other minima are told.
+        quick: the most steps from each, fewer if these gain nothing that matters. Kinks may stop the search,
+            and no other minima are returned.
     """
     idle = _IDLE if quick else 0.0
     found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS, idle=idle)
@@ -89,12 +89,12 @@ def search(
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
-    """Where a search settles that was stopped by kinks of the cost; None where that is not what stopped it.
+    """Return where a search stopped by kinks of the cost settles, or None if kinks did not stop it.
 
     A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains what its slopes promise; nor where the edge of stability mirrors a root. Parameters that
-    block the way are held, one after the other, dead times where there are some. The rest settles, and then
-    each held one is moved to both sides, where the cost must be higher.
+    and Newton gains what its slopes promise. The same happens if the edge of stability mirrors a root.
+    Parameters that block the way are held, one after the other; only dead times, if there are some. The rest
+    settles. Then each held one is moved to both sides, where the cost must be higher.
     """
     size = point.theta.size
     held = np.zeros(size, dtype=bool)
@@ -120,7 +120,7 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
 
 
 def _newton(point: Point, held: NDArray[np.bool_]) -> tuple[Array, float]:
-    """The step (k,) of Gauss and Newton that leaves some parameters, and the gain that it promises."""
+    """Return the step (k,) of Gauss and Newton that leaves some parameters, and the gain that it promises."""
     free = np.flatnonzero(~held)
     scale = np.sqrt(np.maximum(np.diag(point.hessian)[free], 1e-300))
     step = np.zeros(held.size)
@@ -135,7 +135,7 @@ def _moved(records: Records, point: Point, step: Array) -> Point:
 
 
 def _beside(records: Records, point: Point, held: NDArray[np.bool_]) -> Point | None:
-    """A point of lower cost where a held parameter is a little more or less; None if there is none."""
+    """Return a point of lower cost where a held parameter is a little more or less; None if there is none."""
     variance = point.cost / point.errors.size
     for j in map(int, np.flatnonzero(held)):
         size = _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300))
@@ -163,9 +163,9 @@ def _deviance(records: Records, point: Point) -> float:
 
 
 def _by_chance(records: Records, fell: float, more: int, unknowns: int) -> float:
-    """The probability that so many `more` unknowns, useless ones, let -2 log likelihood fall as far.
+    """Return the probability that `more` useless unknowns lower -2 log likelihood by `fell`.
 
-    Many unknowns shrink what is left of noise that is estimated along, which chi-squared does not know.
+    Many unknowns shrink the estimated noise, which chi-squared does not account for.
     """
     left = records.y.size - records.size - unknowns
     if records.weights is not None or left < 1:
@@ -175,7 +175,7 @@ def _by_chance(records: Records, fell: float, more: int, unknowns: int) -> float
 
 
 def _swamped(records: Records, late: int) -> bool:
-    """Whether unknown inputs that act for so many samples explain half of a record, whatever the model."""
+    """Return whether unknown inputs over `late` samples explain half of a record, whatever the model."""
     return 2 * late * records.u.shape[1] > max(records.lengths)
 
 
@@ -186,17 +186,17 @@ def from_rest_or_free(
     searched: Callable[[Records, Array | None], Search],
     about: Array | None = None,
 ) -> Search:
-    """The search from rest, unless unknown starts explain what it leaves better than chance.
+    """Return the search from rest, unless unknown starts explain its errors better than chance.
 
-    An F test of their likelihood ratio, with as many degrees of freedom as there are more unknowns. Noise
-    never rests: what was before the record is unknown either way.
+    An F test of the likelihood ratio decides; its degrees of freedom are the additional unknowns. Noise
+    never rests: its values before the record are unknown either way.
 
     Args:
         records: from rest.
-        deviations: the same from their means, which an unknown level makes up for.
+        deviations: the records about their means, which an unknown level makes up for.
         rest: whether the records begin at rest about zero; None: as the data say.
         searched: what searches from its own starts and, if given, from the parameters (k,).
-        about: (k,), parameters that tell about how long unknown inputs act.
+        about: (k,), parameters that show roughly how long unknown inputs act.
     """
 
     def begun_free(known: Array | None, late: int) -> Search:
@@ -225,7 +225,7 @@ def from_rest_or_free(
     from_rest = _deviance(records, at_rest.point)
 
     def more(point: Point) -> int:
-        """Unknowns, beyond those from rest; none where too few errors are left to compare."""
+        """Return the unknowns beyond the ones from rest; 0 if too few errors are left to compare."""
         few = records.y.size <= records.size + point.near.unknowns + _FEWEST
         return 0 if few else point.near.unknowns - at_rest.point.near.unknowns
 

@@ -1,7 +1,7 @@
-"""Lines that an input does not excite: what a linear plant leaves silent, a nonlinear one answers.
+"""Measure outputs at lines that an input does not excite, where only a nonlinear plant responds.
 
 [pintelon-schoukens-2012], Section 4.3: an even nonlinearity answers odd harmonics at even ones, an odd one at
-odd ones. The scatter of the periods tells how much of it is noise.
+odd ones. The scatter of the periods shows how much of it is noise.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _NEIGHBOURS = 15
 
 @dataclass(frozen=True)
 class SilentLines:
-    """What p outputs have at so many lines without excitation.
+    """The power of p outputs at `lines` lines without excitation.
 
     Attributes:
         over_noise: (p,) mean of the power there over that of the noise; about one for noise alone.
         probability: (p,) that noise alone has as much, by an F test over all lines.
-        rms: (p,) of what is beyond the noise.
+        rms: (p,) of the part beyond the noise.
         beyond: (lines, p) mean squares of the transforms that are beyond the noise, over neighbouring lines.
     """
 
@@ -68,7 +68,7 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
 
 
 def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(lines, p): means over neighbours, at the ends over the nearest so many."""
+    """Return means over neighbouring lines (lines, p), at the ends over equally many nearest ones."""
     window = min(_NEIGHBOURS, len(noise))
     sums = np.concatenate([np.zeros((1, noise.shape[1])), np.cumsum(noise, axis=0)])
     first = np.clip(np.arange(len(noise)) - window // 2, 0, len(noise) - window)

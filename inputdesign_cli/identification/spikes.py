@@ -10,7 +10,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.repeated import NORMAL
 
-# Farther from zero than so many robust standard deviations; of as few samples as this, than twice as many.
+# A spike is farther from zero than _FAR robust standard deviations, twice that of _UNSURE samples.
 _FAR, _UNSURE = 8.0, 20
 # Not more of the samples than this, which hold this share of the sum of squares.
 _FEW, _MOST = 0.05, 0.5

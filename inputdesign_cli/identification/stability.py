@@ -11,7 +11,7 @@ from inputdesign_cli.arrays import Array
 _MARGIN = 1e-3
 # A root that is nearer counts as on it. Specs refuse what is within rounding of the circle.
 _ON_THE_CIRCLE = 1e-9
-# A sum of coefficients that is zero, as far as decimals can tell.
+# A sum of coefficients that is zero to rounding of decimals.
 _EXACT = 1e-12
 
 
@@ -39,7 +39,7 @@ def without_integrators(monic: Array) -> Array:
 
 
 def reflected(monic: Array) -> Array:
-    """A polynomial (m + 1,) with its roots outside the unit circle mirrored at it."""
+    """Return a polynomial (m + 1,) with its roots outside the unit circle mirrored at it."""
     roots = np.roots(monic)
     modulus = np.abs(roots)
     roots = np.where(modulus >= 1.0, roots / np.maximum(modulus, 1.0) ** 2, roots)

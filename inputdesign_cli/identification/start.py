@@ -1,8 +1,8 @@
-"""What nobody knows of the past of a record: its level, the states of the plant, the noise before it.
+"""Describe the unknown past of a record: its level, the states of the plant, the noise before it.
 
-Level and states are unknown numbers. The noise before a record is as random as that in it: of stationary
-noise C/D e, what it adds later has a covariance that C and D tell ([ljung-1999], Section 10.5, on initial
-conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihood).
+Level and states are unknown numbers. The noise before a record is as random as the noise in it. For
+stationary noise C/D e, its later effect has a covariance that C and D determine ([ljung-1999], Section 10.5,
+on initial conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihood).
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _INSIDE = 1e-5
 
 
 class Start(NamedTuple):
-    """What the past adds to the N prediction errors of one output, each row by one unknown.
+    """Effect of the past on the N prediction errors of one output; each row belongs to one unknown.
 
     Attributes:
         free: (m, N), by the level and states, of which nothing is known.
-        disturbance: (m, N), the same before the inverse of the noise model.
+        disturbance: (m, N), `free` before the inverse of the noise model.
         noise: (n, N), by independent unknowns of the variance of e.
         zeros: -2 log of a density of the zeros of the noise model, see `density`; a scalar.
     """
@@ -38,23 +38,23 @@ class Start(NamedTuple):
 
     @classmethod
     def white(cls, free: NDArray[np.float64]) -> Start:
-        """Where the noise is white: it has no past."""
+        """Return the start under white noise, which has no past."""
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
     @property
     def is_white(self) -> bool:
-        """Whether it is known to be that of white noise."""
+        """Return whether the start is known to be under white noise."""
         return self.free is self.disturbance and not len(self.noise)
 
     def and_free(self, free: NDArray[np.float64], disturbance: NDArray[np.float64]) -> Start:
-        """With further unknowns of which nothing is known, (m, N) each."""
+        """Return the start with further free unknowns, (m, N) each."""
         return self._replace(
             free=np.concatenate([self.free, free]),
             disturbance=np.concatenate([self.disturbance, disturbance]),
         )
 
     def cropped(self, samples: int) -> Start:
-        """What it is of a shorter record."""
+        """Return the start of a shorter record."""
         if self.is_white:
             return Start.white(self.free[:, :samples])
         free, disturbance, noise = (block[:, :samples] for block in self[:3])
@@ -67,7 +67,7 @@ class Start(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """Whether all are."""
+        """Return whether all numbers are finite."""
         return all(bool(np.all(np.isfinite(block))) for block in self)
 
 
@@ -80,7 +80,7 @@ def differences(above: Sequence[Start], below: Sequence[Start], span: float) -> 
 
 
 def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
-    """(n, samples): what stationary noise C/D e before a record adds to (D/C) of what is in it.
+    """Return what stationary noise C/D e before a record adds to (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
     first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values
@@ -135,7 +135,7 @@ def _inside(d: Array) -> Array:
 
 
 def _step_down(d: Array) -> tuple[list[Array], NDArray]:
-    """The predictors of the orders 0 to n - 1 of e / D, and the variances (n,) of their errors.
+    """Return the predictors of the orders 0 to n - 1 of e / D, and the variances (n,) of their errors.
 
     By the recursion of [brockwell-davis-1991], Section 5.2, from the predictor of order n, which is D.
     """

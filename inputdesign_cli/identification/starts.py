@@ -34,7 +34,7 @@ def starting_points(row: OutputOrders, u: Sequence[Array], y: Array) -> Array:
 
 
 def _nearly_cancelling(row: OutputOrders, theta: Array) -> list[Array]:
-    """The same with C and D that nearly cancel, at low or at high frequency: often minima of their own."""
+    """Return `theta` with C and D that nearly cancel, at low and at high frequency: often separate minima."""
     C, D = (row.by_letter[letter][0] for letter in "cd")
     points = []
     for sign in (1.0, -1.0) if row.c and row.d else ():
@@ -62,7 +62,7 @@ def _shifted(x: Array, lag: int) -> Array:
 
 
 def _long_model(row: OutputOrders, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
-    """Residuals of a long ARX model, and what it says that each input alone causes."""
+    """Return residuals of a long ARX model, and what it says that each input alone causes."""
     highest = max([row.a, row.c, row.d, *(max(entry.b, entry.f) for entry in row.entries)])
     order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
     regressors = [(x, range(entry.delay, order + 1)) for x, entry in zip(inputs, row.entries, strict=True)]
@@ -116,7 +116,7 @@ def _output_error(
 
 
 def noise_polynomials(v: Array, c: int, d: int) -> tuple[Array, Array]:
-    """The coefficients after the first of C (c,) and D (d,), from samples v of C/D e."""
+    """Return the coefficients after the first of C (c,) and D (d,), from samples v of C/D e."""
     long = max(1, min(10 + 2 * (c + d), v.size // 6))
     _, noise = regress(v, [(-v, range(1, long + 1))])
     (below, above), _ = regress(v, [(-v, range(1, d + 1)), (noise, range(1, c + 1))])

@@ -43,11 +43,11 @@ class StateSpaceRecord:
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.structure.entries)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
+        """Return prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
         model = self.structure.at(theta)
         (A, early, late), m, n = model.held, model.matrices, model.order
         u0, u1 = (shifted(self.u, model.lag + lag, (len(self.u),)) for lag in (0, 1))
@@ -120,7 +120,7 @@ class StateSpaceRecord:
         return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))
 
     def lateness(self, theta: Array) -> int:
-        """The dead time in samples, one that is begun counted whole."""
+        """Return the dead time in samples, one that is begun counted whole."""
         model = self.structure.at(theta)
         return late_samples(model.matrices.delay, model.sample_time or 1.0)
 
@@ -130,15 +130,15 @@ class StateSpaceRecord:
         return np.flatnonzero([letter == DELAY for letter, _, _ in self.structure.entries])
 
     def crossings(self, theta: Array) -> Array:
-        """Those of its dead time."""
+        """Return the crossings of its dead time."""
         return crossings_of(theta, self.dead_times, self.structure.at(theta).sample_time or 1.0, len(self.y))
 
     def remembering(self, late: int) -> Self:
-        """The same, where unknown inputs act for so many samples."""
+        """Return the record with free responses to inputs before it, which act for `late` samples."""
         return replace(self, late=late)
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of A, C and K; of B where it is no matter of course which way inputs push the states."""
+        """Return the indices of entries in A, C and K; of B and delays too if few inputs push many states."""
         if not (free or self._coloured):
             return np.zeros(0, dtype=np.int64)
         pushed = free and self.late > 0 and self.structure.order > 2 * self.structure.inputs
@@ -147,7 +147,7 @@ class StateSpaceRecord:
 
     @property
     def _coloured(self) -> bool:
-        """Whether noise moves the states."""
+        """Return whether noise moves the states."""
         estimated = any(letter == "K" for letter, _, _ in self.structure.entries)
         return estimated or bool(np.any(self.structure.matrices.K))
 
@@ -179,7 +179,7 @@ class StateSpaceRecord:
         return found
 
     def stabilised(self, theta: Array) -> Array:
-        """theta where its predictor is stable, or integrates, and otherwise nothing that is finite."""
+        """Return theta if its predictor is stable or integrates, otherwise infinite values."""
         delay = [k for k, (letter, _, _) in enumerate(self.structure.entries) if letter == DELAY]
         out = theta.copy()
         longest = (len(self.y) - 1) * (self.structure.sample_time or 1.0)
@@ -206,7 +206,7 @@ class StateSpaceKind(OfModel):
 
     @cached_property
     def whitening(self) -> NDArray[np.bool_]:
-        """(k,): those in H."""
+        """Return the mask (k,) of the parameters of the noise model H."""
         coloured = bool(np.any(self.model.matrices.K))
         return np.array(
             [letter == "K" or (coloured and letter in "AC") for letter, _, _ in self.model.entries],
@@ -222,7 +222,7 @@ class StateSpaceKind(OfModel):
         return StateSpaceRecord(self.model, u, y)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """The nominal parameters, and the `given` ones."""
+        """Return the nominal parameters, and the `given` ones."""
         points = np.array([self.model.theta, *([] if given is None else [given])])
         return Starts(points, np.zeros(len(points), dtype=np.int64), len(points))
 

@@ -59,21 +59,21 @@ class Structure:
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.names)
 
     @property
     def memory(self) -> int:
-        """How far back the regressions look, recursions aside."""
+        """Return how far back the regressions look, recursions aside."""
         return max(row.memory for row in self.rows)
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has, those that n outputs share counted as 1/n."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
         shared = np.bincount(np.concatenate(self.places), minlength=self.size)
         return np.array([float(np.sum(1.0 / shared[place])) for place in self.places])
 
     def problem(self, u: Array, y: Array, noise: Array | None = None) -> PredictionErrors:
-        """The problem of fitting records u (runs, samples, r) and y (runs, samples, p).
+        """Return the problem of fitting records u (runs, samples, r) and y (runs, samples, p).
 
         Args:
             noise: the covariance of e (p, p) if it is known.

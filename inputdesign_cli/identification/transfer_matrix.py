@@ -41,7 +41,7 @@ class TransferKind(OfModel):
 
     @property
     def continuous(self) -> bool:
-        """Whether frequencies of the model are in rad per time unit: not behind a hold."""
+        """Return whether frequencies of the model are in rad per time unit: not behind a hold."""
         return not self.between.hold
 
     @property
@@ -55,7 +55,7 @@ class TransferKind(OfModel):
         return np.zeros(len(self.names), dtype=bool)
 
     def own(self) -> Array:
-        """(p,): how many parameters each output has; those that several share count by their share."""
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
         taken = np.zeros(self.outputs)
         for parameter in self.model.parameters:
             rows = sorted({i for i, _ in parameter.places})
@@ -85,7 +85,7 @@ class TransferKind(OfModel):
         )
 
     def holding(self, known: NDArray[np.bool_]) -> TransferKind:
-        """The same; dead times that are known are not looked for."""
+        """Return the kind with starts that keep known dead times."""
         held = {
             place: parameter.value
             for parameter, fixed in zip(self.model.parameters, known, strict=True)
@@ -95,7 +95,7 @@ class TransferKind(OfModel):
         return replace(self, held=held)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """One more zero or a dead time."""
+        """Return the extensions by a further zero or a dead time."""
         hold, step = self.between.hold, self.between.sample_time
         return tuple(
             Extension(
@@ -110,7 +110,7 @@ class TransferKind(OfModel):
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
-        """What the prediction errors leave, for the noise is white."""
+        """Return the outputs less the prediction errors, since the noise is white."""
         return y - found.point.errors, (True,) * self.outputs
 
 
@@ -126,18 +126,18 @@ def identify_transfer_matrix(
     rest: bool | None = None,
     earlier: Earlier | None = None,
 ) -> Estimate:
-    """Maximum-likelihood estimate of a transfer matrix in s from one record, white noise on the outputs.
+    """Return the maximum-likelihood estimate of a transfer matrix in s, with white noise on the outputs.
 
     The noise of the samples has an unknown full covariance. From each start refined instrumental variables
     iterate first, then Gauss and Newton with damping on the same equations; poles are kept in the left
-    half plane. `refined_iv.py` tells why both have the same solutions.
+    half plane. `refined_iv.py` explains why both have the same solutions.
 
     Args:
         model: the structure, and with it the names and the order of theta; its numbers are not used.
         u, y: (N, r), (N, p).
         between: the time between samples, and whether u is held there.
         start: (k,), tried besides starts made from the data.
-        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
         earlier: an estimate from other data, which counts along.

@@ -17,7 +17,7 @@ from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
 from inputdesign_cli.plant.model import DELAY
 
-# A mode that loses less than this over the whole record cannot be told from one on the stability limit.
+# A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
@@ -27,12 +27,12 @@ _LEAST_DELAY = 1e-12
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:
-    """The samples of a record in which inputs before it act through a dead time; none without one."""
+    """Return the samples of a record in which inputs before it act through a dead time; none without one."""
     return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0
 
 
 def crossings_of(theta: Array, dead_times: NDArray[np.int64], step: float, samples: int) -> Array:
-    """(m, 2, k): steps that take a dead time to sampling instants beside it, and half a sample beyond.
+    """Return steps (m, 2, k) that take a dead time to nearby sampling instants, and half a sample beyond.
 
     Args:
         theta: (k,), of which `dead_times` are the dead times.
@@ -63,12 +63,12 @@ class TransferRecord:
 
     @property
     def samples(self) -> int:
-        """Number of samples N."""
+        """Return the number of samples N."""
         return len(self.y)
 
     @property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.structure.parameters)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -100,7 +100,7 @@ class TransferRecord:
         return tuple(Start.white(np.concatenate(parts)) for parts in found)
 
     def _entering(self, order: int) -> NDArray[np.float64]:
-        """(m, N): what an entry of so many poles may have been moved by."""
+        """Return the unknown signals (m, N) into an entry of `order` poles: impulses, and a level."""
         impulses = np.eye(min(order + self.late, self.samples), self.samples)
         return np.concatenate([impulses, np.ones((int(order > 0), self.samples))])
 
@@ -114,25 +114,25 @@ class TransferRecord:
         return filtered([1.0], poles, entering)
 
     def lateness(self, theta: Array) -> int:
-        """The longest dead time, in samples, those that are begun counted whole."""
+        """Return the longest dead time in samples, rounded up."""
         return late_samples(self.structure.at(theta).memory, self.intersample.sample_time)
 
     @cached_property
     def dead_times(self) -> NDArray[np.int64]:
-        """Where the dead times stand in theta."""
+        """Return where the dead times stand in theta."""
         return np.flatnonzero([parameter.letter == DELAY for parameter in self.structure.parameters])
 
     def crossings(self, theta: Array) -> Array:
-        """Those of inputs that are held: others move no less between the instants."""
+        """Return the crossings of the dead times of held inputs; other inputs make none."""
         late = self.dead_times if self.intersample.hold else self.dead_times[:0]
         return crossings_of(theta, late, self.intersample.sample_time, self.samples)
 
     def remembering(self, late: int) -> Self:
-        """The same, where unknown inputs act for so many samples."""
+        """Return the record with free responses to inputs before it, which act for `late` samples."""
         return replace(self, late=late)
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Those of the denominators."""
+        """Return the indices of the coefficients of the denominators if the states are free."""
         return np.flatnonzero([free and parameter.letter == "a" for parameter in self.structure.parameters])
 
     def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
@@ -157,7 +157,7 @@ class TransferRecord:
         return tuple(Start.white(np.concatenate(parts)) for parts in found)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): the signals (N, m) as they are, for the noise is white."""
+        """Return the signals (N, m) unchanged for each output (p, N, m), since the noise is white."""
         return np.repeat(signals[None], self.structure.outputs, axis=0)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
@@ -182,9 +182,9 @@ class TransferRecord:
         return found
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
+        """Return theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
 
-        Poles that are exactly zero are those of integrators, and stay. Dead times are kept
+        Poles that are exactly zero belong to integrators, and stay. Dead times are kept
         positive and below the length of the record.
         """
         step = self.intersample.sample_time
@@ -210,7 +210,7 @@ class TransferRecord:
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:
-        """Where the coefficients of each denominator stand in theta."""
+        """Return where the coefficients of each denominator stand in theta."""
         groups: dict[tuple[tuple[int, int], ...], list[int]] = {}
         for index, parameter in enumerate(self.structure.parameters):
             if parameter.letter == "a":

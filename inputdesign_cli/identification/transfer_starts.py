@@ -25,7 +25,7 @@ _CUTOFFS = 5
 _HIGHEST_ORDER = 8
 _ITERATIONS = 8
 _MOST_FREQUENCIES = 1000
-# Dead times are tried sample by sample up to so many, then each so much longer than the last.
+# Dead times are tried sample by sample up to _FINE samples, then in steps that grow by _GROWTH.
 _FINE, _GROWTH = 20, 1.2
 _SWEEPS, _MINIMA = 2, 6
 
@@ -33,13 +33,13 @@ Place = tuple[int, int]
 
 
 def starting_points(record: TransferRecord, held: Mapping[Place, float] | None = None) -> Array:
-    """(points, k): one for each cutoff and order of the rows, between the record's length and its step.
+    """Return starting points (points, k) for each cutoff and order of the rows.
 
-    Dead times are looked for on a grid, by what the regression of the row leaves: one after the other, and
-    where an output has only one also at its next best minima.
+    Cutoffs lie between the record's length and its step. Dead times are searched on a grid, one after the
+    other, by the residuals of the regression of the row. A single one also takes its next best minima.
 
     Args:
-        held: dead times of entries that are known.
+        held: known dead times of entries.
     """
     step = record.intersample.sample_time
     lines = slice(1, None, -(-record.samples // (2 * _MOST_FREQUENCIES)))
@@ -61,7 +61,7 @@ def starting_points(record: TransferRecord, held: Mapping[Place, float] | None =
 def _delays(
     record: TransferRecord, filtered: _Filtered, held: Mapping[Place, float]
 ) -> list[dict[Place, float]]:
-    """Dead times of all entries: the best found on the grid, and the best beside it."""
+    """Return dead times of all entries: the best on the grid, and for a single one its next best minima."""
     model = record.structure
     best = {place: held.get(place, model.dead_time(*place)) for place in model.active}
     groups = [
@@ -97,7 +97,7 @@ def _grid(record: TransferRecord) -> Array:
 class _Filtered:
     """Derivatives of the signals of a record behind one state-variable filter, in units of its cutoff.
 
-    With `summed` the order of the denominator of a row is the sum of those of its entries, otherwise the
+    With `summed` the order of the denominator of a row is the sum of its entries' orders, otherwise the
     largest.
     """
 
@@ -107,7 +107,7 @@ class _Filtered:
     _columns: dict[tuple[int, int, float], Array] = field(default_factory=dict)
 
     def responses(self, output: int, delays: Mapping[Place, float], w: Array) -> dict[Place, ComplexArray]:
-        """The responses at `w` of the entries of a row without their dead times, by least squares."""
+        """Return the responses at `w` of the entries of a row without their dead times, by least squares."""
         matrix, target = self._regression(output, delays)
         solution, m = _regression(matrix, target), self._order(output)
         s = 1j * w / self.cutoff
@@ -120,7 +120,7 @@ class _Filtered:
         }
 
     def left(self, output: int, delays: Mapping[Place, float]) -> float:
-        """The share of the power of the target that the regression leaves."""
+        """Return the share of the power of the target that the regression leaves."""
         matrix, target = self._regression(output, delays)
         squared = float(np.sum((target - matrix @ _regression(matrix, target)) ** 2))
         return squared / max(float(np.sum(target**2)), 1e-300)

@@ -1,4 +1,4 @@
-"""What a record tells where nobody knows in which state, and about which level, it began."""
+"""Compute the information matrix of a record whose initial state and level are unknown."""
 
 from __future__ import annotations
 

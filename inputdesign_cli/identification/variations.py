@@ -1,13 +1,13 @@
-"""What a plant that is linear and stays the same does without: an input whose gain changes, or its speed.
+"""Propose departures from a linear time-invariant plant: an input whose gain changes, or its speed.
 
-In place of G u stands G (u + x f), with a signal f that is made of the same input: the input itself after a
+G u is replaced by G (u + x f), with a signal f that is made of the same input: the input itself after a
 part of the record, or times a ramp; a power of it, its sign, the direction of its last move. Prediction
-errors are linear in u, so that their response to f is the gradient with respect to x. Where x is not zero
-there is no single G: small changes of u see another one in each state of the plant, such as early and late,
-or near the middle of the range and far from it.
+errors are linear in u, so that their response to f is the gradient with respect to x. If x is not zero there
+is no single G: small changes of u see a different one in each state of the plant. Examples of states are
+early and late, or near the middle of the range and far from it.
 
-Of a plant that heats faster than it cools f is made of its output: T (1 + x s) dy/dt + y = K u, where s is
-the direction in which y moves, is to first order T dy/dt + y = K u - x T |dy/dt|. What is added acts without
+If a plant heats faster than it cools, f is made of its output: T (1 + x s) dy/dt + y = K u, where s is
+the direction in which y moves, is to first order T dy/dt + y = K u - x T |dy/dt|. The added term acts without
 the dead time.
 """
 
@@ -34,12 +34,12 @@ RISING = "rising"
 
 
 class _Tried(NamedTuple):
-    """A signal f (N,) that is made of an input of size one.
+    """A signal f (N,) that is made of an input scaled to size one.
 
     Attributes:
         gains: df/du, one for each state of the plant.
-        moves: of f that depends on how much the output changes from sample to sample, what a change adds to f
-            in each state; zero of others. It acts `early` by so many samples.
+        moves: what a change of the output from sample to sample adds to f in each state; zero if f does not
+            depend on it. It acts `early` samples early.
     """
 
     name: str
@@ -54,14 +54,14 @@ class _Tried(NamedTuple):
 def variations(
     records: Records, record: Callable[[Array, Array], Record], theta: Array, simulated: Array | None
 ) -> tuple[Alternative, ...]:
-    """Return what is tried of each input, and of the speed of a plant with one input and output.
+    """Return the alternatives for each input, and for the speed of a plant with one input and output.
 
-    Of an input with two values powers and sign are the input itself about a level: they say nothing.
+    For an input with two values, powers and sign are the input itself about a level: they add nothing.
 
     Args:
         record: makes the record of samples (N, r), (N, p) that the structure is to explain.
         theta: (k,), the estimate.
-        simulated: (N, p), what the inputs cause; None where that cannot be simulated, or frequencies are not
+        simulated: (N, p), the response to the inputs; None if it cannot be simulated, or frequencies are not
             in rad/sample.
     """
     found, u, lengths = [], records.u, records.lengths
@@ -133,7 +133,7 @@ def _changes(name: str, x: Array) -> Iterator[_Tried]:
 
 
 def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
-    """The gain of samples x (N,), of mean zero and size one, depends on them."""
+    """Yield signals that stand for a gain that depends on samples x (N,), of mean zero and size one."""
     level, amplitude = (f"a gain of {name} that depends on its {what}" for what in ("level", "amplitude"))
     moves = np.concatenate([_last_moves(own) for own in np.split(x, np.cumsum(lengths)[:-1])])
     for of, phrase, f, gains in (

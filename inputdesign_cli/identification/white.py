@@ -1,4 +1,4 @@
-"""An estimate in the units of its own noise: what it explains, and what it leaves of other signals."""
+"""Express an estimate in the units of its own noise, and split signals into explained and other parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEPENDENT = 1e-6
 """Signals of norm one of which less is left depend on the others."""
 # A relative variance of the noise so small changes probabilities of 0.001 by a few per cent of themselves.
 _WELL_KNOWN = 1e-3
-# At its limit is what cannot move so many standard deviations.
+# A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
 
 Echo = Callable[[Array], Array]
@@ -105,7 +105,7 @@ class White:
         return found
 
     def echoes(self, through: Echo) -> float:
-        """The mean of the score of a signal that is made of the residuals themselves.
+        """Return the mean of the score of a signal that is made of the residuals themselves.
 
         Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
         the mean -tr(Q^T T Q), for T, which looks back in time, has no trace.
@@ -165,7 +165,7 @@ class White:
         return self.residuals[: self.samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
 
     def without(self, columns: Array) -> White:
-        """Return the same where columns ((N + M) p, m) of unknown sizes explain residuals as starts do."""
+        """Return the estimate where columns ((N + M) p, m) of free sizes explain residuals like starts."""
         left, sizes, _ = np.linalg.svd(self.unexplained(_scaled(columns)), full_matrices=False)
         left = left[:, sizes > DEPENDENT]
         freedom = self.residuals.size / self.variance
@@ -179,15 +179,15 @@ class White:
         )
 
     def unexplained(self, columns: Array) -> Array:
-        """What the estimate leaves of columns (N p, m)."""
+        """Return the part of columns (N p, m) that the estimate does not explain."""
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
 
 def _held(records: Records, point: Point) -> NDArray[np.bool_]:
-    """(k,): dead times that the samples would have shorter than they may be.
+    """Return the mask (k,) of dead times that the samples push against a bound.
 
-    There the score is not zero, and what it says of a model that is wrong would go off with what such a
-    parameter explains.
+    There the score is not zero. If the part that this parameter explains were taken off, evidence against a
+    wrong model would go with it.
     """
     held = np.zeros(point.theta.size, dtype=bool)
     variance = point.cost / point.errors.size
@@ -202,7 +202,7 @@ def _held(records: Records, point: Point) -> NDArray[np.bool_]:
 
 
 def _root(errors: Array, samples: int) -> Array:
-    """R (p, p) that makes errors (n, p) of so many samples white in space."""
+    """Return R (p, p) that makes errors (n, p) of `samples` samples white in space."""
     return np.linalg.inv(np.linalg.cholesky(errors.T @ errors / samples))
 
 
@@ -212,6 +212,6 @@ def _scaled(columns: Array) -> Array:
 
 
 def _orthonormal(columns: Array) -> Array:
-    """An orthonormal basis of what columns (n, m) span that were of norm one before others were taken off."""
+    """Return an orthonormal basis of columns (n, m), of norm one before others were taken off."""
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, singular > DEPENDENT])
