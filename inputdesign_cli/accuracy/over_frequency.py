@@ -63,7 +63,7 @@ class OverFrequency(Requirement):
     @property
     @abstractmethod
     def own_singularities(self) -> ComplexArray:
-        """Beyond those of the plant and its loop."""
+        """Return the singularities besides the ones of the plant and its loop."""
 
     @property
     def knots(self) -> Array:
@@ -115,7 +115,7 @@ class OverFrequency(Requirement):
 
     @cached_property
     def poles_on_the_circle(self) -> Array:
-        """Frequencies of the band at which G has a pole on the unit circle, for all an estimate can tell."""
+        """Return the frequencies of the band where G has a pole numerically on the unit circle."""
         lo, hi = self.band
         near = self.grid_singularities
         places = np.unique(near.real[near.imag <= _ON_THE_CIRCLE])
@@ -188,7 +188,7 @@ class OverFrequency(Requirement):
         return seen[1:]
 
     def worst(self, information: Array) -> Violation:
-        """The largest of the violations; one beside frequency zero is told to be there."""
+        """Return the largest violation. A peak next to frequency zero counts as at zero."""
         turn, on_grid = self._on_grid(information)
         # A peak that ends below the highest point of the grid is not the largest.
         found = worst(self._polished(turn, on_grid, float(on_grid.max()) * (1.0 - _ROUNDING)))

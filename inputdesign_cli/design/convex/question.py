@@ -66,6 +66,6 @@ class Question:
         )
 
     def of_length(self, samples: int) -> Question:
-        """The same question of experiments with so many samples."""
+        """Return the question for experiments with this number of samples."""
         others = [replace(one, experiment=replace(one.experiment, samples=samples)) for one in self.others]
         return replace(self, experiment=replace(self.experiment, samples=samples), others=others)

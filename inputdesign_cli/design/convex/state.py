@@ -125,7 +125,7 @@ class State:
     def _prune(self, proof: Proof) -> None:
         """Drop the cuts that have not bound for some rounds; each costs the solver a k x k cone.
 
-        Those that do not bind in one round often do in the next.
+        A cut that does not bind in one round often does in the next.
         """
         weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
         idle = np.where(weights > _BINDS * weights.sum(), 0, np.array(self.idle, dtype=int) + 1)
@@ -199,7 +199,7 @@ class State:
 
 
 def first_state(problem: Problem, start: Array, interior: Array | None, known: Sequence[Place]) -> State:
-    """What is known before the first round; the arguments are those of `exchange`."""
+    """Return the state before the first round; the arguments are the ones of `exchange`."""
     size, inner = problem.basis.size, None
     if interior is not None:
         inner = _inner(problem, interior[:size])

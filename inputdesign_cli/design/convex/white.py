@@ -27,13 +27,13 @@ _SUITED = 8.0  # how far from their own power coordinates serve
 
 
 def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
-    """The smallest white excitation power (per sample) that meets every requirement; 0 if none is needed.
+    """Return the smallest white excitation power (per sample) that meets every requirement, possibly 0.
 
     r_u falls monotonically as the power grows, so this is one scalar equation and needs no solver.
     The coordinates are whitened again at each new estimate of the power.
 
     Raises:
-        InfeasibleError: no power is enough, since the requirement is on what noise alone tells.
+        InfeasibleError: no power is enough, since only the noise informs on the required accuracy.
         OutOfTimeError: see `seconds_left`.
     """
     power = 1.0
@@ -86,7 +86,7 @@ class _Trial:
         return cls(experiment, factories, at, flat)
 
     def near(self, at: float) -> _Trial:
-        """The same, in other coordinates where what only the noise tells would be lost in these."""
+        """Return this trial, or one in coordinates for the power `at` if that is far from its own."""
         return self if abs(at - self.at) <= _SUITED else _Trial.of(self.experiment, self.factories, at)
 
     def excess(self, log_power: float) -> float:

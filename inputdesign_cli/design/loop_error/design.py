@@ -102,7 +102,7 @@ class LoopErrorDesign:
 
     @property
     def output_covariance(self) -> Array:
-        """(n, n) of what the input causes at the output."""
+        """Return the covariance (n, n) of the output due to the input."""
         G = self.problem.plant.plant_at(self.frequencies)
         return np.asarray(np.einsum("kab,k->ab", G @ self.spectrum @ adjoint(G), self.weights).real)
 
@@ -138,12 +138,15 @@ def design_loop_error(
 
 
 def flat(level: float, frequencies: int, inputs: int) -> ComplexArray:
-    """The spectrum level I at so many frequencies, (K, n, n)."""
+    """Return the spectrum level I at K = `frequencies` frequencies, (K, n, n)."""
     return np.broadcast_to(level * np.eye(inputs, dtype=complex), (frequencies, inputs, inputs))
 
 
 def _check_identifiable(problem: LoopErrorProblem, criterion: ParametricCriterion) -> None:
-    """White input tells all parameters apart, judged in coordinates where each alone has information one."""
+    """Raise `SpecError` (`not-identifiable`) unless white input identifies all parameters.
+
+    The matrix is judged in coordinates where each parameter alone has information one.
+    """
     rule = problem.rule(1)
     white = flat(1.0, rule.nodes.size, problem.plant.inputs)
     M = criterion.information(rule.nodes, white, rule.weights)

@@ -43,11 +43,11 @@ class OutOfReachError(Exception):
 
 @dataclass(frozen=True)
 class ToeplitzDesign:
-    """A design and what is proved of it.
+    """A design and the bound that is proved for it.
 
     Attributes:
         R: (n, n) moments summed over the samples.
-        bound: no Toeplitz R does better, in the unit of what is minimised (energy or error).
+        bound: no Toeplitz R does better, in the unit of the objective (energy or error).
         assumed: the least eigenvalue of R11 / r_0 that the proof takes for granted; 0 if none.
         starts, solves, nodes: of the local search, of its small programs, of the branch and bound.
     """
@@ -65,7 +65,7 @@ class ToeplitzDesign:
 
 @dataclass(frozen=True)
 class Normalisation:
-    """From the units of `ToeplitzProblem` to those of the regression."""
+    """Converts the units of `ToeplitzProblem` into the units of the regression."""
 
     regression: Regression
 
