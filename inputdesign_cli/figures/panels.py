@@ -61,7 +61,7 @@ def draw_panels(
         time_unit: frequencies are labelled rad per this.
         magnitude: the label of the vertical axes, of those at the left.
         title: says what all panels are about.
-        below: draws one more panel under all others.
+        below: draws a further panel under all others.
     """
     single = len(panels) == 1
     places = [(0, 0)] if single else [panel.entry or (0, 0) for panel in panels]

@@ -16,12 +16,12 @@ _FEWEST, _MOST = 20, 400
 
 
 class Traced(Line2D):
-    """A curve in the plane along something else, such as a Nyquist plot along frequency.
+    """Draws a curve in the plane along a third variable: a Nyquist plot goes along frequency.
 
     Args:
         x, y: its points (n,).
         along: what it goes along (n,), called `name`.
-        told: what is said of every point, (n,) by name.
+        told: values shown at every point, (n,) by name.
     """
 
     def __init__(

@@ -43,7 +43,10 @@ def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
 
 
 def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> list[Artist]:
-    """Those of all entries; a negative gain begins half a turn away from a positive one."""
+    """Draw the phases of all entries and return the handles of their legend.
+
+    A negative gain begins half a turn away from a positive one.
+    """
     handles: list[Artist] = []
     for number, panel in enumerate(panels):
         color, dashes = stroke(number)

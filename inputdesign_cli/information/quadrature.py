@@ -125,14 +125,14 @@ def integrate(
     knots: Array = _NONE,
     at_once: int = _MANY,
 ) -> NDArray[np.float64]:
-    """`sums` of `values` on a rule that is fine enough, proved by halving every panel.
+    """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
     Halving gains twelve digits or none. Where it gains none and the change is already small, what
     is left is rounding of the integrand (gradients in the whitened coordinates of a plant whose
     parameters are nearly indistinguishable), which no rule can mend.
 
     Args:
-        at_once: values are computed at so many nodes at a time at most.
+        at_once: the largest number of nodes at which values are computed at a time.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:

@@ -28,7 +28,7 @@ class RecordFilters:
 
     @classmethod
     def of(cls, experiment: Experiment) -> RecordFilters | None:
-        """The filters of an experiment, None where it is not of this kind."""
+        """Return the filters of an experiment, or None unless its model is polynomial, single-channel."""
         model = experiment.model
         if not isinstance(model, PolynomialModel) or model.inputs > 1 or model.outputs > 1:
             return None
