@@ -47,7 +47,7 @@ class NoiseSpectrum:
         )
 
     def at(self, period: int, harmonics: NDArray[np.int_]) -> Array:
-        """Phi_v (L, p) at harmonics of a period of so many samples."""
+        """Return Phi_v (L, p) at harmonics of a period of `period` samples."""
         return _power(self._folded(self.impulses, period)[:, harmonics])
 
     def averaged(self, period: int, harmonics: NDArray[np.int_], periods: int) -> Array:

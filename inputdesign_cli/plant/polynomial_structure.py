@@ -21,7 +21,7 @@ from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 
 @dataclass(frozen=True)
 class PolynomialStructure(Parametrised):
-    """Which coefficients are free, what they are called, and what they are.
+    """States which coefficients are free, their names and their values.
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
     are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
@@ -29,7 +29,7 @@ class PolynomialStructure(Parametrised):
 
     Attributes:
         delays: (p, r), the power of the first coefficient of each B that is free, its length where the entry
-            is absent; None where zeros of B say so.
+            is absent; if None, zeros of B say so.
     """
 
     B: Rows
@@ -67,7 +67,7 @@ class PolynomialStructure(Parametrised):
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All free coefficients: those of A, B, C, D, F in turn."""
+        """Return all free coefficients, of A, B, C, D and F in turn."""
         found: list[Parameter] = []
         for letter in "abcdf":
             if letter in "bf":

@@ -26,10 +26,10 @@ Place = Sequence[str | int]
 
 @dataclass(frozen=True)
 class Words:
-    """What a spec says of parameters that have names of their own, to be repeated with other values.
+    """Holds parameters with names of their own as a spec states them, to be repeated with other values.
 
     Attributes:
-        plant: the section as it was written; None where it lists the coefficients, as those of the model do.
+        plant: the section as it was written; None if it lists the coefficients of the model.
         places: label -> where its value stands in the section.
         known: of plant and of noise, what is listed as known.
     """

@@ -36,7 +36,7 @@ def hold_entries(
     period: float,
     delays: Sequence[Sequence[float]],
 ) -> tuple[Rows, Rows]:
-    """The same for every entry of a matrix: numerators and denominators in q^-1, ascending.
+    """Sample every entry of a matrix behind a hold: return polynomials in q^-1, ascending.
 
     Args:
         delays: the dead times of the entries.

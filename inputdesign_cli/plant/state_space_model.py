@@ -228,7 +228,7 @@ class StateSpaceModel(Parametrised):
 
     @property
     def repeated_integrators(self) -> int:
-        """None: the states are those of the spec."""
+        """Return 0, since the states are the ones of the spec."""
         return 0
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:

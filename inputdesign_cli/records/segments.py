@@ -49,7 +49,7 @@ def joined_rows(signals: Signals, *, resample: bool) -> Signals:
     """Return the signals at the times of the output that was written most often; or, if few miss, all rows.
 
     Inputs are held until they are written again, and are their means until the next row; outputs are
-    interpolated linearly. Rows stay as they are if enough of them are whole.
+    interpolated linearly. Rows stay unchanged if enough of them are whole.
 
     Args:
         resample: whether that is asked for.

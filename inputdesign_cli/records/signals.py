@@ -72,7 +72,7 @@ class Signals:
 def signals_of(
     sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Mapping[str, str]
 ) -> Signals:
-    """Return the columns of the channels; those of `references`, by their labels, follow the inputs.
+    """Return the columns of the channels; the columns of `references` follow the inputs, by their labels.
 
     Raises:
         DataError: a column is missing, holds text or nothing, or leaves the range of arithmetic; the times

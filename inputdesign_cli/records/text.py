@@ -242,7 +242,7 @@ def _of_words(row: Sequence[str], width: int) -> bool:
 
 
 def _headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
-    """Line and text of the header, the names (none where there are none), and the rows below.
+    """Return line and text of the header, the names (empty if there are none), and the rows below.
 
     A row of units below the names joins them: `valve` over `%` is `valve (%)`.
     """

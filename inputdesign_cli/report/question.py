@@ -24,7 +24,7 @@ _SPECTRA = {
 
 @dataclass(frozen=True)
 class Question:
-    """What a spec asks, in words, and what a page has to know of the spec beside them."""
+    """Holds the question of a spec in words, and the facts of the spec that a page needs besides."""
 
     title: str
     sentences: tuple[str, ...]  # the system, the experiment, what is asked

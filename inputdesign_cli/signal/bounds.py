@@ -38,9 +38,9 @@ class Bounds:
 
 
 def limiter_of(plant: FiniteRecord, settings: SignalSettings, bounds: Bounds) -> Limiter:
-    """What enforces the bounds on records of the length of the `plant`'s.
+    """Return the limiter that enforces the bounds on records of the length of the `plant`'s.
 
-    Limits on u are those of the record itself in open loop only.
+    Limits on u apply to the record itself in open loop only.
     """
     inputs, open_loop = plant.experiment.inputs, plant.experiment.loop is None
     amplitude, rate = (bounds.amplitude, bounds.rate) if open_loop else (None, None)

@@ -1,6 +1,6 @@
 """Spectra with a Gram matrix: Phi(w) = B(w) Q B(w)^*, Q >= 0, for a fixed row of functions B(w).
 
-What such families share: the cone, its faces, and the price of what lies outside of a face.
+These families share the cone, its faces, and the price of spectra outside of a face.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ _FREE = 1e-12
 class LinesBasis:
     """The unknowns are the powers of atoms: sinusoids at `frequencies` (L,) along `directions` (L, r).
 
-    Directions have length one, so that the power is the total over the channels; they are told apart in
+    Directions have length one, so that the power is the total over the channels; they are compared in
     `units` (r,) of the channels. The basis grows by
     the atoms that would pay: anywhere on the grid when `free`, else at `allowed` frequencies with any
     direction. Prices then hold for every spectrum, or for every spectrum on those lines.
@@ -166,7 +166,7 @@ class LinesBasis:
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
         """The atoms so far and the new ones; x of the old basis is the head of x of the new.
 
-        Of very many atoms those of the least power leave the face. What pays of them comes back.
+        Of very many atoms the ones of least power leave the face. They come back when they pay.
         """
         number = face.generators
         power = np.zeros(self.size)

@@ -125,9 +125,9 @@ def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
 
 
 def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:
-    """The block with roots of C and D no nearer to the unit circle than a record of so many samples tells.
+    """Return the block with roots of C and D not too near to the unit circle, and the letters that changed.
 
-    With it the letters of those that were nearer.
+    Their modulus is at most 1 - 1 / samples: a record of this length cannot resolve nearer roots.
     """
     drawn = dict(noise)
     for letter in {"C", "D"} & noise.keys():

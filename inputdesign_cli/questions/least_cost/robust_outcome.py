@@ -118,7 +118,7 @@ def plants_kept(
         kept: the numbers of the plants that count.
         at_each: what these keep, the plant of the spec first.
         binding: places among them.
-        floors: of those that count.
+        floors: of the plants that count.
     """
     numbers = [0, *(number + 1 for number in kept)]
     worst = int(np.argmax([one.share for one in at_each]))
