@@ -19,7 +19,7 @@ from inputdesign_cli.plant.frequencies import SLACK
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
 _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
-# Shares of the band: a pole is on the circle, only rounding is seen beside it, it lies at an end of the band.
+# Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
 _KEPT = 8  # sets of frequencies whose rows are remembered at a time

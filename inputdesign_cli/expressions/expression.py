@@ -19,7 +19,7 @@ from inputdesign_cli.expressions.steps import FUNCTIONS, Array, Evaluated, Step,
 
 LONGEST = 500
 _REMEMBERED = 64  # sets of expressions, as a search asks for one at many points
-_SHOWN = 60  # of what is made of expressions and longer
+_SHOWN = 60  # letters of a composed expression that is longer
 CONSTANTS = {"pi": math.pi}
 
 

@@ -61,7 +61,7 @@ class Evaluated:
     def gradients(self) -> Array:
         """(K, m)."""
         unit, slopes = np.eye(len(self._known)), list[Array | None]()
-        # What leaves the range of numbers is seen in the result.
+        # Overflow is seen in the result.
         with np.errstate(all="ignore"):
             for step, local in zip(self._steps, self._found, strict=True):
                 slopes.append(unit[self._known[str(step.value)]] if step.operation == "name" else None)

@@ -15,10 +15,10 @@ from inputdesign_cli.figures.style import BLACK, BLUE, DOTTED, GREY, ORANGE, leg
 from inputdesign_cli.outcome.curves import FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.outcome.results import Array
 
-# A record up to the first length is drawn whole, of a longer one so many samples.
+# A record up to the first length is drawn whole, of a longer one the second number of samples.
 _WHOLE, SHOWN = 600, 400
 _AS_LIVELY = 0.5
-_LINE = 2e-3  # the width of a curve, as a share of what is drawn
+_LINE = 2e-3  # the width of a curve, as a share of the height drawn
 
 
 @dataclass(frozen=True)

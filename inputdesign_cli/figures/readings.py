@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from inputdesign_cli.outcome.results import Array, Json
 
-# Fewer points without a line are marks; of more points every so many are kept.
+# Fewer points without a line are marks; more points are thinned out evenly.
 _FEWEST, _MOST = 20, 400
 
 

@@ -44,13 +44,13 @@ ORANGE = "#D55E00"
 GREEN = "#009E73"
 GREY = "#777777"
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
-OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what is admitted
+OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # for curves near a limit
 
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
 _LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
-# A logarithmic axis that ends below so many times its beginning has even steps.
+# A logarithmic axis whose end is below this multiple of its beginning has even steps.
 _EVEN, _STEPS = 8.0, 6
 
 DASHED = (0, (5, 2))

@@ -198,7 +198,7 @@ def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
         log_axes(axes, "y")
         plain_numbers(axes.yaxis, high / low)
     elif table.maximised:
-        # What counts are differences; but those of rounding are none.
+        # Differences count, except differences of rounding.
         half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
         axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     elif low > 0:

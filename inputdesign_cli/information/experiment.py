@@ -24,7 +24,7 @@ from inputdesign_cli.plant import Loop, Model
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
-"""The powers that results tell; that of the moves of u from sample to sample is only limited."""
+"""The powers that results state; the power of the moves of u between samples is only limited."""
 # What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
 _NOTHING = 1e-13
 

@@ -27,7 +27,7 @@ _ROUNDING = 1e-7
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
 NODES_AT_ONCE = 256
-"""So many at a time where the values are large: those of several channels."""
+"""The number of nodes at a time where the values are large, as for several channels."""
 _MANY = 2048
 
 Values = Callable[[Array], NDArray]
@@ -144,7 +144,7 @@ def integrate(
             singularities, lo=lo, hi=hi, highest_lag=highest_lag, refine=refine, knots=knots
         )
 
-    # The first rule never stands alone: one call for its values and those of the next.
+    # The first rule never stands alone: one call computes its values and the next rule's.
     coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once)
     earlier = np.inf
     for refine in range(1, _MAX_REFINEMENTS + 1):

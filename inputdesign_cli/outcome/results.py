@@ -134,7 +134,7 @@ class Results:
         return f"<b>{escape(found.title or '')}</b><table>{cells}</table>"
 
 
-# Frequencies are written with three digits, say: so much of what lies around a line is the line.
+# Users write frequencies with three digits or so: within this share, a frequency is that of the line.
 _SAME_LINE = 1e-3
 
 

@@ -14,11 +14,11 @@ _REFINEMENT = 6
 # Points and steps that narrow a bracket ten thousandfold: few peaks cost their steps, many their points.
 _ZOOM_FEW, _ZOOM_MANY, _FEW = (40, 3), (8, 6), 64
 # Beside a kink the value falls in proportion to the width: narrowed on until it falls by no more than this
-# share of it, or so many times in all.
+# share of it, or this number of times in all.
 _KINK, _MOST_ZOOMS = 1e-9, 16
 SLACK = 0.05
 """A peak between two grid points may stand this much higher than both, as a share of itself."""
-# Values that differ by less are those of a function that is flat there.
+# Where values differ by less, the function is flat.
 _FLAT = 1e-12
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
 
-# So many values of the parameters are kept with their coefficients.
+# Number of recent parameter values that are kept with their coefficients.
 _RECENT = 4
 
 

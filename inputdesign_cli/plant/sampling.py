@@ -25,7 +25,7 @@ def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], pe
     gain = float(np.abs(given).max(initial=0.0))
     scaled = given / gain if gain > 0 else np.ones(1)
     above, below, _ = scipy.signal.cont2discrete((scaled, denominator), period, method="zoh")
-    # In z both have the same length, so that their coefficients are those of q^-1, ascending.
+    # In z both have the same length, so that they are the coefficients in q^-1, ascending.
     top = gain * np.ravel(above).astype(float)
     return Rational(np.concatenate([np.zeros(below.size - top.size), top]), (below,))
 

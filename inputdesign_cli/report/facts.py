@@ -22,7 +22,7 @@ from inputdesign_cli.report.numbers import Fact, enumerated, precise, shown, spo
 
 # Smaller relative gaps differ from machine to machine.
 _CLOSED = 1e-6
-# A plant whose ratio is larger by no more than this share errs as much as those that bind.
+# A plant whose ratio is larger by no more than this share errs as much as the binding plants.
 _AS_MUCH = 1e-4
 # An exact confidence is exceeded if more than this share is kept beyond what was asked.
 _ROOM = 0.005

@@ -35,7 +35,7 @@ class Question:
     asked: frozenset[str]  # the keys under `accuracy`
     family: str  # the type of the spectrum; empty for a given one
     seed: int  # of the signal
-    units: str  # of what the page shows
+    units: str  # of the values on the page
 
 
 def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:

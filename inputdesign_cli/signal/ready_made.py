@@ -19,7 +19,7 @@ from inputdesign_cli.signal.shift_register import shifted_sequences
 _EXCITED = 1e-9
 _DIGITS = 13
 _MIDDLE = (0.05, 0.95)
-# Of more lines phases are not optimised: those of Schroeder are nearly as good.
+# With more lines, phases are not optimised: Schroeder's are nearly as good.
 _OPTIMISED = 2000
 
 

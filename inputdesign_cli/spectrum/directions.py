@@ -85,7 +85,7 @@ def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
     each = np.einsum("naa->na", price).real
     size = each.sum(axis=1)
     free = size <= _NOTHING
-    # Channel by channel: a share of what a dear one costs would be many times the price of a cheap one.
+    # Channel by channel: a share of the price of a dear one would be many times the price of a cheap one.
     little = _SINGULAR * np.where(each > 0.0, each, size[:, None]) + free[:, None]
     P = price + little[:, :, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))

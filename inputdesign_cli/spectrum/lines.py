@@ -26,7 +26,7 @@ from inputdesign_cli.spectrum.directions import (
 _FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
 # New atoms a round: for each input, and in all. The best few get company (see `_around`).
 _NEW_EACH, _MOST_NEW, _MOST_ACCOMPANIED = 16, 64, 16
-# From so many atoms on, so many of the most power stay.
+# Beyond the first number of atoms, the second number stay, with the most power.
 _MOST_ATOMS, _KEPT_ATOMS = 320, 200
 _ATOMS_AT_ONCE = 256
 # Two atoms at one frequency are the same when their directions agree this closely.

@@ -97,7 +97,7 @@ def _suited_to(problem: Problem, experiment: Experiment, information: Array, sta
     """
     if np.linalg.cond(information) < _UNSUITED:
         return experiment
-    # Parameters in units of their own: of what the start tells, and only by their sizes.
+    # Scale each parameter by its own information from the start.
     unit = np.diag(np.sqrt(np.maximum(np.diag(experiment.to_raw(information)), _FAINT)))
     in_units = replace(experiment, factor=unit)
     scaled = replace(problem, experiment=in_units, others=(), finer=None).information(start)

@@ -16,9 +16,9 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, joint_noise
 
 RequirementFactory = Callable[[Experiment], Requirement]
-# So many scenarios are enough for a next step: what serves the worst few serves most of the others.
+# This number of scenarios is enough for a next step: what serves the worst few serves most of the others.
 FEW = 4
-# Maxima from this share of what is looked for on are noted, so that a small step needs no other search.
+# Maxima above this share of the level searched for are noted, so that a small step needs no other search.
 _NEARLY = 0.99
 
 

@@ -139,7 +139,7 @@ def exchange(
                 asked *= _FINER
                 continue
             if stalled and state.gap > goal and not state.dense:
-                # Of multipliers of very different sizes the dense method tells more digits.
+                # The dense method finds more digits of multipliers of very different sizes.
                 state.dense = True
                 gaps.clear()
                 continue

@@ -28,7 +28,7 @@ _SOLVER_MARGIN = 1e-2
 _SOLVER_FLOOR = 1e-10
 _SINGULAR = 1e-14
 _AT_ONCE = 256  # basis functions
-# Shares of a cost below this one, of the largest, are those of rounding.
+# Shares of a cost below this fraction of the largest are rounding errors.
 _NO_SHARE = 1e-9
 # Without a requirement that keeps M definite, weak directions are not blown up beyond this.
 _INDEFINITE = 1e-3

@@ -60,8 +60,8 @@ class Problem:
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
     they can be met. `finer` is a problem of the same experiment on the same or a larger basis; the
-    integrals of this basis are the first ones of its integrals. `seen` are the demands of a like problem, reused
-    if both have the same requirements and plants.
+    integrals of this basis are the first ones of its integrals. `seen` are the demands of a like problem,
+    reused if both have the same requirements and plants.
     """
 
     experiment: Experiment

@@ -42,7 +42,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         problem = trial.problem
         if suffices(problem, problem.baselines):
             return 0.0
-        # The ratio falls as the root of the power where the excitation alone tells what is asked.
+        # The ratio falls as the root of the power if only the excitation informs on the requirement.
         at_once = trial.at + 2.0 * trial.excess(trial.at)
         if abs(at_once - trial.at) <= _SUITED and abs(trial.excess(at_once)) <= _EXACT:
             return float(np.exp(at_once))
@@ -54,7 +54,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
                 if lo < _FAINT:
                     return 0.0  # nothing is asked
         except np.linalg.LinAlgError:
-            return 0.0  # the noise alone tells what is asked, and nothing of other parameters
+            return 0.0  # the noise alone meets the requirement, and has no information on other parameters
         found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
         if abs(found - power) <= 1e-3 * power:
             return found

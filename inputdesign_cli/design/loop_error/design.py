@@ -18,7 +18,7 @@ from inputdesign_cli.information.quadrature import Quadrature
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
-# Eigenvalue of the scaled information matrix below which parameters cannot be told apart.
+# Eigenvalue of the scaled information matrix below which parameters are not identifiable.
 _SINGULAR = 1e-13
 # Means over frequency that halving the panels moves by more than this are not trusted.
 _UNSETTLED = 1e-8

@@ -22,7 +22,7 @@ _STEP_TOLERANCE = 1e-10
 _NODES = {1: 400, 2: 400, 3: 400}
 _NODES_BEYOND = 100  # the boxes of m >= 4 are many and dear, and more of them close little
 _FAINT = 1e-5  # powers of lines below this share, in a design that is flat there
-# A target is out of reach if no energy up to so many times n sigma^2 |L1|^2 / gamma is enough; the largest
+# A target is out of reach if no energy up to this many n sigma^2 |L1|^2 / gamma is enough; the largest
 # of these for which the proof closes counts.
 _PROVED_MULTIPLES = (1e6, 1e4, 1e2)
 

@@ -166,7 +166,7 @@ def _with_larger_noise(
             for k in np.flatnonzero(larger.nominal.in_plant):
                 start[k] = plant[larger.nominal.names[k]]
             other = estimated(larger, found.data, first, found.preparation, start=start)
-        except IdesignError:  # this noise cannot be stated of such a plant, or not estimated
+        except IdesignError:  # this plant cannot have this noise, or it cannot be estimated
             continue
         if other.estimate.converged and not other.estimate.coloured:
             return larger, replace(other, noise_refuted=noise_probability(estimate))

@@ -36,7 +36,7 @@ def spec_text(log: Record, found: Found, sources: Sequence[Path]) -> str:
     low, high = log.u.min(axis=0), log.u.max(axis=0)
     half = 0.5 * (high - low)
     half = np.where(half > 0.0, half, half.max())
-    # Six digits of what the input moves by: a level far from zero takes more.
+    # Six digits of the distance that the input moves: a level far from zero takes more.
     places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in half]
     levels, widths = (
         [round(float(x), n) for x, n in zip(values, places, strict=True)]

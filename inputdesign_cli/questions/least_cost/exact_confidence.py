@@ -32,7 +32,7 @@ from inputdesign_cli.spectrum import flat_basis
 _RECORDS = 4
 # Simulated experiments correct the design this often at the most, until they change alpha by this share.
 _CORRECTIONS, _CORRECTED = 5, 0.01
-# Where other runs do not bear the correction out, so many times as many correct.
+# If other runs do not confirm the correction, this multiple of runs corrects it.
 _SETS = 4
 
 MakeDesign = Callable[[Question, Confidence], Designed]
