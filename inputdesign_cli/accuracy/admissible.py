@@ -131,7 +131,7 @@ class Sensitivity:
 
     @property
     def kept(self) -> Sensitivity:
-        """Itself."""
+        """Return this requirement itself, which is about a loop."""
         return self
 
     def nominal(self, w: ArrayLike) -> Array:
@@ -173,12 +173,12 @@ class Weighted:
 
     @property
     def kept(self) -> Sensitivity | None:
-        """That of the error without the weight."""
+        """Return the loop of the error without the weight, if any."""
         return self.inner.kept
 
     @property
     def floored(self) -> Floored | None:
-        """That of the error without the weight, which is positive."""
+        """Return the floored bound of the error without the weight, which is positive."""
         return self.inner.floored
 
     @property
@@ -212,12 +212,12 @@ class Floored:
 
     @property
     def kept(self) -> Sensitivity | None:
-        """That of the scenario."""
+        """Return the loop of the scenario, if any."""
         return self.own.kept
 
     @property
     def floored(self) -> Floored:
-        """Itself."""
+        """Return this bound itself."""
         return self
 
     def lost(self, grid: Array) -> bool:

@@ -170,7 +170,7 @@ class OverFrequency(Requirement):
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
 
     def most(self, information: Array) -> float:
-        """From the points of the grid: a peak between them stands no higher than `local_maxima` admits."""
+        """Bound the ratio by the grid: a peak between them stands no higher than `local_maxima` admits."""
         top = self.least(information)
         return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
 

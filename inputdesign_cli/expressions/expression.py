@@ -145,7 +145,7 @@ class _Table:
         return tuple(self._places)
 
     def expression(self, place: int, text: str) -> Expression:
-        """That whose last step stands at the place, without steps that it does not need."""
+        """Return the expression whose last step is at `place`, without the steps that it does not need."""
         steps, needed = list(self._places), {place}
         for i in range(place, -1, -1):
             if i in needed:

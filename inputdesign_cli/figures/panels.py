@@ -36,7 +36,7 @@ class Panel(Protocol):
 
     @property
     def names(self) -> str:
-        """Of its input and output; empty where there are none."""
+        """Return the names of its input and output; empty if there are none."""
 
 
 P = TypeVar("P", bound=Panel)

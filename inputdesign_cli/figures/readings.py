@@ -32,7 +32,7 @@ class Traced(Line2D):
 
 
 def readings(page: Figure) -> list[dict[str, Json]]:
-    """Of a page that has been laid out: its panels with named curves over an axis, or along one in the plane.
+    """Return the panels of a laid-out page with named curves over an axis, or along one in the plane.
 
     `box` is left, top, width and height in shares of the page; `low` and `high` are the ends of the axis. A
     panel with a curve in the plane has its `path`, in shares of the panel from the left and from the top.

@@ -59,7 +59,7 @@ def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> list[Artist]:
 
 
 def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
-    """That of the model without jumps, and of the data, where it is known at all, on the nearest turn."""
+    """Draw the phase of the model without jumps, and of the data, if known, on the nearest turn."""
     model = np.degrees(np.unwrap(np.angle(panel.model)))
     known = panel.radius < np.abs(panel.G)
     turn = np.degrees(np.angle(panel.G)) - model

@@ -96,7 +96,7 @@ class Experiment(Coordinates):
         return self._whiten(self.model.plant_gradient(w))
 
     def entry_gradient(self, w: ArrayLike, output: int, input: int) -> ComplexArray:
-        """(n, k): that of one entry of G."""
+        """Return the whitened gradient (n, k) of one entry of G."""
         entry = self.model.plant_gradient(w)[:, :, output : output + 1, input : input + 1]
         return self._whiten(entry)[:, :, 0, 0]
 

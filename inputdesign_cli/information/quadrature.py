@@ -200,7 +200,7 @@ def integrate_band(
     knots: Array = _NONE,
     at_once: int = NODES_AT_ONCE,
 ) -> NDArray[np.float64]:
-    """The same over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
+    """Integrate over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
     The band is stretched to the length of the half circle, for which the panels are laid out.
     """

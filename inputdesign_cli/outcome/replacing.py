@@ -1,8 +1,8 @@
 """Replace one run by another: whole whenever the writer is killed, and put right by the next call.
 
-Everything happens in a folder of work. It is inside the directory of the run, or next to it if the directory
-is yet to be made or is exchanged as a whole. It holds `new`, the files of the new run; `old`, the files of
-the run that leaves, only while files are moved one by one; and a lock, which ends with its process.
+Everything happens in a folder of work. It is inside the directory of the run. It is next to it if the
+directory is yet to be made or is exchanged as a whole. It holds `new`, the files of the new run; `old`, the
+files of the run that leaves, only while files are moved one by one; and a lock, which ends with its process.
 """
 
 from __future__ import annotations

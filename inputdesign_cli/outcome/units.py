@@ -84,7 +84,7 @@ class Units:
         return f"{channel} {self.label(channel)}".strip()
 
     def passage(self, entry: tuple[int, int] | None) -> str:
-        """Of an entry of G, counted from zero, what the user calls its input and output: `valve → level`.
+        """Return the user's names of the input and output of an entry of G, from zero: `valve → level`.
 
         Empty where not both have names, and for all entries together (None) unless there is one alone.
         """
@@ -102,7 +102,7 @@ class Units:
         return "" if self.single else f"[{output + 1},{input + 1}]"
 
     def suffix(self, output: int, input: int) -> str:
-        """The same in names of columns: `_21`; nothing for one."""
+        """Return the index of an entry in names of columns: `_21`; empty for one input and output."""
         return "" if self.single else f"_{output + 1}{input + 1}"
 
 

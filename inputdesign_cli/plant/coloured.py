@@ -151,7 +151,7 @@ class Coloured(Parametrised):
         )
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """That of the plant; it does not depend on C and D."""
+        """Return the fraction of the plant; it does not depend on C and D."""
         part = self.plant.entry_fraction(output, input, w)
         none = np.zeros((len(part.numerator), len(self.own_parameters)), dtype=complex)
         return replace(
@@ -231,7 +231,7 @@ class Coloured(Parametrised):
         return None if self._per_output(self.held)[output] else self._per_output(self.D)[output], -1.0
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Coloured:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         values, rows = np.asarray(theta, dtype=float), {"c": list(self.C), "d": list(self.D)}
         first = len(self.plant.parameters)
         tables = {letter: [p.copy() for p in polynomials] for letter, polynomials in rows.items()}
@@ -260,7 +260,7 @@ class ColouredLoop(LoopAround):
 
     @cached_property
     def inner(self) -> Loop:
-        """That of the plant."""
+        """Return the loop around the plant without the coloured noise."""
         return close_loop(self.model.plant, self.controller)
 
     @property

@@ -128,7 +128,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return tuple(found)
 
     def dead_time(self, output: int, input: int) -> float:
-        """Of an entry."""
+        """Return the dead time of an entry."""
         return float(np.sum(self._delays((output, input))))
 
     def _delays(self, place: tuple[int, int]) -> Array:
@@ -136,7 +136,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return self.delay[place[0]][place[1]] if self.delay else np.zeros(0)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousModel:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         given = {"b": self.numerator, "a": self.denominator, DELAY: self.delay}
         tables = {letter: [[e.copy() for e in row] for row in rows] for letter, rows in given.items()}
         for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):

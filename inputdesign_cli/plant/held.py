@@ -84,7 +84,7 @@ class HeldEntry:
 
     @cached_property
     def transition(self) -> Array:
-        """(2 order, 2 order): of the states over one sample."""
+        """Return the transition matrix (2 order, 2 order) of the states over one sample."""
         return self._held[: 2 * self.order, : 2 * self.order]
 
     @cached_property

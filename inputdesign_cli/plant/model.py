@@ -79,7 +79,7 @@ class Model(Protocol):
 
     @property
     def radius(self) -> float:
-        """Of the farthest pole of G, H and the predictor in z, below one when all are stable.
+        """Return the modulus of the farthest pole of G, H and the predictor in z, below one if stable.
 
         In continuous time exp of the largest real part in s.
         """
@@ -101,7 +101,7 @@ class Model(Protocol):
         """dG/dtheta (n, k, p, r)."""
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest.

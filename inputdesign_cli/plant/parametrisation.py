@@ -78,7 +78,7 @@ class Parametrisation:
 
     @cached_property
     def jacobian(self) -> Array:
-        """(K, k): of the coefficients in the free parameters."""
+        """Return the derivatives (K, k) of the coefficients in the free parameters."""
         return self._image.gradients[:, self.free]
 
     @cached_property

@@ -139,7 +139,7 @@ class PolynomialStructure(Parametrised):
         return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
 
     def row(self, rows: Sequence[Array], output: int) -> Array:
-        """That of an output of A, C or D."""
+        """Return the polynomial of an output in A, C or D."""
         return rows[0] if len(rows) == 1 else rows[output]
 
     @cached_property
@@ -169,7 +169,7 @@ class PolynomialStructure(Parametrised):
         return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         B, F = ([[entry.copy() for entry in row] for row in rows] for rows in (self.B, self.F))
         common = {"a": self.A, "c": self.C, "d": self.D}
         rows = {letter: [polynomial.copy() for polynomial in given] for letter, given in common.items()}

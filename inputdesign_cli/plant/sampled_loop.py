@@ -22,7 +22,7 @@ class Realised(Model, Protocol):
 
     @property
     def realisation(self) -> StateSpace:
-        """From inputs to outputs."""
+        """Return a state-space realisation from inputs to outputs."""
 
     @property
     def poles(self) -> ComplexArray:

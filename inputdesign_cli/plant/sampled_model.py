@@ -64,7 +64,7 @@ class SampledModel(Parametrised, WhiteNoise):
         return {(i, j): plant.held(i, j, self.sample_time) for i, j in plant.active}
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> SampledModel:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         return SampledModel(self.continuous_plant.at(theta, covariance), self.sample_time)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
@@ -100,7 +100,7 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @cached_property
     def realisation(self) -> StateSpace:
-        """From inputs to outputs: the past of each input, then the states of entry after entry."""
+        """Return a realisation whose states are the past of each input, then the states of each entry."""
         lags = [(j, entry.direct_lag) for (_, j), entry in self._entries.items()]
         past = [max((lag for other, lag in lags if other == j), default=0) for j in range(self.inputs)]
         first = np.concatenate([[0], np.cumsum(past)]).astype(int)

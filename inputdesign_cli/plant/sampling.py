@@ -1,4 +1,4 @@
-"""From continuous to discrete time."""
+"""Sample transfer functions: from continuous to discrete time."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class HarmonicGrid:
 
     @property
     def frequencies(self) -> Array:
-        """(L,): of the lines, in rad/sample."""
+        """Return the frequencies (L,) of the lines, in rad/sample."""
         return self.at(self.excited)
 
     def at(self, harmonics: Harmonics) -> Array:

@@ -47,7 +47,7 @@ class Functional:
 
 
 def kept_on_grid(density: Callable[[Array], NDArray]) -> Callable[[Array], NDArray]:
-    """The same function, whose values at the last of the largest arrays it was given are kept."""
+    """Return the function with a memory of its values at the last of the largest arrays."""
     last: list[tuple[Array, NDArray]] = []
 
     def known(w: Array) -> NDArray:
@@ -210,11 +210,11 @@ class DensityFamily:
         return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
-        """None: there are no sinusoids."""
+        """Return no lines: there are no sinusoids."""
         return np.zeros(0), np.zeros((0, self.inputs, self.inputs), dtype=complex)
 
     def moving_average(self, x: Array) -> Array | None:
-        """None: no finite one."""
+        """Return None: there is no finite moving average."""
         return None
 
     def beyond(self, number: int) -> Self:
@@ -222,5 +222,5 @@ class DensityFamily:
         raise ValueError("a family with a density does not grow")
 
     def in_units(self, units: Array) -> Self:
-        """Itself: units do not matter."""
+        """Return the family itself: units do not matter."""
         return self

@@ -61,7 +61,7 @@ class FlatBasis(DensityFamily):
         return integrate_band(source, sums, singularities, self.band)
 
     def coarser(self) -> list[FlatBasis]:
-        """None."""
+        """Return no coarser basis."""
         return []
 
     def first_face(self, price: Functional) -> Face:

@@ -105,7 +105,7 @@ class LinesBasis:
         return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def coarser(self) -> list[LinesBasis]:
-        """None: lines are cheap."""
+        """Return no coarser basis: lines are cheap."""
         return []
 
     def spread(self, powers: Array) -> Array:
@@ -230,7 +230,7 @@ class LinesBasis:
         return np.abs(one.conj() @ other / size) ** 2
 
     def moving_average(self, x: Array) -> Array | None:
-        """None: sinusoids have no density."""
+        """Return None: sinusoids have no density."""
         return None
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:

@@ -122,7 +122,7 @@ class Demands:
         return any(asked.requirement.definite for asked in self.asked)
 
     def requirement(self, index: int) -> Requirement:
-        """By the index that `violations` gives."""
+        """Return the requirement with the index that `violations` gives."""
         return self.asked[index].requirement
 
     def violations(

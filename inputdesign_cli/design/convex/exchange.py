@@ -69,7 +69,7 @@ class ExchangeResult:
 
     @property
     def information(self) -> Array:
-        """(k, k): that of the nominal plant."""
+        """Return the information (k, k) of the nominal plant."""
         return self.informations[0]
 
     @property

@@ -100,7 +100,7 @@ def solve_program(
 
 
 def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | None:
-    """By a general conic solver, with M among the unknowns: without it two digits of the multipliers go."""
+    """Solve by a general conic solver, with M among the unknowns: else the multipliers lose two digits."""
     k, entries, n = program.size, svec_length(program.size), program.cost.size
     inside, scaled = program.face.columns.shape[1], int(program.unit is not None)
     number = n - scaled

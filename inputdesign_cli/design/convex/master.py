@@ -176,7 +176,7 @@ def solve_master(
 
 
 def _shares(weights: Array) -> Array:
-    """Of several costs, with the sum one; a single one has it all."""
+    """Return the shares of several costs, with the sum one; a single cost has it all."""
     if not weights.size:
         return np.ones(1)
     weights = np.where(weights > _NO_SHARE * weights.max(), np.maximum(weights, 0.0), 0.0)

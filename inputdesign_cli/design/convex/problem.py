@@ -102,7 +102,7 @@ class Problem:
         return Gradients(tuple(scenario.experiment for scenario in self.scenarios))
 
     def with_requirements(self, of: Callable[[Scenario], tuple[Requirement, ...]]) -> Problem:
-        """The same problem with other requirements at every scenario, and no side ones."""
+        """Return the problem with other requirements at every scenario, and no side ones."""
         others = tuple(replace(one, requirements=of(one), side=()) for one in self.others)
         return replace(self, requirements=of(self.scenarios[0]), side=(), others=others)
 
@@ -111,7 +111,7 @@ class Problem:
         return self if basis is self.basis else replace(self, basis=basis, finer=None)
 
     def grown(self, basis: Basis) -> Problem:
-        """The same problem on a basis that begins with this one; what is known of this one is kept."""
+        """Return the problem on a basis that begins with this one, and keep the integrals computed so far."""
         grown = replace(self, basis=basis, finer=None)
         grown._before.append(self)
         _ = grown.demands, grown.gradients, grown.information_maps

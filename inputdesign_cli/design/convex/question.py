@@ -56,7 +56,7 @@ class Question:
         return [Alternative(self.experiment, self.requirements, self.side), *self.others]
 
     def at_alpha(self, alpha: float) -> Question:
-        """The same question with another confidence factor of the model errors of the nominal plant."""
+        """Return the question with another confidence factor of the model errors of the nominal plant."""
 
         def changed(make: RequirementFactory) -> RequirementFactory:
             return lambda experiment: with_alpha([make(experiment)], alpha)[0]

@@ -49,7 +49,7 @@ class ResponseLines:
     share: float | None = None
 
     def at(self, G: ComplexArray) -> ResponseLines:
-        """The same lines with another G (L, p, r); what is not bounded is not bounded there."""
+        """Return the lines with another G (L, p, r); an error without a bound has none there."""
         if self.share is None:
             return replace(self, G=G)
         return replace(self, G=G, admitted=np.where(np.isinf(self.admitted), np.inf, self.share * np.abs(G)))
@@ -96,7 +96,7 @@ class ResponseProblem:
 
     @cached_property
     def costs(self) -> Array:
-        """(n,): of the units of x."""
+        """Return the costs (n,) of the units of x."""
         return self.price * self.needed
 
     @cached_property

@@ -160,7 +160,7 @@ def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorr
 
 
 def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Autocorrelations:
-    """The same design on lines at multiples of 15 degrees, if it is no worse for it.
+    """Return the design on lines at multiples of 15 degrees, if it is no worse for it.
 
     An optimum is flat, so a search knows rho only to the root of its tolerance; a constant or
     alternating signal, for one, is recognised here.

@@ -66,7 +66,7 @@ class ModelQuestion:
 
     @property
     def information(self) -> Array:
-        """(k, k): that of the data."""
+        """Return the information (k, k) of the data, which is I in these coordinates."""
         return np.eye(self.experiment.size)
 
     @property

@@ -182,7 +182,7 @@ def _worst(
 
 
 def delivered_samples(design: Design) -> int:
-    """Of the experiment: a whole number where the shortest one is sought."""
+    """Return the samples of the experiment, rounded up where the shortest one is sought."""
     if design.problem.goal != "samples":
         return design.problem.experiment.samples
     return max(int(np.ceil(design.result.s * (1 - 1e-9))), 1)

@@ -91,5 +91,5 @@ class Simulator:
         return SimulatedEstimates(replace(self.nominal, samples=samples), excitation, self.runs, self.step)
 
     def of_record(self, record: Array) -> SimulatedEstimates | None:
-        """Of one record (samples, r)."""
+        """Return the estimates from one record (samples, r)."""
         return self.of(Recorded("design", record, self.step), len(record))

@@ -213,7 +213,7 @@ class _Reread:
 
     @cached_property
     def _experiment(self) -> Experiment:
-        """That of the delivered length, in the coordinates in which the requirements are stated."""
+        """Return the experiment of the delivered length, in the coordinates of the requirements."""
         return replace(self.scenario.experiment, samples=self.done.experiment.samples)
 
     @cached_property

@@ -167,7 +167,7 @@ class ExactConfidence:
         return max(error.worst(information).ratio for error in errors)
 
     def _first_alpha(self) -> float:
-        """That of white excitation where the least cost is sought, lest the first design be out of reach."""
+        """Return alpha of white excitation for the least cost, lest the first design be out of reach."""
         question, experiment = self.question, self.question.experiment
         power = white_power(question) if question.goal == "cost" else 0.0
         if power == 0.0:

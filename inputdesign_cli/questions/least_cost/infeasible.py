@@ -126,7 +126,7 @@ def _together(unreachable: UnreachableError, question: Question) -> str:
 
 
 def _own_factor(limit: PowerLimit, factor: float) -> float:
-    """By what the number of the spec is multiplied where its power is multiplied by `factor`."""
+    """Return the factor of the number in the spec if its power is multiplied by `factor`."""
     return float(np.sqrt(factor)) if limit.implied else factor
 
 
