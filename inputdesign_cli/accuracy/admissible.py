@@ -36,11 +36,11 @@ class AdmissibleError(Protocol):
 
     @property
     def kept(self) -> Sensitivity | None:
-        """The loop whose margins this keeps; None where it is about no loop."""
+        """Return the closed loop whose margins the bound preserves, or None if it is about no loop."""
 
     @property
     def floored(self) -> Floored | None:
-        """What stands in for the r_adm of a plant where that vanishes; None where nothing does."""
+        """Return the bound that replaces r_adm at a plant where it vanishes, or None if there is none."""
 
     def at(self, w: ArrayLike) -> Array:
         """r_adm (n,) at frequencies `w` (n,)."""
@@ -120,7 +120,7 @@ class Sensitivity:
     s(S') <= s(S) / (1 - s(D) s(C S)). With one channel that is (|1 + C G| - |W|) / |C|
     ([bombois-least-costly], Illustration 2, by the reverse triangle inequality).
 
-    `settings` of the controller are told where the loop is what is asked for; None where it is not.
+    `settings` holds the controller settings if the requirement is on the loop itself, else None.
     """
 
     loop: Loop
@@ -131,7 +131,7 @@ class Sensitivity:
 
     @property
     def kept(self) -> Sensitivity:
-        """Itself."""
+        """Return this requirement itself, which is about a loop."""
         return self
 
     def nominal(self, w: ArrayLike) -> Array:
@@ -173,12 +173,12 @@ class Weighted:
 
     @property
     def kept(self) -> Sensitivity | None:
-        """That of the error without the weight."""
+        """Return the loop of the error without the weight, if any."""
         return self.inner.kept
 
     @property
     def floored(self) -> Floored | None:
-        """That of the error without the weight, which is positive."""
+        """Return the floored bound of the error without the weight, which is positive."""
         return self.inner.floored
 
     @property
@@ -198,7 +198,7 @@ class Weighted:
 
 @dataclass(frozen=True)
 class Floored:
-    """r_adm of a scenario, and no less than a `share` of what is admitted at the nominal plant.
+    """Bounds r_adm of a scenario from below by a `share` of r_adm at the nominal plant.
 
     Where a scenario's own r_adm vanishes no experiment would be long enough.
     """
@@ -212,12 +212,12 @@ class Floored:
 
     @property
     def kept(self) -> Sensitivity | None:
-        """That of the scenario."""
+        """Return the loop of the scenario, if any."""
         return self.own.kept
 
     @property
     def floored(self) -> Floored:
-        """Itself."""
+        """Return this bound itself."""
         return self
 
     def lost(self, grid: Array) -> bool:

@@ -37,10 +37,10 @@ class Coverage:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What is asked: max over w of |G(theta) - G| / r_adm <= 1 with this probability.
+    """Requires max over w of |G(theta) - G| / r_adm <= 1 with this probability.
 
-    The same `draws` serve every information matrix, so that alpha is a smooth function of it; as many
-    fresh ones tell the coverage.
+    The same `draws` serve every information matrix, so that alpha is a smooth function of it. A new set of as
+    many draws estimates the coverage.
 
     Attributes:
         excess: the quantile of the estimates of such records over that of the draws, which are asymptotic.
@@ -57,7 +57,7 @@ class Calibration:
         return errors[0].alpha * reached / max(error.worst(information).ratio for error in errors)
 
     def corrected(self, errors: Sequence[ModelError], information: Array, estimates: Array) -> Calibration:
-        """The same for records of which these are estimates.
+        """Return the calibration with `excess` measured on estimates from such records.
 
         Args:
             information: (k, k) of the records, in the coordinates of the errors.

@@ -65,18 +65,18 @@ class Cut(Protocol):
         """Where the requirement asks for it."""
 
     def transformed(self, congruence: Array) -> Cut:
-        """The same set for K M K^T, K = `congruence` (k, k) nonsingular."""
+        """Return the same set for K M K^T, K = `congruence` (k, k) nonsingular."""
 
     def blocks(self, size: int) -> list[CutBlock]:
         """Its cones, all with the same number of auxiliary unknowns; `size` is k."""
 
     @property
     def inequality(self) -> Inequality | None:
-        """The same set as one matrix inequality, unless it is a concave function."""
+        """Return the set as one matrix inequality, unless it is a concave function."""
 
     @property
     def concave(self) -> ConcaveFunction | None:
-        """The same set by a concave function, unless it is a matrix inequality."""
+        """Return the set by a concave function, unless it is a matrix inequality."""
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
         """(Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.

@@ -23,7 +23,7 @@ class MatrixCut:
     concave = None
 
     def transformed(self, congruence: Array) -> MatrixCut:
-        """The same set for K M K^T, see `Cut`."""
+        """Return the same set for K M K^T, see `Cut`."""
         return replace(self, matrix=congruence @ self.matrix @ congruence.T)
 
     def blocks(self, size: int) -> list[CutBlock]:
@@ -60,7 +60,7 @@ class VarianceCut:
     inequality = None
 
     def transformed(self, congruence: Array) -> VarianceCut:
-        """The same set for K M K^T, see `Cut`."""
+        """Return the same set for K M K^T, see `Cut`."""
         return replace(self, directions=congruence @ self.directions)
 
     def blocks(self, size: int) -> list[CutBlock]:
@@ -117,7 +117,7 @@ class DeterminantCut:
     inequality = None
 
     def transformed(self, congruence: Array) -> DeterminantCut:
-        """The same set for K M K^T, see `Cut`."""
+        """Return the same set for K M K^T, see `Cut`."""
         _, logarithm = np.linalg.slogdet(congruence)
         return replace(self, level=self.level * float(np.exp(2.0 * logarithm / len(congruence))))
 
@@ -188,7 +188,7 @@ class TraceCut:
     inequality = None
 
     def transformed(self, congruence: Array) -> TraceCut:
-        """The same set for K M K^T, see `Cut`."""
+        """Return the same set for K M K^T, see `Cut`."""
         inverse = np.linalg.inv(congruence)
         return replace(self, weight=inverse.T @ self.weight @ inverse)
 

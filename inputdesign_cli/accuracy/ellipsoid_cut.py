@@ -29,7 +29,7 @@ class EllipsoidCut:
     concave = None
 
     def transformed(self, congruence: Array) -> EllipsoidCut:
-        """The same set for K M K^T, see `Cut`."""
+        """Return the same set for K M K^T, see `Cut`."""
         corner = np.eye(len(self.form))
         corner[:-1, :-1] = congruence
         return replace(self, form=corner @ self.form @ corner.T)
@@ -48,7 +48,7 @@ class EllipsoidCut:
 
     @property
     def inequality(self) -> Inequality:
-        """That of the S-procedure."""
+        """Return the matrix inequality of the S-procedure."""
         corner = np.zeros_like(self.form)
         corner[-1, -1] = -1.0
         return Inequality(corner, 1.0 / self.alpha**2, -self.form)

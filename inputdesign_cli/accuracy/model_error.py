@@ -40,12 +40,12 @@ class OnModelError(OverFrequency):
 
     @property
     def knots(self) -> Array:
-        """Those of r_adm."""
+        """Return the knots of r_adm."""
         return self.admissible.knots
 
     @property
     def own_singularities(self) -> ComplexArray:
-        """Those of r_adm."""
+        """Return the singularities of r_adm."""
         return self.admissible.singularities
 
     def error_bound(self, information: Array, w: ArrayLike) -> Array:
@@ -72,14 +72,14 @@ class ModelError(OnModelError):
 
 
 def model_errors(requirements: Iterable[Requirement]) -> list[OnModelError]:
-    """Those that hold a model error below an admissible one: what bound.csv shows."""
+    """Return the requirements that bound a model error; bound.csv shows them."""
     return [requirement for requirement in requirements if isinstance(requirement, OnModelError)]
 
 
 def check_positive(admissible: AdmissibleError, grid: Array, *, unit: float, named: str) -> None:
     """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 between the ends of the `grid`.
 
-    The message tells the frequency divided by `unit`, in the unit `named`.
+    The message states the frequency divided by `unit`, in the unit `named`.
     """
     if not np.any(admissible.at(grid)):
         raise bad_spec(

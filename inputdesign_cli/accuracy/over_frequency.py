@@ -19,7 +19,7 @@ from inputdesign_cli.plant.frequencies import SLACK
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
 _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
-# Shares of the band: a pole is on the circle, only rounding is seen beside it, it lies at an end of the band.
+# Shares of the band: a pole is on the circle, only rounding is seen near it, it lies at an end of the band.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
 _KEPT = 8  # sets of frequencies whose rows are remembered at a time
@@ -63,7 +63,7 @@ class OverFrequency(Requirement):
     @property
     @abstractmethod
     def own_singularities(self) -> ComplexArray:
-        """Beyond those of the plant and its loop."""
+        """Return the singularities besides the ones of the plant and its loop."""
 
     @property
     def knots(self) -> Array:
@@ -115,7 +115,7 @@ class OverFrequency(Requirement):
 
     @cached_property
     def poles_on_the_circle(self) -> Array:
-        """Frequencies of the band at which G has a pole on the unit circle, for all an estimate can tell."""
+        """Return the frequencies of the band where G has a pole numerically on the unit circle."""
         lo, hi = self.band
         near = self.grid_singularities
         places = np.unique(near.real[near.imag <= _ON_THE_CIRCLE])
@@ -170,7 +170,7 @@ class OverFrequency(Requirement):
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
 
     def most(self, information: Array) -> float:
-        """From the points of the grid: a peak between them stands no higher than `local_maxima` admits."""
+        """Bound the ratio by the grid: a peak between them stands no higher than `local_maxima` admits."""
         top = self.least(information)
         return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
 
@@ -188,7 +188,7 @@ class OverFrequency(Requirement):
         return seen[1:]
 
     def worst(self, information: Array) -> Violation:
-        """The largest of the violations; one beside frequency zero is told to be there."""
+        """Return the largest violation. A peak next to frequency zero counts as at zero."""
         turn, on_grid = self._on_grid(information)
         # A peak that ends below the highest point of the grid is not the largest.
         found = worst(self._polished(turn, on_grid, float(on_grid.max()) * (1.0 - _ROUNDING)))

@@ -38,7 +38,7 @@ class WeightedVariance(OverFrequency):
 
     @property
     def own_singularities(self) -> ComplexArray:
-        """Those of the weight."""
+        """Return the singularities of the weight."""
         return self.weight.singularities
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:

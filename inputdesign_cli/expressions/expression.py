@@ -1,4 +1,4 @@
-"""Expressions in named parameters, as `K*(1 - exp(-h/T))`: read by a list of what is allowed, never run.
+"""Expressions in named parameters, as `K*(1 - exp(-h/T))`: read by a list of permitted syntax, never run.
 
 The text is parsed by Python's `ast` alone and becomes a list of steps by our own rules, with derivatives by
 forward differentiation: every step carries its value and its slope in all parameters.
@@ -19,7 +19,7 @@ from inputdesign_cli.expressions.steps import FUNCTIONS, Array, Evaluated, Step,
 
 LONGEST = 500
 _REMEMBERED = 64  # sets of expressions, as a search asks for one at many points
-_SHOWN = 60  # of what is made of expressions and longer
+_SHOWN = 60  # letters of a composed expression that is longer
 CONSTANTS = {"pi": math.pi}
 
 
@@ -33,16 +33,16 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class Expression:
-    """A text that has been checked, or what is made of such, and what it is worth.
+    """A text that has been checked, or an expression composed of others, and its value.
 
-    It is a list of steps, of which none is there twice: as long as what it is made of, however often that is
-    used, and worked through without recursion, however deep it is.
+    It is a list of steps without duplicates. The list is as long as its parts, however often they are used.
+    It is worked through without recursion, however deep it is.
 
     Attributes:
-        made: the steps of what is made of others; None of a text, which says them.
+        made: the steps of a composed expression; None for a text, which states them.
 
     Raises:
-        ExpressionError: by `of`, for what is no expression.
+        ExpressionError: by `of`, for a text that is no permitted expression.
     """
 
     text: str
@@ -56,7 +56,7 @@ class Expression:
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:
-        """Each after those that it works on; the last is the expression."""
+        """Return the steps, each after its operands; the last one is the expression."""
         return _read(_tree_of(self.text)) if self.made is None else self.made
 
     @cached_property
@@ -141,11 +141,11 @@ class _Table:
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """All of them, each after those that it works on."""
+        """Return all steps, each after its operands."""
         return tuple(self._places)
 
     def expression(self, place: int, text: str) -> Expression:
-        """That whose last step stands at the place, without steps that it does not need."""
+        """Return the expression whose last step is at `place`, without the steps that it does not need."""
         steps, needed = list(self._places), {place}
         for i in range(place, -1, -1):
             if i in needed:
@@ -255,7 +255,7 @@ _SIGNS: dict[type[ast.AST], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", a
 
 
 def _degree(operation: str, degrees: Sequence[int]) -> int:
-    """0 of a constant, 1 of what is affine in the parameters as it is written, 2 of anything else."""
+    """Return 0 for a constant, 1 for a term affine in the parameters as it is written, 2 otherwise."""
     match operation, degrees:
         case (("number" | "name"), _):
             return int(operation == "name")

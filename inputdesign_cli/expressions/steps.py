@@ -61,7 +61,7 @@ class Evaluated:
     def gradients(self) -> Array:
         """(K, m)."""
         unit, slopes = np.eye(len(self._known)), list[Array | None]()
-        # What leaves the range of numbers is seen in the result.
+        # Overflow is seen in the result.
         with np.errstate(all="ignore"):
             for step, local in zip(self._steps, self._found, strict=True):
                 slopes.append(unit[self._known[str(step.value)]] if step.operation == "name" else None)
@@ -107,7 +107,7 @@ class _Local(NamedTuple):
 def _local(
     step: Step, operands: Sequence[_Local | None], known: Mapping[str, int], values: Array
 ) -> _Local | None:
-    """What a step is worth; None where that is not defined, or what it works on is not."""
+    """Return the value and slopes of a step, or None if it or one of its operands is not defined."""
     operation = step.operation
     if operation == "number":
         return _Local(float(step.value), (), False)
@@ -133,9 +133,9 @@ def _local(
 
 
 def _combined(sign: str, first: _Local, second: _Local) -> tuple[float, float, float]:
-    """The value of a sum, difference, product, ratio or power, and its slopes in both.
+    """Return the value of a sum, difference, product, ratio or power, and its slopes in both operands.
 
-    Those of a ratio are to be divided by the second.
+    The slopes of a ratio are still to be divided by the second operand.
     """
     a, b = first.value, second.value
     if sign == "+":

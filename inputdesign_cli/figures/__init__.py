@@ -2,5 +2,5 @@
 
 import logging
 
-# That its cache cannot be written is no news for the user: it takes another place by itself.
+# That its cache cannot be written is no news for the user: matplotlib then uses another place.
 logging.getLogger("matplotlib").setLevel(logging.ERROR)

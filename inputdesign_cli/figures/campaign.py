@@ -23,7 +23,7 @@ from inputdesign_cli.figures.style import (
 from inputdesign_cli.outcome.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
 
 COLUMNS = 3
-# Of few runs fine bins would show each run by itself.
+# With few runs, fine bins would show each run separately.
 BINS, RUNS_A_BIN = 40, 4
 SHOWN = 0.99
 WIDE = 5.0  # costs beyond it are shown over their logarithm
@@ -80,7 +80,7 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
     number = int(np.clip(runs // RUNS_A_BIN, 2 * COLUMNS, BINS))
     low, top = min(low, 0.95), max(top, 1.05)
     step = (top - low) / number
-    # An edge at one: no bin mixes those that have what is asked with those that miss it.
+    # An edge at one: no bin mixes runs that meet the requirement with runs that miss it.
     bins = (1.0 + step * np.arange(np.floor((low - 1.0) / step), np.ceil((top - 1.0) / step) + 1.0)).tolist()
     handles: list[Artist] = []
     for (name, ratios), colour in zip(curves.ratios.items(), PALETTE, strict=False):

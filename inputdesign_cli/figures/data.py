@@ -15,10 +15,10 @@ from inputdesign_cli.figures.style import BLACK, BLUE, DOTTED, GREY, ORANGE, leg
 from inputdesign_cli.outcome.curves import FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.outcome.results import Array
 
-# A record up to the first length is drawn whole, of a longer one so many samples.
+# A record up to the first length is drawn whole, of a longer one the second number of samples.
 _WHOLE, SHOWN = 600, 400
 _AS_LIVELY = 0.5
-_LINE = 2e-3  # the width of a curve, as a share of what is drawn
+_LINE = 2e-3  # the width of a curve, as a share of the height drawn
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ class _Shown:
 
     @classmethod
     def of(cls, curves: FitCurves) -> _Shown:
-        """Those in which the outputs move most."""
+        """Choose the samples in which the outputs move most."""
         samples = stretch([panel.y for panel in curves.panels])
         begins = np.cumsum(curves.lengths, dtype=np.int64)[:-1]
         return cls(samples, begins[(begins > samples.start) & (begins < samples.stop)] - samples.start)
 
     def broken(self, values: Array) -> Array:
-        """Values (n,) of all samples as they are drawn: no curve goes from one record to the next."""
+        """Return values (n,) of all samples for drawing: no curve goes from one record to the next."""
         return np.insert(values[self.samples], self.begins, np.nan)
 
     def borders(self, time: Array) -> Array:
@@ -90,7 +90,7 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
 
 
 def stretch(outputs: Sequence[Array]) -> slice:
-    """The first samples of outputs (n,), or those in which they move most, if that is far more."""
+    """Return the first samples of outputs (n,), or the window where they vary most, if that is far more."""
     size = len(outputs[0])
     if size <= _WHOLE:
         return slice(0, size)

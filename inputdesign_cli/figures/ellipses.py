@@ -41,7 +41,7 @@ def boundary(center: Array, covariance: Array, probability: float) -> Array:
     radius = np.sqrt(-2.0 * np.log(1.0 - probability))
     angle = np.linspace(0.0, 2.0 * np.pi, POINTS)
     circle = np.stack([np.cos(angle), np.sin(angle)])
-    # Of parameters that are all but told together the covariance is singular, to rounding.
+    # The covariance of nearly unidentifiable parameters is singular, to rounding.
     scale = np.sqrt(np.diag(covariance))
     sizes, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
     root = scale[:, None] * axes * np.sqrt(np.maximum(sizes, 0.0))

@@ -24,7 +24,7 @@ _LEAST = 1e-3
 
 
 def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
-    """A line for every plant, those that bind in colour; none may exceed one."""
+    """Draw a line for every plant, the binding plants in colour; no ratio may exceed one."""
     axes = page.add_subplot()
     plain_decades(axes, "y")
     w = curves.frequency

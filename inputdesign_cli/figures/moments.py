@@ -24,7 +24,7 @@ NUMBERED = 8  # rows up to which the entries are written into the cells
 
 
 def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
-    """R as a coloured matrix, the estimated block framed; beside it the power of each line of the input."""
+    """Draw R as a coloured matrix, its estimated block framed, and the power of each line of the input."""
     if curves.line_frequency is None or curves.line_power is None:
         _draw_matrix(page.add_subplot(), curves)
         return
@@ -57,7 +57,7 @@ def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
 
 
 def draw_error(page: Figure, curves: ErrorCurves, time_unit: str) -> None:
-    """The two parts stacked over energy, white regressors beside them, and the design."""
+    """Draw squared bias and variance stacked over energy, the error of white regressors, and the design."""
     axes = page.add_subplot()
     energy, bias = curves.energy, curves.bias_squared
     total = bias + curves.variance

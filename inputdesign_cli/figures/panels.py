@@ -36,7 +36,7 @@ class Panel(Protocol):
 
     @property
     def names(self) -> str:
-        """Of its input and output; empty where there are none."""
+        """Return the names of its input and output; empty if there are none."""
 
 
 P = TypeVar("P", bound=Panel)
@@ -61,7 +61,7 @@ def draw_panels(
         time_unit: frequencies are labelled rad per this.
         magnitude: the label of the vertical axes, of those at the left.
         title: says what all panels are about.
-        below: draws one more panel under all others.
+        below: draws a further panel under all others.
     """
     single = len(panels) == 1
     places = [(0, 0)] if single else [panel.entry or (0, 0) for panel in panels]

@@ -67,7 +67,7 @@ def draw(
 
 
 def figure(results: Results, name: str) -> Figure:
-    """A figure of a run, such as "bound", as an object of matplotlib to be shown or changed in a notebook.
+    """Return a figure of a run, by its name ("bound"), as a matplotlib object to show or change.
 
     Raises:
         KeyError: the run has no such figure.

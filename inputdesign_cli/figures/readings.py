@@ -11,17 +11,17 @@ from matplotlib.lines import Line2D
 
 from inputdesign_cli.outcome.results import Array, Json
 
-# Fewer points without a line are marks; of more points every so many are kept.
+# Fewer points without a line are marks; more points are thinned out evenly.
 _FEWEST, _MOST = 20, 400
 
 
 class Traced(Line2D):
-    """A curve in the plane along something else, such as a Nyquist plot along frequency.
+    """Draws a curve in the plane along a third variable: a Nyquist plot goes along frequency.
 
     Args:
         x, y: its points (n,).
         along: what it goes along (n,), called `name`.
-        told: what is said of every point, (n,) by name.
+        told: values shown at every point, (n,) by name.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class Traced(Line2D):
 
 
 def readings(page: Figure) -> list[dict[str, Json]]:
-    """Of a page that has been laid out: its panels with named curves over an axis, or along one in the plane.
+    """Return the panels of a laid-out page with named curves over an axis, or along one in the plane.
 
     `box` is left, top, width and height in shares of the page; `low` and `high` are the ends of the axis. A
     panel with a curve in the plane has its `path`, in shares of the panel from the left and from the top.

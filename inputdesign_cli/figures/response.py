@@ -43,7 +43,10 @@ def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
 
 
 def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> list[Artist]:
-    """Those of all entries; a negative gain begins half a turn away from a positive one."""
+    """Draw the phases of all entries and return the handles of their legend.
+
+    A negative gain begins half a turn away from a positive one.
+    """
     handles: list[Artist] = []
     for number, panel in enumerate(panels):
         color, dashes = stroke(number)
@@ -56,7 +59,7 @@ def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> list[Artist]:
 
 
 def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
-    """That of the model without jumps, and of the data, where it is known at all, on the nearest turn."""
+    """Draw the phase of the model without jumps, and of the data, if known, on the nearest turn."""
     model = np.degrees(np.unwrap(np.angle(panel.model)))
     known = panel.radius < np.abs(panel.G)
     turn = np.degrees(np.angle(panel.G)) - model

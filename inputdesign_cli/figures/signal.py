@@ -15,7 +15,7 @@ from inputdesign_cli.outcome.results import Array
 
 SHOWN = 1000  # samples that a figure of this width can show one by one
 ROWS = 4  # channels that fit, of the record and of the outputs together
-MARGIN = 0.08  # above and below, of what is shown
+MARGIN = 0.08  # above and below, as a share of the range shown
 _HIGHER = 0.25  # of the page, for each row beyond the second
 _BAND = 2.0  # standard deviations
 

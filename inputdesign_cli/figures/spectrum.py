@@ -126,13 +126,16 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
 
 
 def _room(w: Array) -> Array:
-    """Frequencies of lines with what leaves room beside them: a line on an axis is not seen."""
+    """Return the frequencies of lines with margins on both sides: a line on an axis is not seen."""
     shown = w[w > 0]
     return np.array([*w, shown.min() / _BESIDE, shown.max() * _BESIDE]) if shown.size else w
 
 
 def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Array]]:
-    """The moduli (n,) of entries (n, r, r) by label: one for those that coincide, none for rounding."""
+    """Return the moduli (n,) of entries (n, r, r) by label.
+
+    Entries that coincide share one label; entries within rounding of zero are left out.
+    """
     found: list[tuple[list[str], Array]] = []
     peak = float(entries.max(initial=0.0))
     for i, j in pairs:

@@ -44,13 +44,13 @@ ORANGE = "#D55E00"
 GREEN = "#009E73"
 GREY = "#777777"
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
-OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what is admitted
+OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # for curves near a limit
 
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
 _LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
-# A logarithmic axis that ends below so many times its beginning has even steps.
+# A logarithmic axis whose end is below this multiple of its beginning has even steps.
 _EVEN, _STEPS = 8.0, 6
 
 DASHED = (0, (5, 2))
@@ -110,7 +110,7 @@ def rendered(
     narrow: bool = False,
     seen: Callable[[Figure], object] | None = None,
 ) -> bytes:
-    """The file of a figure that `paint` draws on an empty page, the same for the same figure.
+    """Return the file of a figure that `paint` draws on an empty page; the same figure gives the same file.
 
     A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves. `seen`
     gets the page as it was laid out.
@@ -146,7 +146,7 @@ def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE)
 
 
 def _strokes(axes: Axes) -> None:
-    """Draw the minor ticks of logarithmic axes as one set of marks each, within the limits as they are.
+    """Draw the minor ticks of logarithmic axes as one set of marks each, within the present limits.
 
     A tick is an object with lines and a text of its own: all of them take half of the time of a figure.
     """
@@ -225,7 +225,7 @@ def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Li
 
 
 def limiting_label(count: int) -> str:
-    """What so many rings stand for: frequencies at which what is asked binds."""
+    """Return the label of rings, which mark the frequencies where a requirement binds."""
     return "limiting frequency" if count == 1 else "limiting frequencies"
 
 
@@ -250,7 +250,7 @@ def positive(values: Array) -> Array:
 
 
 def page_of_pairs(page: Figure, pairs: int, columns: int) -> list[Axes]:
-    """Axes for so many pairs of parameters, row by row."""
+    """Return axes for a number of pairs of parameters, row by row."""
     columns = min(columns, pairs)
     grid = list(page.subplots(-(-pairs // columns), columns, squeeze=False).flat)
     for axes in grid[pairs:]:

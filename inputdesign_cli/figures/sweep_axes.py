@@ -17,7 +17,7 @@ from inputdesign_cli.outcome.results import Array
 LOG_FROM = 10.0
 _LOG_KEYS_FROM = 100.0
 _DECADES_IN_FULL = 3.0
-# Ticks at points: so many at most, and so far apart, in shares of the axis.
+# Ticks at points: their largest number, and their least distance as a share of the axis.
 _MOST_TICKS, _ROOM = 12, 0.055
 _NAMES = {
     "experiment.samples": "number of samples N",

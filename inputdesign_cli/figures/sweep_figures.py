@@ -57,7 +57,7 @@ _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
 
 
 def draw_sweep(table: SweepTable, root: Path, file_type: str = "png") -> list[Path]:
-    """Draw the figures that suit the sweep, and return their paths; those of an earlier call go."""
+    """Draw the figures that suit the sweep and return their paths; remove figures of an earlier call."""
     for name in NAMES:
         _remove(root, name)
     return [draw_into(root, name, paint, file_type) for name, paint in sweep_figures(table)]
@@ -198,7 +198,7 @@ def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
         log_axes(axes, "y")
         plain_numbers(axes.yaxis, high / low)
     elif table.maximised:
-        # What counts are differences; but those of rounding are none.
+        # Differences count, except differences of rounding.
         half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
         axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     elif low > 0:

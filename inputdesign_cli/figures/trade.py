@@ -16,12 +16,12 @@ from inputdesign_cli.outcome.results import Array
 
 @dataclass(frozen=True)
 class Trade:
-    """The worst ratio to what is asked, or the criterion, over lengths (in `unit`) and amplitudes.
+    """The worst ratio to the requirement, or the criterion, over lengths (in `unit`) and amplitudes.
 
     Args:
         amplitudes: their texts, one where only the length was varied.
         values: (amplitudes, lengths), NaN without a result.
-        criterion: whether the values are those of a criterion, and not ratios that are to be one at most.
+        criterion: whether the values are a criterion, and not ratios that are to be one at most.
     """
 
     lengths: Array

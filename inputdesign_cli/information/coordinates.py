@@ -104,17 +104,18 @@ def taking_part(names: Sequence[str], directions: Array) -> str:
 
 
 def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: str) -> Array:
-    """L (k, k), lower triangular, with rows^T rows = L L^T, by a QR factorisation of the rows (number, k).
+    """Return L (k, k), lower triangular, with rows^T rows = L L^T, by a QR factorisation.
 
     The matrix itself is never formed: that halves the digits lost to an ill-conditioned parametrisation.
 
     Args:
+        rows: (number, k).
         excitation: what excites, for the diagnostic ("excitation", "excitation within [0, 2]").
 
     Raises:
-        SpecError: `not-identifiable`, with the names of parameters that cannot be told apart.
-        InaccurateError: `numerically-singular`: other excitations could, but next to resonances all else is
-            lost to rounding.
+        SpecError: `not-identifiable`, with the names of parameters that are not identifiable.
+        InaccurateError: `numerically-singular`: other excitations could identify them, but next to resonances
+            all else is lost to rounding.
     """
     factor, untold = triangular_factor(rows)
     if untold.size:
@@ -140,7 +141,7 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
 
 
 def triangular_factor(rows: NDArray[np.float64]) -> tuple[Array, Array]:
-    """L (k, k), lower triangular, with rows^T rows = L L^T, and directions (k, m) that the rows do not tell.
+    """Return L (k, k), lower triangular, with rows^T rows = L L^T, and its null directions (k, m).
 
     Rank is judged with every column of the rows (number, k) at norm one, whatever its units.
     """

@@ -24,7 +24,7 @@ from inputdesign_cli.plant import Loop, Model
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
-"""The powers that results tell; that of the moves of u from sample to sample is only limited."""
+"""The powers that results state; the power of the moves of u between samples is only limited."""
 # What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
 _NOTHING = 1e-13
 
@@ -96,7 +96,7 @@ class Experiment(Coordinates):
         return self._whiten(self.model.plant_gradient(w))
 
     def entry_gradient(self, w: ArrayLike, output: int, input: int) -> ComplexArray:
-        """(n, k): that of one entry of G."""
+        """Return the whitened gradient (n, k) of one entry of G."""
         entry = self.model.plant_gradient(w)[:, :, output : output + 1, input : input + 1]
         return self._whiten(entry)[:, :, 0, 0]
 
@@ -166,12 +166,12 @@ class Experiment(Coordinates):
         return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
     def squeezed(self, density: NDArray) -> NDArray:
-        """A density (n, r, r) as it is told: (n,) for one input."""
+        """Return a density (n, r, r); for one input its values (n,)."""
         return density[:, 0, 0].real if self.inputs == 1 else density
 
     @cached_property
     def noise_information(self) -> Array:
-        """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
+        """Return the information (k, k) of N samples by the noise alone (in the loop), without excitation."""
         if not self.told_by_noise:
             return np.zeros((self.size, self.size))
         told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities)
@@ -189,19 +189,19 @@ class Experiment(Coordinates):
 
     @cached_property
     def told_by_noise(self) -> bool:
-        """Whether noise alone tells of any parameter."""
+        """Return whether the noise alone has information on any parameter."""
         if self.model.continuous:
             return False
         return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
 
     def whitened(self, power: float | Array) -> Experiment:
-        """The same experiment in coordinates where M = I by this power, flat over the band.
+        """Return the experiment in coordinates where M = I by this power, flat over the band.
 
         Args:
             power: of all channels together, which share it evenly, or (r,) of each.
 
         Raises:
-            SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
+            SpecError: `not-identifiable` when even that excitation does not identify all parameters.
         """
         raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
         noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
@@ -217,11 +217,11 @@ class Experiment(Coordinates):
         excited: tuple[Quadrature, ComplexArray],
         noise: tuple[Quadrature, ComplexArray | None],
     ) -> Experiment:
-        """`whitened`, where the gradients of raw parameters at the nodes of the `flat_rules` are at hand.
+        """Return `whitened`, given the gradients of raw parameters at the nodes of the `flat_rules`.
 
         Args:
             excited: with `excitation_gradient`.
-            noise: with `noise_gradient`, None where the noise tells nothing.
+            noise: with `noise_gradient`, None if the noise alone has no information.
         """
         width = (self.band[1] - self.band[0]) / np.pi
         total = float(np.sum(power))
@@ -261,7 +261,10 @@ def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
 
 
 def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
-    """(.., n, 1, r): what x causes at one channel, without what rounding leaves of nothing; all for None."""
+    """Return the response at one channel, (.., n, 1, r), without rounding errors; all for None.
+
+    Entries that are negligible beside the largest of their matrix are set to zero.
+    """
     if channel is None:
         return response
     row = response[..., channel : channel + 1, :]

@@ -1,4 +1,4 @@
-"""What a finite record tells: its own information matrix, not that of the spectrum it was drawn from."""
+"""Compute the information matrix of a finite record itself, not of the spectrum it was drawn from."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class FiniteRecord:
         return self.known + self._excited(record)
 
     def information_of_experiment(self, record: Array) -> Array:
-        """(k, k): the same of an experiment of its own length that goes on as the record does."""
+        """Return the information (k, k) of a full-length experiment that goes on as the record does."""
         share = self.experiment.samples / self.samples
         return self.experiment.baseline_information + share * self._excited(record)
 
@@ -75,7 +75,7 @@ class FiniteRecord:
         return [self]
 
     def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
-        """(plants, channels): the powers at every plant, or once where they are those of the record."""
+        """Return the powers (plants, channels) at every plant, or once if the record itself has them."""
         plants = self.each[:1] if self._is_record(of) else self.each
         return np.array([plant.mean_squares(of, record) for plant in plants])
 
@@ -95,9 +95,9 @@ class FiniteRecord:
 
 @dataclass(frozen=True)
 class FiniteRecords(FiniteRecord):
-    """The same for several plants at once: what is known and what a record tells are stacks of matrices.
+    """Evaluates a record at several plants at once; information matrices are stacked.
 
-    Signals are those at the first plant, that of `experiment`; the `others` follow it.
+    Signals are computed at the first plant, which is that of `experiment`; the `others` follow it.
     """
 
     others: tuple[Experiment, ...] = ()

@@ -1,7 +1,7 @@
-"""What several plants tell, and cost, under the same spectra: they share nodes and what is the same there.
+"""Compute information and cost of several plants under the same spectra, with shared nodes.
 
-Much of the time of an integral goes into its nodes and into what the spectra are there. Both are nearly the
-same for plants that are alike.
+Much of the time of an integral goes into its nodes and into the spectra at these nodes. Both hardly differ
+between plants that are alike.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
 
 
 def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
-    """(size, S, k, k): what each of the basis functions tells of each."""
+    """Return the information (size, S, k, k) by each of the basis functions at each plant."""
     return np.concatenate([_together(group, integrals) for group in _groups(experiments)], axis=1)
 
 
@@ -108,7 +108,7 @@ def _cost(
 
 
 def _groups(experiments: Sequence[Experiment]) -> list[Sequence[Experiment]]:
-    """Experiments whose integrals are one: those of several channels are large enough each by itself."""
+    """Return groups of experiments that share an integral; one of several channels is a group alone."""
     first = experiments[0]
     channels = first.model.outputs * first.inputs
     number = max(_AT_A_NODE // first.size**2, 1) if channels == 1 else 1

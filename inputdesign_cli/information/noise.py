@@ -1,4 +1,4 @@
-"""What the noise alone tells: around a loop, or of a plant with past outputs in its prediction."""
+"""Compute the information of the noise alone, in a loop or for a plant predicted from past outputs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, Va
 
 
 def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
-    """(S, k, k): what a sample of each of S plants tells without any excitation.
+    """Return the information (S, k, k) of a sample of each of S plants without any excitation.
 
     Args:
         gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.

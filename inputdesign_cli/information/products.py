@@ -25,7 +25,7 @@ class WeightedProducts:
 
     @classmethod
     def of(cls, gradient: Callable[[Array], ComplexArray], w: Array) -> WeightedProducts:
-        """Of F = `gradient` (n, k, p, r) at frequencies `w`."""
+        """Build the products of F = `gradient` (n, k, p, r) at frequencies `w`."""
         return cls(
             [
                 _by_output(gradient(w[start : start + _AT_ONCE]))

@@ -27,7 +27,7 @@ _ROUNDING = 1e-7
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
 NODES_AT_ONCE = 256
-"""So many at a time where the values are large: those of several channels."""
+"""The number of nodes at a time where the values are large, as for several channels."""
 _MANY = 2048
 
 Values = Callable[[Array], NDArray]
@@ -125,14 +125,14 @@ def integrate(
     knots: Array = _NONE,
     at_once: int = _MANY,
 ) -> NDArray[np.float64]:
-    """`sums` of `values` on a rule that is fine enough, proved by halving every panel.
+    """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
     Halving gains twelve digits or none. Where it gains none and the change is already small, what
     is left is rounding of the integrand (gradients in the whitened coordinates of a plant whose
     parameters are nearly indistinguishable), which no rule can mend.
 
     Args:
-        at_once: values are computed at so many nodes at a time at most.
+        at_once: the largest number of nodes at which values are computed at a time.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:
@@ -144,7 +144,7 @@ def integrate(
             singularities, lo=lo, hi=hi, highest_lag=highest_lag, refine=refine, knots=knots
         )
 
-    # The first rule never stands alone: one call for its values and those of the next.
+    # The first rule never stands alone: one call computes its values and the next rule's.
     coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once)
     earlier = np.inf
     for refine in range(1, _MAX_REFINEMENTS + 1):
@@ -200,7 +200,7 @@ def integrate_band(
     knots: Array = _NONE,
     at_once: int = NODES_AT_ONCE,
 ) -> NDArray[np.float64]:
-    """The same over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
+    """Integrate over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
     The band is stretched to the length of the half circle, for which the panels are laid out.
     """

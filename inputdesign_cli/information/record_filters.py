@@ -28,7 +28,7 @@ class RecordFilters:
 
     @classmethod
     def of(cls, experiment: Experiment) -> RecordFilters | None:
-        """The filters of an experiment, None where it is not of this kind."""
+        """Return the filters of an experiment, or None unless its model is polynomial, single-channel."""
         model = experiment.model
         if not isinstance(model, PolynomialModel) or model.inputs > 1 or model.outputs > 1:
             return None
@@ -54,7 +54,7 @@ class RecordFilters:
 
     @cached_property
     def _responses(self) -> dict[PowerKind, Filter]:
-        """From the excitation to each kind of signal."""
+        """Return the filters from the excitation to each kind of signal."""
         m, loop, one = self.model, self.experiment.loop, np.ones(1)
         B, AF = m.B[0][0], np.convolve(m.A[0], m.F[0][0])
         if loop is None:

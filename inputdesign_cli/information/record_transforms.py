@@ -60,7 +60,7 @@ class RecordTransforms:
         return self._back(np.concatenate(parts))
 
     def _transform(self, record: Array) -> ComplexArray:
-        """(frequencies, r): of the samples (n, r), weighted."""
+        """Return the Fourier transform (frequencies, r) of the samples (n, r), weighted."""
         return np.fft.rfft(record * self._weights[:, None], self._length, axis=0)
 
     def _back(self, transform: ComplexArray) -> NDArray[np.float64]:

@@ -40,7 +40,7 @@ class Nominal:
 
 @dataclass(frozen=True)
 class Assessment:
-    """The verdict with its reasons, and what an experiment that was designed on top leaves.
+    """The verdict with its reasons, and the accuracy that a designed top-up would reach.
 
     `undecided` are the reasons against a verdict, `causes` their kinds. `left` is the largest ratio after the
     top-up, `experiments` how often it has to be applied (`periods`: how many periods have to count).

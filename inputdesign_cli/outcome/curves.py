@@ -149,7 +149,7 @@ class FanCurves(Curves):
 
 @dataclass(frozen=True)
 class CampaignCurves(Curves):
-    """The worst ratio at the estimate and the energy applied after so many samples; all arrays (n,)."""
+    """Holds the worst ratio at the estimate and the energy applied, after each of `samples`; all (n,)."""
 
     samples: Array
     ratio: Array
@@ -159,7 +159,7 @@ class CampaignCurves(Curves):
 
 @dataclass(frozen=True)
 class EstimateCurves(Curves):
-    """Estimates and their standard deviations after so many samples, by name; all arrays (n,)."""
+    """Holds estimates and standard deviations by name, after each of `samples`; all arrays (n,)."""
 
     samples: Array
     estimates: Mapping[str, Array]

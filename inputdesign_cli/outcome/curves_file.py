@@ -30,7 +30,7 @@ def curves_json(curves: Mapping[str, Curves]) -> bytes:
 
 
 def read_curves(directory: Path) -> dict[str, Curves]:
-    """The curves of a run by file stem; none where it has no such file.
+    """Return the curves of a run by file stem, an empty mapping if it has no such file.
 
     Raises:
         DataError: `run-unreadable`, the file holds something else.

@@ -18,9 +18,9 @@ Deviations = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Objective:
-    """The value that the delivered design attains, with what is proved of all others.
+    """The value that the delivered design attains, with proved bounds on all others.
 
-    `value` is recomputed from the spectrum. `lower_bound` (`upper_bound` of what is maximised) holds for this
+    `value` is recomputed from the spectrum. `lower_bound` (`upper_bound` of a maximum) holds for this
     type of spectrum, `any_spectrum_bound` for every spectrum, `any_structure_bound` for all moments.
     """
 

@@ -12,7 +12,7 @@ from inputdesign_cli.outcome.results import Json, Result
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the comparison; `computed` is None where there is no such number, and `note` says why."""
+    """One line of the comparison; without a `computed` number, `note` says why it is None."""
 
     golden: str
     run: str

@@ -144,7 +144,7 @@ def _matter(polynomials: Sequence[Array]) -> bool:
 
 
 def _rows(polynomials: Sequence[Array]) -> list[Plain]:
-    """One polynomial common to all outputs as it is; a list of those of each output."""
+    """Return one polynomial common to all outputs as it is, or else a list with one for each output."""
     return polynomials[0].tolist() if len(polynomials) == 1 else [p.tolist() for p in polynomials]
 
 

@@ -81,7 +81,7 @@ def objective(kind: str | None) -> Objective:
     return OBJECTIVES.get(kind or "", UNKNOWN)
 
 
-# Of white excitation that is not told to be anything else, and of that which spends what the design does.
+# Labels of white excitation by default, and of white excitation that costs as much as the design.
 WHITE = ("white", "white, same cost")
 
 

@@ -1,8 +1,8 @@
-"""What a run was made from, so that it is not lost to a run of something else that has the same name.
+"""Record what a run was made from, so that a run of something else does not replace it by name.
 
-`made_from` in `result.json` names the spec and the data as they are seen from the run directory: a project
-that is moved as a whole keeps its runs. `asked_sha256` is the digest of the spec as it was read, where the
-`spec.yaml` of the run is another one.
+`made_from` in `result.json` names the spec and the data relative to the run directory: a project that is
+moved as a whole keeps its runs. `asked_sha256` is the digest of the spec as it was read, if the `spec.yaml`
+of the run differs from it.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def check_place(directory: Path, origin: Origin, spec: str) -> None:
 
 
 def has_other_values(directory: Path, spec: str) -> bool:
-    """Whether a run stands there whose `spec.yaml` is another one."""
+    """Return whether the directory holds a run whose `spec.yaml` differs from this one."""
     try:
         return load_result(directory).get("spec_sha256") not in (None, digest(spec))
     except DataError:

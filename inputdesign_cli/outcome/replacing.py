@@ -1,8 +1,8 @@
-"""One run in the place of another: whole whenever the writer is killed, and put right by the next call.
+"""Replace one run by another: whole whenever the writer is killed, and put right by the next call.
 
-Everything happens in a folder of work, inside the directory of the run or, where that is yet to be made or is
-to be exchanged as a whole, beside it. It holds `new`, the files of the new run; `old`, those of the run that
-leaves, only while files are moved one by one; and a lock, which ends with its process.
+Everything happens in a folder of work. It is inside the directory of the run. It is next to it if the
+directory is yet to be made or is exchanged as a whole. It holds `new`, the files of the new run; `old`, the
+files of the run that leaves, only while files are moved one by one; and a lock, which ends with its process.
 """
 
 from __future__ import annotations
@@ -164,7 +164,10 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def _exchange() -> Callable[[Path, Path], None] | None:
-    """What exchanges two folders in one step (raises `OSError`), or None where the system cannot."""
+    """Return a function that exchanges two folders in one step, or None if the system cannot.
+
+    It raises `OSError`.
+    """
     if not hasattr(os, "geteuid"):  # Windows
         return None
     try:

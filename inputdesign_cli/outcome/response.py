@@ -18,10 +18,10 @@ class DetectionLines:
 
 @dataclass(frozen=True)
 class SilentLine:
-    """What the outputs have at lines of one kind that are not excited; lists are by output.
+    """Describes the outputs at lines of one kind that are not excited; lists are by output.
 
-    `worst_ratio` is the largest share of what is admitted that the nonlinearity takes, at `frequency`.
-    `cubed` names the signal whose cube the lines resemble.
+    `worst_ratio` is the largest share of r_adm that the nonlinearity takes, at `frequency`. `cubed` names the
+    signal whose cube the lines resemble.
     """
 
     lines: int

@@ -51,17 +51,17 @@ class Results:
 
     @property
     def cost(self) -> float | None:
-        """The cost of the experiment; None where nothing is applied."""
+        """Return the cost of the experiment, or None if nothing is applied."""
         return self.outcome.cost
 
     @property
     def objective(self) -> Objective | None:
-        """The value of the design with its proved bounds; None where nothing was designed."""
+        """Return the value of the design with its proved bounds, or None if nothing was designed."""
         return self.outcome.objective
 
     @property
     def model_error(self) -> ModelError | None:
-        """The largest r_u/r_adm and its frequency; None where no model error is looked at."""
+        """Return the largest r_u/r_adm and its frequency, or None if no model error is looked at."""
         return self.outcome.model_error
 
     @property
@@ -134,7 +134,7 @@ class Results:
         return f"<b>{escape(found.title or '')}</b><table>{cells}</table>"
 
 
-# Frequencies are written with three digits, say: so much of what lies around a line is the line.
+# Users write frequencies with three digits or so: within this share, a frequency is that of the line.
 _SAME_LINE = 1e-3
 
 

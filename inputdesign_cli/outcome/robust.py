@@ -10,7 +10,7 @@ Parameters = Mapping[str, float]
 
 @dataclass(frozen=True)
 class ActivePlant:
-    """A plant that binds: its number (0 is that of the spec), and the share of what is admitted it takes."""
+    """A plant that binds: its number (0 is that of the spec), and its share of the admissible error."""
 
     scenario: int
     share: float
@@ -96,7 +96,7 @@ class FreshPlants:
 
 @dataclass(frozen=True)
 class DrawnEstimates:
-    """The share of what is admitted that estimates of the binding plants reach with this confidence."""
+    """The share of the admissible error that estimates of the binding plants reach with this confidence."""
 
     draws: int
     confidence: float
@@ -105,9 +105,9 @@ class DrawnEstimates:
 
 @dataclass(frozen=True)
 class Robust:
-    """What a design keeps at every plant, or what a given excitation gives there.
+    """The accuracy that a design keeps at every plant, or that a given excitation gives there.
 
-    `support` counts the plants that bind a design, `missed` those that a given excitation misses.
+    `support` counts the plants that bind a design, `missed` the plants that a given excitation misses.
     """
 
     source: str

@@ -8,12 +8,12 @@ _EXACT = 1e-12  # a value this near to its digits has them
 
 
 def rounded_up(value: float, digits: int = 6) -> str:
-    """So many digits, rounded up: what is printed suffices."""
+    """Round up to this number of digits, so that the printed value suffices."""
     return _rounded(value, digits, 1.0)
 
 
 def rounded_down(value: float, digits: int) -> str:
-    """So many digits, rounded down."""
+    """Round down to this number of digits."""
     return _rounded(value, digits, -1.0)
 
 

@@ -51,8 +51,8 @@ def write_run(
 ) -> list[Path]:
     """Write a run directory and return the paths of its files, `result.json` last.
 
-    An earlier run in `directory` is replaced, including those of its files that the new run no longer
-    has, and the page about it; files that are not of a run are left alone. Whatever fails or kills the
+    An earlier run in `directory` is replaced, including files that the new run no longer has,
+    and the page about it. Files that are not of a run are left alone. Whatever fails or kills the
     writer, `directory` holds afterwards what it held before or the new run, at the latest after the next
     call.
 

@@ -72,7 +72,7 @@ def csv_line(cells: Iterable[str]) -> str:
     """Write one line of a table; a cell with a comma, a quote or the end of a line in it stands in quotes.
 
     Spreadsheets run a text that begins like a formula, so an apostrophe goes before it: `'=1+1`. Numbers stay
-    as they are.
+    unchanged.
     """
     buffer, end = io.StringIO(), "\r\n"  # the writer puts in quotes what holds a character of its end
     csv.writer(buffer, lineterminator=end).writerow(map(_escaped, cells))
@@ -116,7 +116,7 @@ def read_csv(path: Path) -> dict[str, Array]:
 
 
 def csv_columns(content: bytes) -> dict[str, Array]:
-    """The columns of what `csv_text` made: name -> (n,).
+    """Return the columns of a table that `csv_text` made: name -> (n,).
 
     Raises:
         ValueError: it is no table of numbers.

@@ -1,4 +1,4 @@
-"""What turns the numbers of an experiment into those of its user: units, and the names of signals."""
+"""Convert the numbers of an experiment into its user's units, and name its signals."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Units:
-    """Time, frequency and channels of an experiment as its user counts and calls them.
+    """Holds the units and names of time, frequency and channels that the user of an experiment uses.
 
-    `sampled` tells discrete time, where the experiment counts in rad/sample, from continuous time, where it
-    counts in rad per `time_unit` as the user does. `channels` are names and units of u1, .. and y1, .. where
-    the user gave them, empty where not. `by_duration` tells that the user states lengths in `time_unit`, not
-    in samples. One input and one output carry no index in the names of curves and entries.
+    `sampled` says whether time is discrete, where the experiment counts in rad/sample, or continuous, where
+    it counts in rad per `time_unit` as the user does. `channels` are names and units of u1, .. and y1, .. if
+    the user gave them, else empty. `by_duration` says whether the user states lengths in `time_unit` or in
+    samples. One input and one output carry no index in the names of curves and entries.
     """
 
     time_unit: str
@@ -41,7 +41,7 @@ class Units:
         return f"rad/{self.time_unit}"
 
     def length(self, samples: int, section: str = "experiment") -> str:
-        """The key that states or limits such a length, with its value: experiment.samples: 600."""
+        """Return the key that states or limits a length, with its value: experiment.samples: 600."""
         if self.by_duration:
             return f"{section}.duration: {samples * self.sample_time:.10g}"
         return f"{section}.samples: {samples}"
@@ -80,11 +80,11 @@ class Units:
         return f"{name} ({unit})".strip() if unit else name
 
     def header(self, channel: str) -> str:
-        """The same as the header of a column, which begins with the channel."""
+        """Return the label as the header of a column, which begins with the channel."""
         return f"{channel} {self.label(channel)}".strip()
 
     def passage(self, entry: tuple[int, int] | None) -> str:
-        """Of an entry of G, counted from zero, what the user calls its input and output: `valve → level`.
+        """Return the user's names of the input and output of an entry of G, from zero: `valve → level`.
 
         Empty where not both have names, and for all entries together (None) unless there is one alone.
         """
@@ -102,7 +102,7 @@ class Units:
         return "" if self.single else f"[{output + 1},{input + 1}]"
 
     def suffix(self, output: int, input: int) -> str:
-        """The same in names of columns: `_21`; nothing for one."""
+        """Return the index of an entry in names of columns: `_21`; empty for one input and output."""
         return "" if self.single else f"_{output + 1}{input + 1}"
 
 

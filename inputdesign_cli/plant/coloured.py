@@ -1,6 +1,6 @@
-"""Any model with noise that is coloured besides, by polynomials in q^-1, or drifts.
+"""Add coloured noise, by polynomials in q^-1, or drift to any model.
 
-With H = H0 C / (D (1 - q^-1)) the prediction errors of output i are those of the model, filtered once more:
+With H = H0 C / (D (1 - q^-1)) the prediction errors of output i are the model's, filtered once more:
 epsilon_i = (D_i (1 - q^-1) / C_i) epsilon0_i ([ljung-1999], Section 4.2). What integrates is known and has no
 parameter, so that it is no more than this filter: signals are differenced, and noise is summed.
 """
@@ -35,7 +35,7 @@ class Coloured(Parametrised):
 
     Attributes:
         C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
-            those of the plant.
+            the parameters of the plant.
         held: of each D, whether it is known; then it may have roots on the unit circle, and the gradient with
             respect to its coefficients is not asked for (and given as zero).
         drift: whether the noise integrates, Delta = 1 - q^-1; one for all outputs or one an output.
@@ -83,7 +83,7 @@ class Coloured(Parametrised):
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those of the plant, then the coefficients of C and D."""
+        """Return the parameters of the plant, then the coefficients of C and D."""
         return (*self.plant.parameters, *self.own_parameters)
 
     @cached_property
@@ -116,7 +116,7 @@ class Coloured(Parametrised):
 
     @cached_property
     def estimated_roots(self) -> ComplexArray:
-        """Roots in z of what is estimated of C and D."""
+        """Return the roots in z of C and of the parts of D that are estimated."""
         free = [d for d, held in zip(self.D, self.held, strict=True) if not held]
         return join_roots(roots_in_z(p) for p in (*self.C, *free))
 
@@ -127,7 +127,7 @@ class Coloured(Parametrised):
 
     @property
     def radius(self) -> float:
-        """See `Model`; what is known of the noise, such as an integrator, does not count."""
+        """See `Model`; known parts of the noise, for example an integrator, do not count."""
         return max(self.plant.radius, float(np.abs(self.estimated_roots).max(initial=0.0)))
 
     @property
@@ -145,13 +145,13 @@ class Coloured(Parametrised):
         return self.plant.entry_singularities(output, input)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): those of the plant."""
+        """Return `bends` (k,) of the plant, and False for the coefficients of C and D."""
         return np.concatenate(
             [self.plant.bends(output, input), np.zeros(len(self.own_parameters), dtype=bool)]
         )
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """That of the plant; it does not depend on C and D."""
+        """Return the fraction of the plant; it does not depend on C and D."""
         part = self.plant.entry_fraction(output, input, w)
         none = np.zeros((len(part.numerator), len(self.own_parameters)), dtype=complex)
         return replace(
@@ -231,7 +231,7 @@ class Coloured(Parametrised):
         return None if self._per_output(self.held)[output] else self._per_output(self.D)[output], -1.0
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Coloured:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         values, rows = np.asarray(theta, dtype=float), {"c": list(self.C), "d": list(self.D)}
         first = len(self.plant.parameters)
         tables = {letter: [p.copy() for p in polynomials] for letter, polynomials in rows.items()}
@@ -260,7 +260,7 @@ class ColouredLoop(LoopAround):
 
     @cached_property
     def inner(self) -> Loop:
-        """That of the plant."""
+        """Return the loop around the plant without the coloured noise."""
         return close_loop(self.model.plant, self.controller)
 
     @property

@@ -24,7 +24,7 @@ from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised
 class ContinuousModel(Parametrised, WhiteNoise):
     """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
 
-    `numerator` and `denominator` hold ascending coefficients, those of s^0 first; denominators are
+    `numerator` and `denominator` hold ascending coefficients, s^0 first; denominators are
     monic. With `common` all entries share one denominator and its parameters.
 
     Parameters are named after their power of s: `b0[2,1]` is the constant of the numerator of entry
@@ -33,7 +33,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
     an entry that is absent has none.
 
     `delay` holds a list of one dead time for each entry, an empty list for entries that act at once; it is
-    empty where all do. `entries` are those that are not absent; None where zeros of the numerators say so.
+    empty where all do. `entries` are the ones present; if None, zeros of the numerators say so.
     """
 
     numerator: Rows
@@ -58,10 +58,10 @@ class ContinuousModel(Parametrised, WhiteNoise):
         common_delay: bool = False,
         degrees: Sequence[Sequence[int]] | None = None,
     ) -> ContinuousModel:
-        """From any coefficients: each entry divided by the leading coefficient of its denominator.
+        """Build from any coefficients: each entry divided by the leading coefficient of its denominator.
 
         Args:
-            degrees: (p, r), of the numerators, -1 of those that are absent; without them trailing zeros are
+            degrees: (p, r), of the numerators, -1 of absent entries; without them trailing zeros are
                 dropped.
         """
         tops = [[np.asarray(t, dtype=float) for t in row] for row in numerator]
@@ -105,7 +105,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Numerator coefficients entry by entry, then those of the denominators, then dead times."""
+        """Return numerator coefficients entry by entry, then denominator coefficients, then dead times."""
         single = self.outputs == self.inputs == 1
         found = [
             Parameter("b", power, ((i, j),), entry_label(i, j, single=single), float(value))
@@ -128,7 +128,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return tuple(found)
 
     def dead_time(self, output: int, input: int) -> float:
-        """Of an entry."""
+        """Return the dead time of an entry."""
         return float(np.sum(self._delays((output, input))))
 
     def _delays(self, place: tuple[int, int]) -> Array:
@@ -136,7 +136,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return self.delay[place[0]][place[1]] if self.delay else np.zeros(0)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousModel:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         given = {"b": self.numerator, "a": self.denominator, DELAY: self.delay}
         tables = {letter: [[e.copy() for e in row] for row in rows] for letter, rows in given.items()}
         for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):

@@ -80,5 +80,5 @@ def _added(parts: Sequence[Rational]) -> Rational:
 
 
 def delayed(transfer: Rational, samples: int) -> Rational:
-    """The same, so many samples later."""
+    """Return the transfer function with a further delay of this number of samples."""
     return Rational(np.concatenate([np.zeros(samples), transfer.numerator]), transfer.denominator)

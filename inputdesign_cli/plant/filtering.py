@@ -33,7 +33,7 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis
 
 
 def _of_rows(b: NDArray, a: NDArray, rows: NDArray) -> NDArray:
-    """The same of rows (m, n), a[0] being one."""
+    """Filter rows (m, n) by b / a, a[0] being one."""
     driven = rows * b[0]
     for lag in range(1, min(b.size, rows.shape[1])):
         driven[:, lag:] += b[lag] * rows[:, :-lag]

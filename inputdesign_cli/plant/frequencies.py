@@ -14,11 +14,11 @@ _REFINEMENT = 6
 # Points and steps that narrow a bracket ten thousandfold: few peaks cost their steps, many their points.
 _ZOOM_FEW, _ZOOM_MANY, _FEW = (40, 3), (8, 6), 64
 # Beside a kink the value falls in proportion to the width: narrowed on until it falls by no more than this
-# share of it, or so many times in all.
+# share of it, or this number of times in all.
 _KINK, _MOST_ZOOMS = 1e-9, 16
 SLACK = 0.05
 """A peak between two grid points may stand this much higher than both, as a share of itself."""
-# Values that differ by less are those of a function that is flat there.
+# Where values differ by less, the function is flat.
 _FLAT = 1e-12
 
 
@@ -85,15 +85,15 @@ def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
 def local_maxima(
     function: Callable[[Array], Array], grid: Array, values: Array, *, above: float = -np.inf
 ) -> tuple[Array, Array]:
-    """Local maxima of `function` over [grid[0], grid[-1]], polished between the grid points.
+    """Return the local maxima of `function` over [grid[0], grid[-1]], polished between the grid points.
 
     `function` maps frequencies (n,) to values (n,) and `values` are its values on `grid`. Around
     every grid maximum the grid is refined once, which parts twin peaks that share a bracket; then each
     bracket is narrowed by repeated sampling, all at once. Only continuity is asked for (tables have
     kinks). Maxima with values <= `above` are left out.
 
-    Where only rounding tells maxima apart the function is flat, and the highest stands for all. A maximum
-    that only rounding tells from the value at an end of the grid is at that end.
+    Where maxima differ only by rounding the function is flat, and the highest stands for all. A maximum
+    that differs only by rounding from the value at an end of the grid is at that end.
 
     Returns:
         Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.

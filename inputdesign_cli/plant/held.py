@@ -84,7 +84,7 @@ class HeldEntry:
 
     @cached_property
     def transition(self) -> Array:
-        """(2 order, 2 order): of the states over one sample."""
+        """Return the transition matrix (2 order, 2 order) of the states over one sample."""
         return self._held[: 2 * self.order, : 2 * self.order]
 
     @cached_property
@@ -202,9 +202,9 @@ class HeldEntry:
         return np.concatenate(parts, axis=1)
 
     def forgetting(self, responses: ComplexArray, z: ComplexArray, samples: int) -> ComplexArray:
-        """Responses (m, columns) at points z whose memory ends after so many samples.
+        """Return responses (m, columns) at points z whose memory ends after this number of samples.
 
-        Exact in a record that is no longer, whatever the poles: there is nothing older to remember.
+        They are exact in a record that is no longer, whatever the poles: there is nothing older to remember.
         """
         n = self.order
         left = samples - (0 if self.delay is None else self.lag + 1)

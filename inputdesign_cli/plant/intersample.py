@@ -1,6 +1,6 @@
-"""Transfer matrices in s driven by samples: what happens between the samples, exactly.
+"""Simulate transfer matrices in s driven by samples, exactly between the samples.
 
-Everything is at rest before the record. With a hold, outputs are those of the plant behind it. Without, what
+Everything is at rest before the record. With a hold, outputs come from the plant behind it. Without, what
 is applied is the band-limited interpolation of the samples and of zeros around them, as many on each side,
 and the outputs are read at the same instants. Both by FFT: an entry is one chain of states in time, of which
 its output and all its gradients are linear combinations.

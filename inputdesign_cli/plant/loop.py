@@ -34,7 +34,7 @@ _SEVERAL = (
 
 
 def beside_zero(w: ArrayLike, nearest: float) -> ComplexArray | Array:
-    """The frequencies `w`, those of the axis moved at least so far from zero."""
+    """Return the frequencies `w`, with real ones moved to at least `nearest` from zero."""
     given = np.asarray(w)
     if nearest == 0.0 or np.iscomplexobj(given):
         return given
@@ -101,7 +101,10 @@ class Loop(ABC):
 
     @property
     def radius(self) -> float:
-        """Of the farthest pole in z of what the excitation and the noise cause, integrators left out."""
+        """Return the largest modulus of poles in z of the closed loop and the predictor.
+
+        Integrators of the predictor are left out.
+        """
         filters = self.predictor_poles
         caused = np.concatenate([self.closed_poles, filters[np.abs(filters - 1.0) >= INTEGRATES]])
         return float(np.abs(caused).max(initial=0.0))
@@ -247,7 +250,7 @@ def disturbance_gradients(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
 def _prediction_gradients(
     loops: Sequence[Loop], w: ArrayLike, y: ComplexArray, u: ComplexArray, e: NDArray
 ) -> ComplexArray:
-    """Those of the models, at once where they are read off at the same frequencies."""
+    """Return the prediction gradients of the models, all at once if their frequencies agree."""
     if len({loop.nearest for loop in loops}) == 1:
         models = [loop.model for loop in loops]
         return prediction_gradients(models[0], models, loops[0].beside_zero(w), y, u, e)

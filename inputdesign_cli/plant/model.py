@@ -60,7 +60,7 @@ class Model(Protocol):
 
     @property
     def flaw(self) -> str | None:
-        """What makes the parameters none of a plant, as a negative dead time; None where nothing does."""
+        """Return why the parameters describe no plant, as a negative dead time, or None if they do."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
@@ -79,7 +79,7 @@ class Model(Protocol):
 
     @property
     def radius(self) -> float:
-        """Of the farthest pole of G, H and the predictor in z, below one when all are stable.
+        """Return the modulus of the farthest pole of G, H and the predictor in z, below one if stable.
 
         In continuous time exp of the largest real part in s.
         """
@@ -92,7 +92,7 @@ class Model(Protocol):
         """(k,): the parameters in which numerator and denominator of an entry of G are not affine."""
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as such a fraction, where no free parameter bends it."""
+        """Return one entry of G as a `Fraction`, where no free parameter bends it."""
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
@@ -101,7 +101,7 @@ class Model(Protocol):
         """dG/dtheta (n, k, p, r)."""
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest.
@@ -145,7 +145,7 @@ class Parameter:
 
 
 def entry_label(output: int, input: int, *, single: bool) -> str:
-    """The channels of a parameter as they stand in its name, counted from one: `[2,1]`."""
+    """Return the channels of a parameter in its name, counted from one: `[2,1]`; empty if `single`."""
     return "" if single else f"[{output + 1},{input + 1}]"
 
 
@@ -218,7 +218,7 @@ class Parametrised:
 
     @cached_property
     def dead_times(self) -> NDArray[np.bool_]:
-        """(k,): those that are dead times."""
+        """Return whether each parameter is a dead time, (k,)."""
         return np.array([parameter.letter == DELAY for parameter in self.parameters], dtype=bool)
 
     @property

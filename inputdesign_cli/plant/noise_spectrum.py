@@ -24,7 +24,7 @@ class NoiseSpectrum:
 
     @classmethod
     def of(cls, model: Model) -> NoiseSpectrum:
-        """That of H e of a model in discrete time.
+        """Compute the spectrum of H e of a model in discrete time.
 
         Raises:
             InaccurateError: `integral-inaccurate` for noise that hardly forgets.
@@ -47,7 +47,7 @@ class NoiseSpectrum:
         )
 
     def at(self, period: int, harmonics: NDArray[np.int_]) -> Array:
-        """Phi_v (L, p) at harmonics of a period of so many samples."""
+        """Return Phi_v (L, p) at harmonics of a period of `period` samples."""
         return _power(self._folded(self.impulses, period)[:, harmonics])
 
     def averaged(self, period: int, harmonics: NDArray[np.int_], periods: int) -> Array:
@@ -72,5 +72,5 @@ class NoiseSpectrum:
 
 
 def _power(transforms: NDArray[np.complex128]) -> Array:
-    """(L, p): of outputs, over independent sources, which come first."""
+    """Return the powers (L, p) of outputs, summed over independent sources, which come first."""
     return np.asarray(np.sum(np.abs(transforms) ** 2, axis=0))

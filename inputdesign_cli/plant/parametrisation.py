@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.expressions import Evaluated, Expression, evaluated
 
-# So many values of the parameters are kept with their coefficients.
+# Number of recent parameter values that are kept with their coefficients.
 _RECENT = 4
 
 
@@ -22,7 +22,7 @@ class Parametrisation:
 
     Attributes:
         labels: (m,) what the user calls them; `symbols` (m,) what `terms` (K,) call them.
-        values: (m,); those that are not free are known.
+        values: (m,); parameters that are not free are known.
     """
 
     labels: tuple[str, ...]
@@ -55,7 +55,7 @@ class Parametrisation:
         return all(term.affine for term in self.terms)
 
     def at(self, theta: ArrayLike) -> Parametrisation:
-        """The same with other values (k,) of the free ones."""
+        """Return the parametrisation with other values (k,) of the free parameters."""
         point = np.asarray(theta, dtype=float)
         key = point.tobytes()
         if key not in self._recent:
@@ -78,7 +78,7 @@ class Parametrisation:
 
     @cached_property
     def jacobian(self) -> Array:
-        """(K, k): of the coefficients in the free parameters."""
+        """Return the derivatives (K, k) of the coefficients in the free parameters."""
         return self._image.gradients[:, self.free]
 
     @cached_property
@@ -89,7 +89,7 @@ class Parametrisation:
 
     @property
     def undefined(self) -> str | None:
-        """The first term that has no value or no derivative here; None where all have both."""
+        """Return the first term that has no value or no derivative here, or None if all have both."""
         sound = np.isfinite(self.coefficients) & np.all(np.isfinite(self.jacobian), axis=1)
         return None if np.all(sound) else self.terms[int(np.argmin(sound))].text
 

@@ -21,7 +21,7 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
     """
     at = np.asarray(w)
     asked, known = _latest[0]
-    # G, H and their gradients are asked for at the same frequencies in turn, and so are those of like plants.
+    # G, H and their gradients are asked for at the same frequencies in turn, also for similar plants.
     if at.shape == asked.shape and np.array_equal(at, asked):
         return known
     q = np.asarray(np.exp(-1j * at))

@@ -105,7 +105,9 @@ class PolynomialLoop(Loop):
         return first._lefts(lefts, q)
 
     def _lefts(self, lefts: Array, q: ComplexArray) -> ComplexArray:
-        """(S, n, p + r, p + r): the rows of one controller once, and those of the plants by their own length.
+        """Return the values (S, n, p + r, p + r) of the left matrices at `q`.
+
+        The rows of the one controller are evaluated once, the rows of the plants up to their own length.
 
         Args:
             lefts: (S, p + r, p + r, l), of plants of one structure.

@@ -23,9 +23,9 @@ def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
 
 
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
-    """(.., K, rows, columns): the values of (.., rows, columns, l) at `q` (K,), which stands for q^-1.
+    """Return the values (.., K, rows, columns) of (.., rows, columns, l) at `q` (K,), which stands for q^-1.
 
-    In memory those of an entry stand side by side.
+    In memory the values of an entry stand side by side.
     """
     value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
     value[:] = matrix[..., -1:]

@@ -38,14 +38,14 @@ class PolynomialModel(PolynomialStructure):
         return H
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): those of A and F of the entry, where both stand in its denominator."""
+        """Return (k,), True for parameters of A and F of the entry if both stand in its denominator."""
         both = len(self.row(self.A, output)) > 1 and len(self.F[output][input]) > 1
         return np.array(
             [both and p.letter in "af" and (output, input) in p.places for p in self.parameters], dtype=bool
         )
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as such a fraction, gradients (n, k), where none is bent."""
+        """Return one entry of G as a `Fraction` with gradients (n, k), where no parameter bends it."""
         q = unit_circle(w)
         above = np.zeros((q.size, len(self.parameters)), dtype=complex)
         below = np.zeros_like(above)
@@ -102,7 +102,7 @@ class PolynomialModel(PolynomialStructure):
 
 @input_gradients.register
 def _input_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    """(S, n, k, p, r): those of models of one structure."""
+    """Return the input gradients (S, n, k, p, r) of models of one structure."""
     G = np.stack([model.plant_at(w) for model in models]) if first.outputs_count else None
     u = np.eye(first.inputs, dtype=complex)[None, None]
     return _gradients(models, w, first.inputs, G, u, None)
@@ -110,7 +110,7 @@ def _input_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], 
 
 @noise_gradients.register
 def _noise_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    """(S, n, k, p, p): those of models of one structure."""
+    """Return the noise gradients (S, n, k, p, p) of models of one structure."""
     H = np.stack([model.noise_at(w) for model in models]) if first.outputs_count else None
     e = np.eye(first.outputs, dtype=complex)[None, None]
     return _gradients(models, w, first.outputs, H, None, e)
@@ -125,7 +125,7 @@ def _prediction_gradients(
     u: NDArray,
     e: NDArray,
 ) -> ComplexArray:
-    """(S, n, k, p, m): those of models of one structure."""
+    """Return the prediction gradients (S, n, k, p, m) of models of one structure."""
     return _gradients(models, w, y.shape[-1], y, u, e)
 
 
@@ -137,10 +137,10 @@ def _gradients(
     u: NDArray | None,
     e: NDArray | None,
 ) -> ComplexArray:
-    """(S, n, k, p, m): `prediction_gradient` of models of one structure, by the polynomials of the predictor.
+    """Return `prediction_gradient` (S, n, k, p, m) of models of one structure, by polynomials.
 
     Args:
-        y, u, e: (S, n, p or r, m); None stands for nothing, and a length of one for the same everywhere.
+        y, u, e: (S, n, p or r, m); None is a zero signal; axes of length one are broadcast.
     """
     first, q = models[0], unit_circle(w)
     gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)

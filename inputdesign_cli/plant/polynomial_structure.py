@@ -21,7 +21,7 @@ from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 
 @dataclass(frozen=True)
 class PolynomialStructure(Parametrised):
-    """Which coefficients are free, what they are called, and what they are.
+    """States which coefficients are free, their names and their values.
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
     are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
@@ -29,7 +29,7 @@ class PolynomialStructure(Parametrised):
 
     Attributes:
         delays: (p, r), the power of the first coefficient of each B that is free, its length where the entry
-            is absent; None where zeros of B say so.
+            is absent; if None, zeros of B say so.
     """
 
     B: Rows
@@ -67,7 +67,7 @@ class PolynomialStructure(Parametrised):
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All free coefficients: those of A, B, C, D, F in turn."""
+        """Return all free coefficients, of A, B, C, D and F in turn."""
         found: list[Parameter] = []
         for letter in "abcdf":
             if letter in "bf":
@@ -139,7 +139,7 @@ class PolynomialStructure(Parametrised):
         return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
 
     def row(self, rows: Sequence[Array], output: int) -> Array:
-        """That of an output of A, C or D."""
+        """Return the polynomial of an output in A, C or D."""
         return rows[0] if len(rows) == 1 else rows[output]
 
     @cached_property
@@ -169,7 +169,7 @@ class PolynomialStructure(Parametrised):
         return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         B, F = ([[entry.copy() for entry in row] for row in rows] for rows in (self.B, self.F))
         common = {"a": self.A, "c": self.C, "d": self.D}
         rows = {letter: [polynomial.copy() for polynomial in given] for letter, given in common.items()}

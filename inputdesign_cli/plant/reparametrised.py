@@ -26,10 +26,10 @@ Place = Sequence[str | int]
 
 @dataclass(frozen=True)
 class Words:
-    """What a spec says of parameters that have names of their own, to be repeated with other values.
+    """Holds parameters with names of their own as a spec states them, to be repeated with other values.
 
     Attributes:
-        plant: the section as it was written; None where it lists the coefficients, as those of the model do.
+        plant: the section as it was written; None if it lists the coefficients of the model.
         places: label -> where its value stands in the section.
         known: of plant and of noise, what is listed as known.
     """
@@ -153,7 +153,7 @@ class Reparametrised:
         return self._chained(self.coefficients.prediction_gradient(w, y, u, e))
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Reparametrised:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         moved = self.parametrisation.at(theta)
         coefficients = self.coefficients.at(moved.coefficients, covariance)
         return replace(self, coefficients=coefficients, parametrisation=moved)
@@ -176,7 +176,7 @@ class ReparametrisedLoop(LoopAround):
 
     @cached_property
     def inner(self) -> Loop:
-        """That of the coefficients."""
+        """Return the loop around the model with its coefficients as parameters."""
         return close_loop(self.model.coefficients, self.controller)
 
 

@@ -22,7 +22,7 @@ class Realised(Model, Protocol):
 
     @property
     def realisation(self) -> StateSpace:
-        """From inputs to outputs."""
+        """Return a state-space realisation from inputs to outputs."""
 
     @property
     def poles(self) -> ComplexArray:
@@ -37,7 +37,7 @@ class Realised(Model, Protocol):
 class SampledLoop(Loop):
     """`Loop` with R = I and N = G, which has no poles outside the unit circle, and H = I.
 
-    Poles and signals are those of the states of the entries of G and of the rows of C: polynomials in q^-1
+    Poles and signals come from the states of the entries of G and of the rows of C: polynomials in q^-1
     would lose the digits of poles that crowd at z = 1 when sampling is fast. States of G that feedback does
     not reach are poles of G, hence stable.
 

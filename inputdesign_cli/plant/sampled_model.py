@@ -19,7 +19,7 @@ from inputdesign_cli.plant.transfer import StateSpace
 
 @dataclass(frozen=True)
 class SampledModel(Parametrised, WhiteNoise):
-    """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay those of s.
+    """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay in s.
 
     Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
     dG/da_k = -s^k b / a^2: each entry needs one state-space model of a^2, exact through one exponential.
@@ -55,7 +55,7 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The k parameters, those of the plant in s."""
+        """Return the k parameters, which belong to the plant in s."""
         return self.continuous_plant.parameters
 
     @cached_property
@@ -64,7 +64,7 @@ class SampledModel(Parametrised, WhiteNoise):
         return {(i, j): plant.held(i, j, self.sample_time) for i, j in plant.active}
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> SampledModel:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         return SampledModel(self.continuous_plant.at(theta, covariance), self.sample_time)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
@@ -83,9 +83,9 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @cached_property
     def repeated_integrators(self) -> int:
-        """The integrators of single entries that are the same for the plant as a whole.
+        """Return by how many the integrators of single entries exceed the integrators of the plant.
 
-        Of simple ones there are as many as the rank of their gains; no feedback moves the others, for they
+        The plant has as many simple ones as their gains have rank. No feedback moves the others, for they
         take no part in G.
         """
         gains, simple = np.zeros((self.outputs, self.inputs)), 0
@@ -100,7 +100,7 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @cached_property
     def realisation(self) -> StateSpace:
-        """From inputs to outputs: the past of each input, then the states of entry after entry."""
+        """Return a realisation whose states are the past of each input, then the states of each entry."""
         lags = [(j, entry.direct_lag) for (_, j), entry in self._entries.items()]
         past = [max((lag for other, lag in lags if other == j), default=0) for j in range(self.inputs)]
         first = np.concatenate([[0], np.cumsum(past)]).astype(int)
@@ -148,7 +148,7 @@ class SampledModel(Parametrised, WhiteNoise):
         return max((entry.lag + 1.0 for entry in self._entries.values() if entry.delay), default=0.0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): all, for sampled coefficients depend on those of s through an exponential."""
+        """Return (k,), all True: sampled coefficients depend on parameters in s through an exponential."""
         return np.ones(self.theta.size, dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:

@@ -1,4 +1,4 @@
-"""From continuous to discrete time."""
+"""Sample transfer functions: from continuous to discrete time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], pe
     gain = float(np.abs(given).max(initial=0.0))
     scaled = given / gain if gain > 0 else np.ones(1)
     above, below, _ = scipy.signal.cont2discrete((scaled, denominator), period, method="zoh")
-    # In z both have the same length, so that their coefficients are those of q^-1, ascending.
+    # In z both have the same length, so that they are the coefficients in q^-1, ascending.
     top = gain * np.ravel(above).astype(float)
     return Rational(np.concatenate([np.zeros(below.size - top.size), top]), (below,))
 
@@ -36,7 +36,7 @@ def hold_entries(
     period: float,
     delays: Sequence[Sequence[float]],
 ) -> tuple[Rows, Rows]:
-    """The same for every entry of a matrix: numerators and denominators in q^-1, ascending.
+    """Sample every entry of a matrix behind a hold: return polynomials in q^-1, ascending.
 
     Args:
         delays: the dead times of the entries.

@@ -113,7 +113,7 @@ class StateSpaceModel(Parametrised):
         return np.array([letter != "K" for letter, _, _ in self.entries], dtype=bool)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> StateSpaceModel:
-        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         table, delay = {letter: M.copy() for letter, M in self._table.items()}, self.matrices.delay
         for (letter, i, j), value in zip(self.entries, np.asarray(theta, dtype=float), strict=True):
             if letter == DELAY:
@@ -228,7 +228,7 @@ class StateSpaceModel(Parametrised):
 
     @property
     def repeated_integrators(self) -> int:
-        """None: the states are those of the spec."""
+        """Return 0, since the states are the ones of the spec."""
         return 0
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
@@ -316,7 +316,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def realisation(self) -> StateSpace:
-        """From inputs to outputs: the past of the inputs, then the states."""
+        """Return a realisation whose states are the past of the inputs, then the states of the model."""
         (A, early, late), m, r = self.held, self.matrices, self.inputs
         past = max(self.direct_lag, self.lag)
         first = past * r

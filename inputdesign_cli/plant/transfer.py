@@ -55,7 +55,7 @@ class Rational:
     def build(
         cls, numerator: Coefficients, denominator: Coefficients | Sequence[Coefficients] = (1.0,)
     ) -> Rational:
-        """From plain numbers; `denominator` is one polynomial or a list of factors."""
+        """Build from plain numbers; `denominator` is one polynomial or a list of factors."""
         factors = [denominator] if np.ndim(denominator[0]) == 0 else denominator
         return cls(np.asarray(numerator, dtype=float), tuple(np.asarray(f, dtype=float) for f in factors))
 
@@ -170,7 +170,7 @@ class TransferMatrix:
     def build(
         cls, numerator: Sequence[Sequence[Coefficients]], denominator: Sequence[Sequence[Coefficients]]
     ) -> TransferMatrix:
-        """From entries with a denominator each; zero entries have no poles."""
+        """Build from entries with a denominator each; zero entries have no poles."""
         rows, below = [], []
         for tops, bottoms in zip(numerator, denominator, strict=True):
             own = [tuple(bottom) if np.any(top) else () for top, bottom in zip(tops, bottoms, strict=True)]
@@ -182,7 +182,7 @@ class TransferMatrix:
 
     @classmethod
     def of(cls, rows: Sequence[Sequence[Rational]]) -> TransferMatrix:
-        """From entries with denominators in factors; a factor that entries of a row share is kept once."""
+        """Build from entries with denominators in factors; a factor that a row shares is kept once."""
         tops, below = [], []
         for row in rows:
             own = [Counter(map(tuple, entry.denominator if np.any(entry.numerator) else ())) for entry in row]
@@ -246,7 +246,7 @@ class TransferMatrix:
 
     @property
     def realisation(self) -> StateSpace:
-        """From columns to rows, row by row in the observer's canonical form."""
+        """Return a realisation from columns to rows, row by row in the observer's canonical form."""
         outputs, inputs, length = self.numerator.shape
         direct = np.zeros((outputs, inputs))
         blocks = []

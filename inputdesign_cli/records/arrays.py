@@ -158,7 +158,7 @@ def _sheet(
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, NDArray]]:
-    """The arrays in a value by their names, of a struct by those of its fields."""
+    """Yield the arrays in a value by name; a struct gives the arrays of its fields by their names."""
     if hasattr(value, "toarray"):
         value.check_format(full_check=True)
         value = value.toarray() if value.shape[0] * value.shape[1] <= _MOST_DENSE else [None]

@@ -53,7 +53,7 @@ def is_missing(cell: str) -> bool:
 
 
 def is_error(cell: str) -> bool:
-    """Return whether a cell holds an error of a spreadsheet, such as #N/A."""
+    """Return whether a cell holds an error of a spreadsheet, for example #N/A."""
     return _ERROR.fullmatch(cell.strip()) is not None
 
 
@@ -121,7 +121,7 @@ def column_of(cells: Sequence[str], decimal: str = ".", *, stated: bool = False)
 
 
 def _like_thousands(texts: Sequence[str]) -> bool:
-    """Whether points may stand between thousands, as in 1.250: others, such as 808, have no decimals."""
+    """Return whether points may stand between thousands, as in 1.250: others, like 808, have no decimals."""
     there = [text for text in texts if not is_missing(text)]
     hundreds = any("." not in text and len(text.lstrip("+-")) == 3 for text in there)
     return hundreds and any("." in text for text in there) and all(map(_WHOLE.fullmatch, there))

@@ -230,7 +230,7 @@ def reference_columns(
     """Return `r1` -> the column of the reference that is added to an input, if every input has one.
 
     Args:
-        columns: by channel, those that the user names.
+        columns: the columns that the user names, by channel.
         clean: whether columns that nobody names count only if they hold numbers alone.
 
     Raises:
@@ -263,7 +263,7 @@ def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
 
 
 def with_names_of(units: Units, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
-    """Return the named columns, and those that are called as the spec calls a channel."""
+    """Return the named columns, and the columns that have the name of a channel in the spec."""
     found = {}
     for channel, (name, _) in units.channels.items():
         same = [header for header in sheet.names if name_and_unit(header)[0].lower() == name.lower()]

@@ -113,7 +113,7 @@ def _parses(text: str, form: str) -> bool:
 
 
 def _read(texts: Sequence[str], form: str) -> NDArray[np.datetime64] | None:
-    """Moments (n,), in UTC where all have a zone; None where a text is none."""
+    """Return moments (n,), in UTC if all have a zone, or None if a text is no moment."""
     import pandas
 
     zones = sum(_ZONE.search(text[10:]) is not None for text in texts) if form == _ISO_FORM else 0
@@ -130,7 +130,7 @@ def with_days(sheet: Sheet) -> Sheet:
     """Return the sheet with days to its times of day.
 
     A column of dates and one of times of day become one moment. Where there are no dates, times of day that
-    fall by more than half a day are those of the next day.
+    fall by more than half a day belong to the next day.
     """
     columns = list(sheet.columns)
     dates = [i for i, column in enumerate(columns) if _of_dates(column)]
@@ -176,14 +176,14 @@ def is_moment(text: str) -> bool:
 
 
 def are_digits(x: Array) -> bool:
-    """Return whether numbers are dates such as 20240312 or 202403121015, most likely."""
+    """Return whether numbers are dates like 20240312 or 202403121015, most likely."""
     near = x[(x >= 1.97e7) & (x < 2.1e16)]
     found = [_DIGITS.fullmatch(f"{value:.0f}") for value in np.floor(near)]
     return sum(one is not None for one in found) > _MOSTLY * x.size
 
 
 def are_clock_digits(x: Array) -> bool:
-    """Return whether numbers are times of day such as 105959 or 1059: their steps are even only as such."""
+    """Return whether numbers are times of day like 105959 or 1059: their steps are even only then."""
     low, mid, high, steps = x % 100, x // 100 % 100, x // 10_000, np.diff(x)
     if x.size < 3 or x.min() < 0 or x.max() < 100 or np.any((low >= 60) | (mid >= 60) | (high >= 24)):
         return False

@@ -43,5 +43,5 @@ class Preparation:
 
     @property
     def levels(self) -> Mapping[str, float]:
-        """By channel, the levels of the signals: the operating point, if that is what is taken away."""
+        """Return the levels of the signals by channel: the operating point, if that is what is taken away."""
         return self.operating_point if self.detrend == "none" else {}

@@ -42,7 +42,7 @@ _ROUND = 1e-3
 
 @dataclass(frozen=True)
 class Recorded:
-    """The signals as they stand in the files.
+    """Holds the signals as the files have them.
 
     Attributes:
         values: (samples, r + p), of inputs and outputs.
@@ -63,11 +63,11 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Record:
-    """Recorded experiments, their segments one after the other.
+    """Holds recorded experiments, their segments one after the other.
 
     Attributes:
         u, y: (N, r), (N, p), inputs and outputs, without gaps.
-        r: (N, r), the reference of a loop; None where some file does not have it.
+        r: (N, r), the reference of a loop; None if some file does not have it.
         time: (N,), in `time_unit`; counted from zero in a file that has none.
         lengths: the samples of each segment.
         files: the name of each file and its samples.
@@ -76,7 +76,7 @@ class Record:
         findings: what was done to the record and what was seen in it.
         header: the names of the columns of the first file, in small letters.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
-        recorded: the signals as they stand in the files; None: not known.
+        recorded: the signals as the files have them; None: not known.
         repeated: files that have samples in common.
         lined: whether a line was taken away from an output: its slope is then estimated with the model, since
             the inputs cause a part of it.

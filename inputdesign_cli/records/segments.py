@@ -24,7 +24,7 @@ MOST_JITTER = 0.25
 # A longer step is a gap; with `resample` it may be longer before it is one.
 _GAP, _LONG_GAP = 1.5, 3.0
 SHORTEST = 10
-# Rows count as they stand where this share of the whole ones stands in long stretches, or, of short records,
+# Rows count unchanged where this share of the whole ones stands in long stretches, or, of short records,
 # where this share is whole.
 _KEPT, _FEW, _SHORT = 0.25, 0.5, 2 * SHORTEST
 # Steps of an output that are longer, in its own, are gaps.
@@ -49,7 +49,7 @@ def joined_rows(signals: Signals, *, resample: bool) -> Signals:
     """Return the signals at the times of the output that was written most often; or, if few miss, all rows.
 
     Inputs are held until they are written again, and are their means until the next row; outputs are
-    interpolated linearly. Rows stay as they are if enough of them are whole.
+    interpolated linearly. Rows stay unchanged if enough of them are whole.
 
     Args:
         resample: whether that is asked for.

@@ -33,7 +33,7 @@ from inputdesign_cli.records.sheet import Sheet
 # Steps of time differ from a round number by less than this share of it by rounding alone.
 _ROUND = 1e-4
 _SINCE_1970 = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
-# Counts of these years: those of one unit are none of another, and in seconds they would be millennia away.
+# Counts of these years: a count in one unit is out of range in any other, and as seconds lies millennia away.
 _FIRST, _LAST = (datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (2000, 2100))
 
 
@@ -72,7 +72,7 @@ class Signals:
 def signals_of(
     sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Mapping[str, str]
 ) -> Signals:
-    """Return the columns of the channels; those of `references`, by their labels, follow the inputs.
+    """Return the columns of the channels; the columns of `references` follow the inputs, by their labels.
 
     Raises:
         DataError: a column is missing, holds text or nothing, or leaves the range of arithmetic; the times

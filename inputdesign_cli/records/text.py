@@ -194,7 +194,7 @@ def _split(path: Path, key: str, text: str, separator: str | None) -> Rows:
     lines, begun, rows = text.splitlines(), 1, []
     if separator is None:
         return [(number, line.split()) for number, line in enumerate(lines, start=1)]
-    # Behind a quote that is never closed this is no row by itself.
+    # Behind a quote that is never closed this is no separate row.
     reader = csv.reader(
         io.StringIO("\n".join([*lines, "\x00"]), newline=""), delimiter=separator, strict=True
     )
@@ -242,7 +242,7 @@ def _of_words(row: Sequence[str], width: int) -> bool:
 
 
 def _headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
-    """Line and text of the header, the names (none where there are none), and the rows below.
+    """Return line and text of the header, the names (empty if there are none), and the rows below.
 
     A row of units below the names joins them: `valve` over `%` is `valve (%)`.
     """

@@ -1,4 +1,4 @@
-"""What a figure shows: captions that speak of what is drawn, and sentences for those who do not see it."""
+"""Describe figures: captions for the curves drawn, and sentences for readers who do not see them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ OF_DATA = "data"  # what r_u of an estimate is called
 
 
 def described(curves: Curves, time_unit: str) -> str | None:
-    """The sentence, frequencies in rad per `time_unit`; None where the caption says as much."""
+    """Return the sentence, frequencies in rad per `time_unit`, or None if the caption says as much."""
     tell = _TOLD.get(type(curves))
     return None if tell is None else tell(curves, f"rad/{time_unit}")
 
 
 def captioned(curves: Curves) -> str:
-    """The caption, of what there is in this figure."""
+    """Return the caption, which depends on the curves in this figure."""
     return _CAPTIONED[type(curves)](curves)
 
 

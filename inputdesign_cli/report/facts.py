@@ -22,7 +22,7 @@ from inputdesign_cli.report.numbers import Fact, enumerated, precise, shown, spo
 
 # Smaller relative gaps differ from machine to machine.
 _CLOSED = 1e-6
-# A plant whose ratio is larger by no more than this share errs as much as those that bind.
+# A plant whose ratio is larger by no more than this share errs as much as the binding plants.
 _AS_MUCH = 1e-4
 # An exact confidence is exceeded if more than this share is kept beyond what was asked.
 _ROOM = 0.005
@@ -72,7 +72,7 @@ def _value_and_cost(outcome: Outcome) -> Iterator[Fact]:
 
 
 def length(outcome: Outcome) -> int | None:
-    """Return the samples of the record; without one those of the experiment."""
+    """Return the samples of the record, or of the experiment if there is no record."""
     return outcome.samples if outcome.signal is None else outcome.signal.samples
 
 
@@ -381,7 +381,7 @@ def _signal(outcome: Outcome, signal: Signal) -> Iterator[str]:
 
 
 def _beside_the_design(found: Objective | None, signal: Signal) -> Iterator[str]:
-    """Yield how much larger the errors of the samples are than those of the design, or how much they cost."""
+    """Yield how much accuracy the samples lose, or how much more they cost, compared with the design."""
     if found is not None and found.kind == "accuracy_factor":
         more = 0.0 if signal.worst_ratio is None else signal.worst_ratio / found.value - 1.0
         if more >= _LITTLE_LESS:

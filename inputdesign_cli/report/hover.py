@@ -1,4 +1,4 @@
-"""The script of a page: it tells the values of curves where one points, or steps with the arrow keys.
+"""The script of a page: it shows the values of curves where one points, or steps with the arrow keys.
 
 Without it a page shows the same pictures and numbers.
 """

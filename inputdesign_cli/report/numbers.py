@@ -24,7 +24,7 @@ def shown(value: object) -> str:
 
 
 def precise(ratio: float) -> str:
-    """A ratio with four digits, but with as many as tell it from one."""
+    """Return a ratio with four digits, or with seven if it is above one but would read as one."""
     return f"{ratio:.7g}" if ratio > 1.0 + 1e-6 and f"{ratio:.4g}" == "1" else f"{ratio:.4g}"
 
 
@@ -45,5 +45,5 @@ def spoken(name: str) -> str:
 
 
 def provenance(environment: Mapping[str, object], more: Iterable[Fact] = ()) -> list[Fact]:
-    """Versions, and what else tells where numbers come from."""
+    """Return the versions, and further facts that show where numbers come from."""
     return [*more, *((name, str(version), "") for name, version in environment.items() if version)]

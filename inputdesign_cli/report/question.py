@@ -24,7 +24,7 @@ _SPECTRA = {
 
 @dataclass(frozen=True)
 class Question:
-    """What a spec asks, in words, and what a page has to know of the spec beside them."""
+    """Holds the question of a spec in words, and the facts of the spec that a page needs besides."""
 
     title: str
     sentences: tuple[str, ...]  # the system, the experiment, what is asked
@@ -35,7 +35,7 @@ class Question:
     asked: frozenset[str]  # the keys under `accuracy`
     family: str  # the type of the spectrum; empty for a given one
     seed: int  # of the signal
-    units: str  # of what the page shows
+    units: str  # of the values on the page
 
 
 def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:

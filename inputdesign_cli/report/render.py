@@ -52,8 +52,8 @@ def _filled(
 ) -> str:
     """Return the page about a directory.
 
-    It carries the SHA-256 of the file `record`, so that a reader can see whether it is about what stands
-    beside it, and the date of the record, so that the same run gives the same page.
+    It carries the SHA-256 of the file `record`, so that a reader can see whether it is about that file.
+    Its date is the date of the record, so that the same run gives the same page.
     """
     with readable(directory / record):
         digest = hashlib.sha256(read_regular(directory / record)).hexdigest()

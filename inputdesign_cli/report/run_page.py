@@ -28,7 +28,7 @@ from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 
-# Headings and the charts that belong under them; those of data and of simulated runs have their own.
+# Headings and the charts that belong under them; charts of data and of simulated runs have their own.
 _SECTIONS = (
     ("Accuracy", ("bound", "deviations", "fan")),
     ("The loop", ("nyquist",)),

@@ -38,9 +38,9 @@ class Bounds:
 
 
 def limiter_of(plant: FiniteRecord, settings: SignalSettings, bounds: Bounds) -> Limiter:
-    """What enforces the bounds on records of the length of the `plant`'s.
+    """Return the limiter that enforces the bounds on records of the length of the `plant`'s.
 
-    Limits on u are those of the record itself in open loop only.
+    Limits on u apply to the record itself in open loop only.
     """
     inputs, open_loop = plant.experiment.inputs, plant.experiment.loop is None
     amplitude, rate = (bounds.amplitude, bounds.rate) if open_loop else (None, None)
@@ -58,7 +58,7 @@ def limiter_of(plant: FiniteRecord, settings: SignalSettings, bounds: Bounds) ->
 def limited_responses(
     experiment: Experiment, bounds: Bounds, step: float, hold: int, frequencies: Array
 ) -> list[LimitedResponse]:
-    """From sinusoids of the values to each signal that is limited, in steady state, and its bound.
+    """Return responses of each limited signal to sinusoids of the values, in steady state, and its bound.
 
     `frequencies` (L,) are in rad per value. Of values that are held only the record itself is answered for.
     """
@@ -110,7 +110,7 @@ def _signals(plant: FiniteRecord, of: PowerKind, hold: int, bound: Array) -> Sig
 
 
 def _moves(signals: SignalConstraint) -> SignalConstraint:
-    """From one sample of each signal to the next, the first from rest."""
+    """Return the limit on the moves of each signal from one sample to the next, the first from rest."""
     return SignalConstraint(
         lambda values: np.diff(signals.apply(values), axis=0, prepend=0.0),
         lambda weights: signals.adjoint(weights - np.append(weights[1:], 0.0 * weights[:1], axis=0)),

@@ -21,7 +21,7 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class SignalConstraint:
-    """Signals (n, q) that are linear in the record, such as outputs, and the largest modulus (q,) of each.
+    """Signals (n, q) that are linear in the record, as outputs are, and the largest modulus (q,) of each.
 
     `adjoint` is the transpose of `apply`: it answers in the shape of the record.
     """
@@ -31,7 +31,7 @@ class SignalConstraint:
     bound: Array
 
     def tightened(self, factor: float) -> SignalConstraint:
-        """The same with this share of its bound."""
+        """Return the constraint with this share of its bound."""
         return SignalConstraint(self.apply, self.adjoint, factor * self.bound)
 
 

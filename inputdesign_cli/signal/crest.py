@@ -80,7 +80,7 @@ def _log_norm(
     if peak == 0.0:  # so few samples that all of them are zeros of the sinusoids: no phase is better
         return 0.0, np.zeros(phases.size)
     count = sum(record.size for record in records)
-    # Without those that do not matter: powers that underflow are slow.
+    # Leave out negligible values: powers that underflow are slow.
     least = _NEGLIGIBLE ** (1.0 / p)
     relative = [np.where(np.abs(record) < least * peak, 0.0, record / peak) for record in records]
     powers = [np.abs(record) ** (p - 2) * record for record in relative]

@@ -23,7 +23,7 @@ class DesignedSpectrum:
         power: the mean square, of all inputs together.
         step: time between samples in the unit of time of the frequencies (1 for rad/sample).
         density: maps frequencies (n,) to Phi, (n,) for one input, else (n, r, r); None for sinusoids.
-        sinusoids: of such a spectrum, frequencies in its own unit.
+        sinusoids: of a spectrum without a density, frequencies in its own unit.
         free: whether their frequencies were found, not given.
         autocovariances: (m + 1,) c_0 .. c_m of one input that a moving average can make.
     """
@@ -49,10 +49,10 @@ class DesignedSpectrum:
         return cls(inputs, power, step, partial(basis.density, x), autocovariances=moving_average)
 
     def lines(self, period: int, hold: int = 1) -> Lines:
-        """The sinusoids of a period of so many values, each held for `hold` samples; in rad per value.
+        """Return the sinusoids of `period` values, each held for `hold` samples, in rad per value.
 
-        Those of a spectrum of sinusoids have their own frequencies. Free ones that the period cannot tell
-        apart are one; those that the user gave are left as they are.
+        A spectrum of sinusoids keeps its own frequencies. Free ones that the period cannot resolve become
+        one; given ones stay unchanged.
         """
         step = hold * self.step
         if self.density is not None:

@@ -98,7 +98,7 @@ class Evaluator:
         known = self.plant.known
         gained = self.plant.information(samples) - known
         try:
-            if not known.any():  # ratios are those of standard deviations: they fall as the level grows
+            if not known.any():  # ratios are of standard deviations: they fall as the level grows
                 return self.target.worst_ratio(gained) or None
             return least_level(lambda level: self.target.worst_ratio(known + level**2 * gained), 1.0)
         except np.linalg.LinAlgError:  # too short to excite every parameter

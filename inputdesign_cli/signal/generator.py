@@ -66,10 +66,10 @@ class SignalGenerator:
 
     @cached_property
     def lines(self) -> Lines:
-        """Those of one block of values: a period of the multisine, as many as there are inputs.
+        """Return the lines of one block of values; a period of the signal consists of one or more blocks.
 
-        Lines of a design of sinusoids keep their own frequencies in a multisine of single samples that is
-        not repeated; otherwise they move to the nearest harmonics.
+        Lines of a design of sinusoids keep their own frequencies in a multisine of single samples that is not
+        repeated. Otherwise they move to the nearest harmonics.
         """
         settings, blocks = self.settings, 1
         if self.method == "multisine":

@@ -35,7 +35,7 @@ class HarmonicGrid:
 
     @property
     def frequencies(self) -> Array:
-        """(L,): of the lines, in rad/sample."""
+        """Return the frequencies (L,) of the lines, in rad/sample."""
         return self.at(self.excited)
 
     def at(self, harmonics: Harmonics) -> Array:
@@ -51,7 +51,7 @@ class HarmonicGrid:
 
 
 def thinned(candidates: Harmonics, group: int, rng: np.random.Generator) -> Harmonics:
-    """The candidates without one, at random, of each whole group of so many."""
+    """Return the candidates without one, at random, of each whole group of `group` candidates."""
     whole = candidates.size // group
     return np.asarray(np.delete(candidates, np.arange(whole) * group + rng.integers(group, size=whole)))
 
@@ -65,7 +65,7 @@ def nearest_harmonics(period: int, frequencies: Array, *, odd: bool) -> Harmonic
 
 
 def harmonics_between(period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> Harmonics:
-    """So many harmonics in a band (rad/sample), as even in the logarithm as the period lets them; or all.
+    """Return `lines` harmonics in a band (rad/sample), as even in the logarithm as can be; None: all.
 
     Raises:
         TooFewHarmonicsError: the band has fewer.

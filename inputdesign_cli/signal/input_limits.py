@@ -17,7 +17,7 @@ _ROUNDING = 1.0 + 1e-12
 
 @dataclass(frozen=True)
 class InputLimits:
-    """Bounds on the values of one input and on their moves, None where there is none, and its converter."""
+    """Bounds on the values of one input and on their moves, None if there is none, and its converter."""
 
     amplitude: float | None = None
     rate: float | None = None

@@ -15,7 +15,7 @@ _COARSE = 1e-3
 _WIDER = 1.5
 _GROWTH = 1.2
 _MOST_GROWTH = 40.0
-# A level that leaves more than this share of the figure gains nothing worth having; so many may.
+# A level that keeps more than this share of the figure gains too little; the second number may do so.
 _WORTH = 0.998
 _PATIENCE = 4
 _NOTHING, _PLENTY = 1e-9, 1e30

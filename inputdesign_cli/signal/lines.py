@@ -25,7 +25,7 @@ class Lines:
     period: int | None = None
 
     def scaled(self, factor: float) -> Lines:
-        """The same with all powers multiplied."""
+        """Return the lines with all powers multiplied by `factor`."""
         return Lines(self.frequencies, factor * self.powers, self.period)
 
     @property
@@ -73,11 +73,11 @@ class Lines:
 
 
 def merged(lines: Lines, samples: int) -> Lines:
-    """Lines that a record of so many samples cannot tell apart as one each, with the sum of their powers.
+    """Merge lines that a record of this number of samples cannot resolve, and add up their powers.
 
-    The exchange finds the same optimal frequency several times over, to within rounding; in a record such
-    lines would beat. Those that it cannot tell from 0 or pi become constant or alternating: over the record
-    they have no phase, and with a random one might vanish.
+    The exchange finds the same optimal frequency several times over, to within rounding; in a record these
+    lines would beat. Lines that it cannot distinguish from 0 or pi become constant or alternating. Over the
+    record they have no phase, and with a random one might vanish.
     """
     order = np.argsort(lines.frequencies)
     w, powers, total = lines.frequencies[order], lines.powers[order], lines.totals[order]

@@ -90,7 +90,7 @@ def block_vectors(lines: Lines, block: int) -> ComplexArray:
 
 
 def _sinusoids(lines: Lines, vectors: ComplexArray, samples: int) -> Array:
-    """(samples, r): the sum of sinusoids whose mean squares are those of `vectors` (L, r)."""
+    """Return (samples, r), the sum of sinusoids with the mean squares of `vectors` (L, r)."""
     if lines.period is None:
         amplitude = np.where(lines.real, 1.0, np.sqrt(2.0))[:, None] * vectors
         return np.concatenate(

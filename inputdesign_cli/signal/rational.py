@@ -1,7 +1,7 @@
 """Low-order rational filters from the taps of a causal factor, stable by construction.
 
 The taps h_0 .. h_L are the impulse response of a filter of many states, a tapped delay line. Their Hankel
-matrix, with h_{i+j+1} in block (i, j), takes past inputs to future outputs. Its singular values tell how much
+matrix, with h_{i+j+1} in block (i, j), takes past inputs to future outputs. Its singular values show how much
 each state carries, and keeping the largest is a balanced truncation ([pernebo-silverman-1982]), whose poles
 lie inside the unit circle. The model is read off the singular vectors as in [kung-1978].
 """

@@ -19,7 +19,7 @@ from inputdesign_cli.signal.shift_register import shifted_sequences
 _EXCITED = 1e-9
 _DIGITS = 13
 _MIDDLE = (0.05, 0.95)
-# Of more lines phases are not optimised: those of Schroeder are nearly as good.
+# With more lines, phases are not optimised: Schroeder's are nearly as good.
 _OPTIMISED = 2000
 
 
@@ -65,7 +65,7 @@ def chirp(samples: int, band: tuple[float, float]) -> Array:
 
 
 def steps(number: int, samples: int, inputs: int, rng: np.random.Generator) -> Array:
-    """(samples, inputs) from -1 to 1: so many levels, evenly spread, each for as long, in random order."""
+    """Return (samples, inputs) from -1 to 1: `number` even levels, each for as long, in random order."""
     levels = np.linspace(-1.0, 1.0, number)
     which = np.minimum(np.arange(samples) * number // samples, number - 1)
     return np.stack([rng.permutation(levels)[which] for _ in range(inputs)], axis=1)

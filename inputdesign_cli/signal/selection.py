@@ -103,7 +103,7 @@ def _hopeless(ratios: Sequence[float], samples: int) -> bool:
 
 
 def _stream(seed: int, number: int) -> np.random.Generator:
-    """Of the candidate of this number: the child that `SeedSequence.spawn` would make."""
+    """Return the generator of this candidate: the child that `SeedSequence.spawn` would make."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
 
 

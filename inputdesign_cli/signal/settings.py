@@ -92,7 +92,7 @@ class SignalSettings:
 
     @property
     def vectors(self) -> LineVectors:
-        """Of the lines of a multisine over the inputs, see `multisine_record`."""
+        """Return how lines of a multisine are distributed over the inputs, see `multisine_record`."""
         return "random" if self.phases == "random" else "orthogonal"
 
     def period(self, samples: int) -> int:

@@ -15,7 +15,7 @@ from inputdesign_cli.compute.time_limit import time_is_over
 
 _MOST_CHANGES = 3
 _SHIFTED = 0.6  # the share of the changes that shift a switch; the others add or remove one
-# After each so many tries, or sixth of them: would as much gained again and again be enough?
+# After this number of tries, or a sixth of all: would the same gain, repeated, be enough?
 _STRETCH, _STRETCHES = 100, 6
 
 

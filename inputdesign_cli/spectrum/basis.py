@@ -47,7 +47,7 @@ class Functional:
 
 
 def kept_on_grid(density: Callable[[Array], NDArray]) -> Callable[[Array], NDArray]:
-    """The same function, whose values at the last of the largest arrays it was given are kept."""
+    """Return the function with a memory of its values at the last of the largest arrays."""
     last: list[tuple[Array, NDArray]] = []
 
     def known(w: Array) -> NDArray:
@@ -62,7 +62,7 @@ def kept_on_grid(density: Callable[[Array], NDArray]) -> Callable[[Array], NDArr
 
 
 def weighted_mean(functionals: Sequence[Functional], weights: Array) -> Functional:
-    """sum_i w_i f_i over those of nonzero weight, `weights` (n,) with the sum one."""
+    """Return sum_i w_i f_i over nonzero weights, `weights` (n,) with the sum one."""
     parts = [(f, float(w)) for f, w in zip(functionals, weights, strict=True) if w != 0.0]
     last: list[tuple[Array, NDArray]] = []
 
@@ -80,7 +80,7 @@ class Face:
     """A part of the cone of spectra, small enough for a solver: x = columns y with y in a simple cone.
 
     `columns` is (size, number); `kind` says that y is a nonnegative vector or svec of a positive
-    semidefinite matrix of order `order`. `generators` is the basis' own record of what spans it.
+    semidefinite matrix of order `order`. `generators` is the basis' own record of the spectra that span it.
     """
 
     columns: Array
@@ -102,13 +102,13 @@ class Pricing:
 
 
 class Basis(Protocol):
-    """A linear family of spectra, x (size,) -> Phi, with the cone of those that are nonnegative.
+    """A linear family of spectra, x (size,) -> Phi, with the cone of its nonnegative members.
 
     The cone is never handed to a solver whole. A design starts on `first_face` and enlarges it where
     `price` shows that a spectrum outside of it would pay.
 
     A family has a density over frequency, or it consists of sinusoids; the other of `density` and `lines` is
-    then empty. Densities of one input are (n,), those of r inputs Hermitian (n, r, r).
+    then empty. Densities of one input are (n,), of r inputs Hermitian (n, r, r).
     """
 
     @property
@@ -146,7 +146,7 @@ class Basis(Protocol):
 
     @property
     def even(self) -> Array:
-        """(size,): the same of total power one, even over the channels."""
+        """Return `spread` of total power one, (size,), even over the channels."""
 
     def in_units(self, units: Array) -> Basis:
         """The family for channels of these units (r,); only where that changes where a design begins."""
@@ -184,7 +184,7 @@ class Basis(Protocol):
         """The type of the family and what it takes to restate the spectrum, as plain data and arrays.
 
         Args:
-            unit: what frequencies are divided by to be those of the user.
+            unit: frequencies are divided by it to be in the user's unit.
         """
 
 
@@ -210,17 +210,17 @@ class DensityFamily:
         return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
-        """None: there are no sinusoids."""
+        """Return no lines: there are no sinusoids."""
         return np.zeros(0), np.zeros((0, self.inputs, self.inputs), dtype=complex)
 
     def moving_average(self, x: Array) -> Array | None:
-        """None: no finite one."""
+        """Return None: there is no finite moving average."""
         return None
 
     def beyond(self, number: int) -> Self:
-        """None: such a family does not grow."""
+        """Raise `ValueError`: a family with a density does not grow."""
         raise ValueError("a family with a density does not grow")
 
     def in_units(self, units: Array) -> Self:
-        """Itself: units do not matter."""
+        """Return the family itself: units do not matter."""
         return self

@@ -24,16 +24,16 @@ WeightedSums = Callable[[NDArray, NDArray, Array], NDArray]
 
 
 def matrices(density: NDArray) -> NDArray:
-    """Values (n,) of a density for one input as (n, 1, 1); Hermitian values (n, r, r) as they are."""
+    """Return values (n,) of a density for one input as (n, 1, 1), and values (n, r, r) unchanged."""
     return density[:, None, None] if density.ndim == 1 else density
 
 
 def integrand(density: Density, factor: Factor | None, inputs: int) -> tuple[Values, WeightedSums]:
-    """What to compute at the nodes of a rule, and how to sum it against a table of functions.
+    """Return the values to compute at the nodes of a rule, and how to sum them against a table of functions.
 
     The sums, of the table (n, functions), of the values at n nodes and of the weights (n,), are
     sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r). With a `factor` F of D, D = F^* F, the
-    values are those of F.
+    values belong to F.
     """
     if factor is not None and inputs > 1:
         return factor, _summed_products
@@ -85,7 +85,7 @@ def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
     each = np.einsum("naa->na", price).real
     size = each.sum(axis=1)
     free = size <= _NOTHING
-    # Channel by channel: a share of what a dear one costs would be many times the price of a cheap one.
+    # Channel by channel: a share of the price of a dear one would be many times the price of a cheap one.
     little = _SINGULAR * np.where(each > 0.0, each, size[:, None]) + free[:, None]
     P = price + little[:, :, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))

@@ -46,7 +46,7 @@ class FirBasis(DensityFamily):
 
     @property
     def degree(self) -> int:
-        """That of the trigonometric polynomial."""
+        """Return the degree of the trigonometric polynomial."""
         return self.order
 
     def spread(self, powers: Array) -> Array:

@@ -45,7 +45,7 @@ class FlatBasis(DensityFamily):
         return level if self.inputs == 1 else level[:, None, None] * np.eye(self.inputs, dtype=complex)
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """(1,): v^* Phi v inside the band, the same for every direction v of length one."""
+        """Return v^* Phi v inside the band, (1,); it does not depend on the direction v of length one."""
         return np.array([self.level])
 
     def integrals(
@@ -61,7 +61,7 @@ class FlatBasis(DensityFamily):
         return integrate_band(source, sums, singularities, self.band)
 
     def coarser(self) -> list[FlatBasis]:
-        """None."""
+        """Return no coarser basis."""
         return []
 
     def first_face(self, price: Functional) -> Face:

@@ -1,6 +1,6 @@
 """Spectra with a Gram matrix: Phi(w) = B(w) Q B(w)^*, Q >= 0, for a fixed row of functions B(w).
 
-What such families share: the cone, its faces, and the price of what lies outside of a face.
+These families share the cone, its faces, and the price of spectra outside of a face.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class GramBasis(DensityFamily, ABC):
 
     @property
     def degree(self) -> int:
-        """That of the polynomial."""
+        """Return the degree of the polynomial."""
         return self.order
 
     @property
@@ -68,7 +68,7 @@ class GramBasis(DensityFamily, ABC):
 
     @abstractmethod
     def of_order(self, order: int) -> Self:
-        """The same family with a lower order; its x is the head of ours."""
+        """Return the family with a lower order; its x is the head of ours."""
 
     def coarser(self) -> list[Self]:
         """Lower orders, each about half the next, whose optimum is a good start for this one."""
@@ -134,7 +134,7 @@ def _units(metric: NDArray) -> Array:
 
 
 def _independent(vectors: NDArray) -> NDArray:
-    """The same span over the real numbers, by orthonormal vectors."""
+    """Return an orthonormal basis of the span over the real numbers."""
     if not np.iscomplexobj(vectors):
         return np.asarray(scipy.linalg.qr(vectors, mode="economic")[0])
     q = scipy.linalg.qr(np.concatenate([vectors.real, vectors.imag]), mode="economic")[0]

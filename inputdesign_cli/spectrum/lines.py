@@ -26,7 +26,7 @@ from inputdesign_cli.spectrum.directions import (
 _FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
 # New atoms a round: for each input, and in all. The best few get company (see `_around`).
 _NEW_EACH, _MOST_NEW, _MOST_ACCOMPANIED = 16, 64, 16
-# From so many atoms on, so many of the most power stay.
+# Beyond the first number of atoms, the second number stay, with the most power.
 _MOST_ATOMS, _KEPT_ATOMS = 320, 200
 _ATOMS_AT_ONCE = 256
 # Two atoms at one frequency are the same when their directions agree this closely.
@@ -42,7 +42,7 @@ _FREE = 1e-12
 class LinesBasis:
     """The unknowns are the powers of atoms: sinusoids at `frequencies` (L,) along `directions` (L, r).
 
-    Directions have length one, so that the power is the total over the channels; they are told apart in
+    Directions have length one, so that the power is the total over the channels; they are compared in
     `units` (r,) of the channels. The basis grows by
     the atoms that would pay: anywhere on the grid when `free`, else at `allowed` frequencies with any
     direction. Prices then hold for every spectrum, or for every spectrum on those lines.
@@ -105,7 +105,7 @@ class LinesBasis:
         return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def coarser(self) -> list[LinesBasis]:
-        """None: lines are cheap."""
+        """Return no coarser basis: lines are cheap."""
         return []
 
     def spread(self, powers: Array) -> Array:
@@ -166,7 +166,7 @@ class LinesBasis:
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
         """The atoms so far and the new ones; x of the old basis is the head of x of the new.
 
-        Of very many atoms those of the least power leave the face. What pays of them comes back.
+        Of very many atoms the ones of least power leave the face. They come back when they pay.
         """
         number = face.generators
         power = np.zeros(self.size)
@@ -230,7 +230,7 @@ class LinesBasis:
         return np.abs(one.conj() @ other / size) ** 2
 
     def moving_average(self, x: Array) -> Array | None:
-        """None: sinusoids have no density."""
+        """Return None: sinusoids have no density."""
         return None
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:

@@ -38,7 +38,7 @@ class MatrixFirBasis(GramBasis):
         return flat
 
     def of_order(self, order: int) -> MatrixFirBasis:
-        """The same with a lower order."""
+        """Return the basis with a lower order."""
         return MatrixFirBasis(self.inputs, order)
 
     def autocovariances(self, x: Array) -> NDArray[np.float64]:

@@ -54,7 +54,7 @@ class PolynomialBasis(GramBasis):
         return hvec(flat.astype(complex)) if self.hermitian else svec(flat)
 
     def of_order(self, order: int) -> PolynomialBasis:
-        """The same with a lower order."""
+        """Return the basis with a lower order."""
         return replace(self, order=order)
 
     def functions(self, w: ArrayLike) -> Array:

@@ -43,9 +43,10 @@ class TabulatedSpectrum(DensityFamily):
         return self.phi.shape[1]
 
     def raised(self, share: float) -> TabulatedSpectrum:
-        """The table with this share of what every second row misses of the others added to all rows.
+        """Return the table with a `share` of its interpolation error added to all rows.
 
-        Errors are taken by their size, so that those at different frequencies do not cancel.
+        The error is found by interpolation from every second row to the others. It is taken by its size, so
+        that errors at different frequencies do not cancel.
         """
         rows = np.unique([*range(0, self.frequency.size, 2), self.frequency.size - 1])
         missed = self.phi - TabulatedSpectrum(self.frequency[rows], self.phi[rows])._at(self.frequency)

@@ -28,7 +28,7 @@ _DRAWN = (
     "  fresh: 200",
 )
 _FIRST = "{type: fir, order: 20}"
-# Answers that go with every other, in place of those that are not asked yet.
+# Answers that go with every other, in place of answers that are not asked for yet.
 _MEANWHILE = {
     "plant": "heater",
     "wish": "prediction within 5 % up to 1",

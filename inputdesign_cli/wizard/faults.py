@@ -50,7 +50,7 @@ _PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum
 _LINES_THERE = re.compile(r"holds (\d+) .* (\d+) are asked")
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 _QUIETER = re.compile(r"less of a margin than (\w+): ([\d.]+) .*such as \w+: ([\d.]+)")
-# How a margin that is weaker than a first value, such as a second one, is asked for.
+# How to ask for a margin that is weaker than a first value, for example a second one.
 _WEAKER = {
     "max_sensitivity_db": ("more than {} dB", "{} dB"),
     "phase_margin": ("less than {} degrees", "{} degrees"),

@@ -19,7 +19,7 @@ _MADE = {"multisine": "  # how samples are made of the spectrum: sinusoids as de
 _LEAST_BITS, _MOST_BITS = 2, 32
 DRIFTING = (1.0, -0.8)  # C of noise that drifts
 _SAME_STEP = 0.01  # of rows and samples
-_WHITE = 3.0  # correlations above so many deviations of chance colour the noise
+_WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
 
 

@@ -16,7 +16,7 @@ from inputdesign_cli.wizard.questions import bad_answer, file_of
 from inputdesign_cli.wizard.stated_plants import TEMPLATES, PlantAnswer, plant_of_words, system_of
 
 _LEAST_ROWS = 10  # of a step response
-_LONGER = 2.0  # a time constant of so many records is none
+_LONGER = 2.0  # a time constant of more records than this is none
 _GAP = 1.5  # sample times from one row to the next: a sample is missing
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")

@@ -17,7 +17,7 @@ from inputdesign_cli.wizard.faults import in_their_words
 
 # From the simplest on; sinusoids no more than half the samples.
 _ORDERS, _LINES = (20, 40), (60, 120, 240)
-_ENOUGH = 1.02  # of what every spectrum reaches
+_ENOUGH = 1.02  # of the bound over every spectrum
 _LEAST_GAP = 1e-3  # smaller gaps are written as this
 _BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
 

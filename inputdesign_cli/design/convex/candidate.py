@@ -1,9 +1,9 @@
-"""Designs that meet everything: an iterate of the exchange, repaired by scaling or by mixing.
+"""Make an iterate of the exchange meet all requirements and limits, by scaling or by mixing.
 
-A relaxed optimum misses a little of what it was not told about. Where scaling up only helps (no limits,
-or limits that scale along), the smallest sufficient factor repairs it. Otherwise it is mixed with a
-design that meets everything strictly: the miss is convex along the way, so that its chord already leads
-to a design that is good enough, and a few steps find the best mixture.
+The optimum of a relaxation violates a little the constraints that it does not contain. If scaling up only
+helps (no limits, or limits that scale along), the smallest sufficient factor repairs it. Otherwise it is
+mixed with a design that meets everything strictly. The violation is convex along the way. Its chord already
+leads to a design that is good enough, and a few steps find the best mixture.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ _TINY = np.finfo(float).tiny
 class Certificate:
     """A proved lower bound on the objective, and the dual point that proves it.
 
-    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled such that
+    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that
     price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
     the spectra for which that is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of
     which the largest is paid.
@@ -143,7 +143,7 @@ def _certified(
 
 
 def _kept(rows: Sequence[Row], weights: Array, share: float) -> Array:
-    """The weights with a `share` of what all upper limits take added to each limit on a power."""
+    """Return the weights, raised for each power limit by a `share` of the weighted sum of upper bounds."""
     if not len(rows):
         return weights
     powers = np.array([row.upper and row.limit is not None for row in rows])

@@ -29,7 +29,7 @@ class Cone(ABC):
 
     @abstractmethod
     def look(self, at: Array) -> float:
-        """Evaluate S(at); returns the largest entry of what the slack misses of it.
+        """Evaluate S(at) and return the largest entry of its difference from the slack.
 
         Raises:
             LinAlgError: the slack has left the cone.
@@ -65,7 +65,7 @@ class Cone(ABC):
 
     @abstractmethod
     def multipliers(self) -> list[Array]:
-        """Z, one array for each of what the block was made of."""
+        """Return the multipliers Z, one array for each part of the block."""
 
 
 class Orthant(Cone):
@@ -255,6 +255,6 @@ def reach(values: Array, steps: Array) -> float:
 
 
 def furthest(changes: Stack) -> float:
-    """The same for matrices I + share * change."""
+    """Return the largest share for which all matrices I + share * change are positive semidefinite."""
     least = float(np.linalg.eigvalsh(changes)[:, 0].min())
     return -1.0 / least if least < 0.0 else np.inf

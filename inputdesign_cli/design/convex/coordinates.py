@@ -1,4 +1,4 @@
-"""Coordinates that suit a design: those in which white excitation, or what it starts from, gives M = I."""
+"""Coordinates in which white excitation, or the spectrum a design starts from, gives M = I."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ def _restated(problem: Problem, question: Question, coordinates: Sequence[Experi
 
 
 def suited(problem: Problem, question: Question, start: Array) -> Problem:
-    """The problem in coordinates where `start` gives M = I, if flat excitation does not suit it.
+    """Return the problem in coordinates where `start` gives M = I, if flat excitation does not suit it.
 
-    A pole next to the unit circle may dominate what flat excitation tells: lines away from it then tell
-    little of all parameters, and yet tell them apart. Otherwise, the problem itself.
+    A pole next to the unit circle may dominate the information of flat excitation. Lines away from it then
+    add little information on any parameter, and yet identify them all. Otherwise, return the problem itself.
     """
     informations = problem.informations(start)
     if np.all(np.linalg.cond(informations) < _UNSUITED):
@@ -91,10 +91,13 @@ def suited(problem: Problem, question: Question, start: Array) -> Problem:
 
 
 def _suited_to(problem: Problem, experiment: Experiment, information: Array, start: Array) -> Experiment:
-    """One plant's experiment in such coordinates; `information` (k, k) is what `start` tells of it."""
+    """Return one plant's experiment in coordinates where `start` gives M = I, if M is ill-conditioned.
+
+    `information` (k, k) is M of `start` in the present coordinates.
+    """
     if np.linalg.cond(information) < _UNSUITED:
         return experiment
-    # Parameters in units of their own: of what the start tells, and only by their sizes.
+    # Scale each parameter by its own information from the start.
     unit = np.diag(np.sqrt(np.maximum(np.diag(experiment.to_raw(information)), _FAINT)))
     in_units = replace(experiment, factor=unit)
     scaled = replace(problem, experiment=in_units, others=(), finer=None).information(start)

@@ -16,9 +16,9 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, joint_noise
 
 RequirementFactory = Callable[[Experiment], Requirement]
-# So many scenarios are enough for a next step: what serves the worst few serves most of the others.
+# This number of scenarios is enough for a next step: what serves the worst few serves most of the others.
 FEW = 4
-# Maxima from this share of what is looked for on are noted, so that a small step needs no other search.
+# Maxima above this share of the level searched for are noted, so that a small step needs no other search.
 _NEARLY = 0.99
 
 
@@ -101,7 +101,7 @@ class Demands:
 
     @cached_property
     def noise_informations(self) -> NDArray[np.float64]:
-        """(S, k, k): what the noise alone tells of each scenario, whatever is asked."""
+        """Return the information (S, k, k) of the noise alone for each scenario, whatever is asked."""
         return joint_noise([scenario.experiment for scenario in self.scenarios])
 
     def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
@@ -122,7 +122,7 @@ class Demands:
         return any(asked.requirement.definite for asked in self.asked)
 
     def requirement(self, index: int) -> Requirement:
-        """By the index that `violations` gives."""
+        """Return the requirement with the index that `violations` gives."""
         return self.asked[index].requirement
 
     def violations(
@@ -133,11 +133,11 @@ class Demands:
         side: bool = False,
         few: int | None = None,
     ) -> list[tuple[int, Violation]]:
-        """All local maxima of all requirements' ratios, each with the index of its requirement in `asked`.
+        """Return the local maxima of all ratios, each with the index of its requirement in `asked`.
 
         Args:
             side: look at the side requirements, not at the others.
-            few: so many scenarios with violations are enough; those that were worst before are first.
+            few: stop after this number of scenarios with violations; the worst ones before are first.
         """
         if len(self.scenarios) == 1:
             return list(self._violated(0, informations[0], above, side))
@@ -185,7 +185,7 @@ class Demands:
     def _violated(
         self, number: int, information: Array, above: float, side: bool
     ) -> Iterator[tuple[int, Violation]]:
-        """Those of one scenario."""
+        """Yield the violations of one scenario, each with the index of its requirement."""
         for index in self._asked_of[number]:
             if self.asked[index].side == side:
                 for violation in self.asked[index].requirement.violations(information, above=above):

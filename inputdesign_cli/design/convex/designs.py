@@ -29,13 +29,13 @@ _FAR_BELOW = 1e-12
 
 @dataclass(frozen=True)
 class Design:
-    """A design and what it is compared with.
+    """A design and the designs it is compared with.
 
-    `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even
-    over the inputs and meets the same requirements (or exhausts the same limits); `white_power` is its power,
-    `white_within` tells whether it keeps to the limits. `any_spectrum` is the same problem over all
-    spectra; its certificate bounds every excitation whatever (limits on the density left out). None where
-    it was not asked for, or there was no time for it.
+    `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even over
+    the inputs and meets the same requirements (or exhausts the same limits). `white_power` is its power;
+    `white_within` says whether it keeps to the limits.
+    `any_spectrum` solves the same problem over all spectra. Its certificate bounds every excitation whatever
+    (limits on the density left out). It is None if it was not asked for or if time ran out.
     """
 
     problem: Problem
@@ -53,7 +53,7 @@ class UnfinishedDesignError(OutOfTimeError):
 
     @classmethod
     def of(cls, design: Design) -> UnfinishedDesignError:
-        """The error that tells what the design reaches."""
+        """Return the error that states how good the design is, and holds it."""
         error = cls(_stopped(design).diagnostics)
         error.design = design
         return error
@@ -68,7 +68,7 @@ def solve_design(
         any_spectrum_tolerance: None leaves out the bound over every spectrum.
 
     Raises:
-        SpecError: `not-identifiable` when no excitation can tell some parameters apart;
+        SpecError: `not-identifiable` when no excitation identifies all parameters;
             `too-few-lines` when the given lines cannot.
         UnreachableError: the requirements cannot be met within the limits.
         UnfinishedDesignError: with the best design so far.
@@ -138,7 +138,7 @@ def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
 
 
 def _stopped(design: Design) -> OutOfTimeError:
-    """The error that tells the best design so far and what is proved of all others."""
+    """Return the error that states the best design so far and the proved bound on all others."""
     problem = design.problem
     value, bound = design.result.objective, design.result.certificate.bound
     criterion = problem.demands.criterion

@@ -43,7 +43,7 @@ class UnfinishedError(OutOfTimeError):
 
     @classmethod
     def of(cls, ended: OutOfTimeError, found: ExchangeResult) -> UnfinishedError:
-        """The error that says the same, with what was found."""
+        """Return an error with the same diagnostics that holds the result found so far."""
         error = cls(ended.diagnostics)
         error.found = found
         return error
@@ -54,7 +54,7 @@ class ExchangeResult:
     """A spectrum `x` of `basis` that meets everything, its information, and the proved bound.
 
     `objective` is what was minimised: the cost, or s (see `Problem`); `certificate.bound` is its proved
-    lower bound. `informations` (S, k, k) are the M_s(x); for the goal "samples" those of the s samples.
+    lower bound. `informations` (S, k, k) are the M_s(x); for the goal "samples" they belong to s samples.
     """
 
     basis: Basis
@@ -69,7 +69,7 @@ class ExchangeResult:
 
     @property
     def information(self) -> Array:
-        """(k, k): that of the nominal plant."""
+        """Return the information (k, k) of the nominal plant."""
         return self.informations[0]
 
     @property
@@ -107,7 +107,7 @@ def exchange(
         tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
             when the solver makes no more progress: its `gap` says so.
         enough: stop already when it says so of (objective, bound).
-        known: places that are likely to bind, such as those of a like design: cuts to begin with.
+        known: places that are likely to bind, for example from a similar design: cuts to begin with.
 
     Raises:
         UnfinishedError: with what was reached.
@@ -139,7 +139,7 @@ def exchange(
                 asked *= _FINER
                 continue
             if stalled and state.gap > goal and not state.dense:
-                # Of multipliers of very different sizes the dense method tells more digits.
+                # The dense method finds more digits of multipliers of very different sizes.
                 state.dense = True
                 gaps.clear()
                 continue

@@ -1,4 +1,4 @@
-"""Can the sinusoids that a spectrum may have tell all parameters apart at all?"""
+"""Test whether the sinusoids that a spectrum may have can identify all parameters."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def check_excites(problem: Problem, start: Array) -> None:
 def _check_reachable(problem: Problem, start: Array) -> None:
     """Raise `InfeasibleError` when no power of these lines is enough: they excite too few directions.
 
-    What the noise alone tells keeps the information matrix regular then, but does not grow with power.
+    The noise alone then keeps the information matrix regular, but its part does not grow with power.
     """
     if problem.goal != "cost" or problem.basis.has_density:
         return

@@ -14,11 +14,11 @@ _ROUNDING, _FAINT = 1e-12, 1e-9
 
 
 def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:
-    """The same design without the sinusoids that together hardly change its information.
+    """Return the design without the sinusoids that together hardly change its information.
 
-    The solver leaves a little power everywhere. Power alone does not tell what can go: in a loop with
-    integral action power near frequency zero is almost free of charge, and dwarfs that of lines that matter.
-    Where the cost is sought the other lines make up for those that go.
+    The solver leaves a little power everywhere. Power alone does not show which lines can go. In a loop with
+    integral action, power near frequency zero costs almost nothing and far exceeds that of lines that matter.
+    If the cost is minimised, the other lines make up for the removed ones.
     """
     if found.basis.has_density or problem.has_floors or not found.x.any():
         return found

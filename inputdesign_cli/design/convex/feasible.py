@@ -25,7 +25,7 @@ _PLENTY = 1e4
 class UnreachableError(Exception):
     """The requirements cannot be met within the limits.
 
-    `nearest` solves `problem` (goal "factor"), the best accuracy within the limits: the least s > 1 such that
+    `nearest` solves `problem` (goal "factor"), the best accuracy within the limits: the least s > 1 for which
     s times its information meets them, so that every error must be loosened by sqrt(s), with its certificate.
     `within` keeps to all limits with room to spare, where some are lower ones. With `limits_alone` it is the
     lower limits that contradict the upper ones, whatever the accuracy.

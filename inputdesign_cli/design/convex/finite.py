@@ -100,7 +100,7 @@ def solve_program(
 
 
 def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | None:
-    """By a general conic solver, with M among the unknowns: without it two digits of the multipliers go."""
+    """Solve by a general conic solver, with M among the unknowns: else the multipliers lose two digits."""
     k, entries, n = program.size, svec_length(program.size), program.cost.size
     inside, scaled = program.face.columns.shape[1], int(program.unit is not None)
     number = n - scaled
@@ -158,7 +158,10 @@ def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | No
 
 
 def by_interior(program: FiniteProgram, *, tolerance: float) -> tuple[FiniteSolution | None, float]:
-    """By the dense interior-point method: its best iterate, None where it had none, and the error of that."""
+    """Solve by the dense interior-point method; return its best iterate and the error of that iterate.
+
+    The iterate is None if the method has none.
+    """
     n, inside = program.cost.size, program.face.columns.shape[1]
     parts = [_seen(program, matrix) for matrix in program.matrices]
     share = 1.0 / max(sum(cone.degree for seen, _ in parts for cone in seen.cones), 1)

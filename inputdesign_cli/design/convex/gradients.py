@@ -34,7 +34,7 @@ class Gradients:
         return graded_grid(nominal.singularities, *nominal.band)
 
     def grid_of(self, scenarios: Sequence[int]) -> Array:
-        """The same for the densities of these scenarios together."""
+        """Return the common frequency grid for the densities of these scenarios together."""
         others = frozenset(scenarios) - {0}
         if not others:
             return self.grid

@@ -43,7 +43,7 @@ class QuadraticDesign:
 
     @property
     def real(self) -> QuadraticDesign:
-        """The same for the real and imaginary parts of H, one above the other."""
+        """Return the problem for the real and imaginary parts of H, one above the other."""
         if not np.iscomplexobj(self.maps):
             return self
         return QuadraticDesign(

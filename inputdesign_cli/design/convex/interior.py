@@ -1,11 +1,11 @@
-"""A primal-dual interior-point method for the finite programs of the exchange, on dense blocks.
+"""Solve the finite programs of the exchange by a primal-dual interior-point method on dense blocks.
 
-minimise q^T v subject to S_b(v) in its cone for every block b, with a multiplier Z_b each. Directions are
-those of [helmberg-1996], with the corrector of [mehrotra-1992]. Many matrix inequalities
-hold the same M(v): their part of the linear system is summed over them, as a matrix of the entries of M, and
-only then taken to the unknowns, so that one inequality more costs next to nothing. A general
-solver takes all unknowns through each of them. Smooth concave functions of M (determinant, inverse trace) are
-taken as they are, with their curvature, not by matrix inequalities of twice the order.
+A program minimises q^T v subject to S_b(v) in its cone for every block b, with a multiplier Z_b each. The
+directions come from [helmberg-1996], with the corrector of [mehrotra-1992]. Many matrix inequalities hold the
+same M(v). Their part of the linear system is summed over them, as a matrix of the entries of M, and only then
+taken to the unknowns. A further inequality therefore costs next to nothing. A general solver takes all
+unknowns through each of them. Smooth concave functions of M (determinant, inverse trace) enter with their
+curvature, not by matrix inequalities of twice the order.
 
 Its answer is a suggestion like any solver's: the bound is evaluated from the multipliers by `certificate`.
 """
@@ -33,7 +33,7 @@ _ROUNDING = 1e-5  # errors below this are as likely rounding
 
 @dataclass(frozen=True)
 class Seen:
-    """Blocks of a = `offset` (e,) + `gains` (e, n) v: those of one information matrix."""
+    """Blocks that depend on one information matrix, through a = `offset` (e,) + `gains` (e, n) v."""
 
     cones: Sequence[Cone]
     offset: Array
@@ -59,7 +59,7 @@ def follow_path(
         q: (n,) the cost.
         start: (n,) unknowns inside of their cones.
         direct: blocks of v.
-        through: blocks of what is linear in v; their multipliers follow those of `direct`.
+        through: blocks of an a that is linear in v; their multipliers follow the ones of `direct`.
 
     Raises:
         InaccurateError: `out-of-time`.

@@ -29,7 +29,7 @@ class PowerLimit:
     scenario: int = 0
 
     def everywhere(self, limits: Sequence[PowerLimit]) -> list[int]:
-        """The numbers of those of the limits that are the same at one plant or another."""
+        """Return the indices of the limits that differ from this one at most in their scenario."""
         return [index for index, other in enumerate(limits) if replace(other, scenario=self.scenario) == self]
 
     @property

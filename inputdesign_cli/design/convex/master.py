@@ -28,7 +28,7 @@ _SOLVER_MARGIN = 1e-2
 _SOLVER_FLOOR = 1e-10
 _SINGULAR = 1e-14
 _AT_ONCE = 256  # basis functions
-# Shares of a cost below this one, of the largest, are those of rounding.
+# Shares of a cost below this fraction of the largest are rounding errors.
 _NO_SHARE = 1e-9
 # Without a requirement that keeps M definite, weak directions are not blown up beyond this.
 _INDEFINITE = 1e-3
@@ -69,10 +69,10 @@ class Implied:
 
 @dataclass(frozen=True)
 class Proof:
-    """What the multipliers of one round suggest, in the problem's own units.
+    """Holds the multipliers of one round, in the problem's own units.
 
-    `cuts` holds what each cut implies, whatever the solver did; `rows` (number of rows,) are nonnegative
-    weights of the limits, `costs` those of the costs of which the largest is paid, with the sum one.
+    `cuts` holds what each cut implies, whatever the solver did. `rows` (number of rows,) are nonnegative
+    weights of the limits. `costs` are weights, with the sum one, of the costs of which the largest is paid.
     """
 
     cuts: tuple[Implied, ...]
@@ -107,11 +107,11 @@ def solve_master(
     keep: bool = False,
     dense: bool = False,
 ) -> MasterSolution | None:
-    """Solve one finite program; None when the solver has no point to show.
+    """Solve one finite program; return None when the solver has no point to show.
 
     Args:
         best: the best design so far, which sets the scales.
-        rough: a tolerance that will do where it saves many steps: those of a large program.
+        rough: a tolerance that is enough where it saves many steps, as in a large program.
         keep: let any multiple of the best spectrum be added to the face, so that the program stays
             feasible where scaling up is no remedy.
         dense: see `solve_program`.
@@ -176,7 +176,7 @@ def solve_master(
 
 
 def _shares(weights: Array) -> Array:
-    """Of several costs, with the sum one; a single one has it all."""
+    """Return the shares of several costs, with the sum one; a single cost has it all."""
     if not weights.size:
         return np.ones(1)
     weights = np.where(weights > _NO_SHARE * weights.max(), np.maximum(weights, 0.0), 0.0)

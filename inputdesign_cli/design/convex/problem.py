@@ -44,7 +44,7 @@ class Problem:
     "cost": the least cost; `cost` weighs the powers of input, output and excitation
     ([bombois-least-costly], (18)).
 
-    "factor": the least s such that s M(x) meets the requirements, x within the limits: the best
+    "factor": the least s for which s M(x) meets the requirements, x within the limits: the best
     accuracy (s is the square of the ratio r_u / r_adm, or the inverse of a criterion). In
     (s x, s) this is linear again: z = s x, M' = s M0 + sum z_i M_i, limits times s.
 
@@ -59,9 +59,9 @@ class Problem:
 
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
-    they can be met. `finer` is a problem of the same experiment on the same or a larger basis, of whose
-    integrals those of this basis are the head. `seen` are the demands of a like problem, which are those of
-    this one where both ask the same of the same plants.
+    they can be met. `finer` is a problem of the same experiment on the same or a larger basis; the
+    integrals of this basis are the first ones of its integrals. `seen` are the demands of a like problem,
+    reused if both have the same requirements and plants.
     """
 
     experiment: Experiment
@@ -102,16 +102,16 @@ class Problem:
         return Gradients(tuple(scenario.experiment for scenario in self.scenarios))
 
     def with_requirements(self, of: Callable[[Scenario], tuple[Requirement, ...]]) -> Problem:
-        """The same problem with other requirements at every scenario, and no side ones."""
+        """Return the problem with other requirements at every scenario, and no side ones."""
         others = tuple(replace(one, requirements=of(one), side=()) for one in self.others)
         return replace(self, requirements=of(self.scenarios[0]), side=(), others=others)
 
     def on(self, basis: Basis) -> Problem:
-        """The same problem on another basis, such as one that has grown out of this one."""
+        """Return the problem on another basis, for example one that has grown out of this one."""
         return self if basis is self.basis else replace(self, basis=basis, finer=None)
 
     def grown(self, basis: Basis) -> Problem:
-        """The same problem on a basis that begins with this one; what is known of this one is kept."""
+        """Return the problem on a basis that begins with this one, and keep the integrals computed so far."""
         grown = replace(self, basis=basis, finer=None)
         grown._before.append(self)
         _ = grown.demands, grown.gradients, grown.information_maps
@@ -123,7 +123,7 @@ class Problem:
         return grown
 
     def _along(self, known: Callable[[Problem], Array], integrals: Callable[[Basis], Array]) -> NDArray:
-        """Integrals of all basis functions: the head of those of a finer problem, or more than were known."""
+        """Return integrals of all basis functions, from a finer problem or by adding to known ones."""
         if self.finer is not None:
             return known(self.finer)[: self.basis.size]
         if self._before:
@@ -153,7 +153,7 @@ class Problem:
 
     @property
     def information_map(self) -> NDArray[np.float64]:
-        """(size, k, k): those of the nominal plant."""
+        """Return the information maps (size, k, k) of the nominal plant."""
         return self.information_maps[:, 0]
 
     @cached_property

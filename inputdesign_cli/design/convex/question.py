@@ -56,7 +56,7 @@ class Question:
         return [Alternative(self.experiment, self.requirements, self.side), *self.others]
 
     def at_alpha(self, alpha: float) -> Question:
-        """The same question with another confidence factor of the model errors of the nominal plant."""
+        """Return the question with another confidence factor of the model errors of the nominal plant."""
 
         def changed(make: RequirementFactory) -> RequirementFactory:
             return lambda experiment: with_alpha([make(experiment)], alpha)[0]
@@ -66,6 +66,6 @@ class Question:
         )
 
     def of_length(self, samples: int) -> Question:
-        """The same question of experiments with so many samples."""
+        """Return the question for experiments with this number of samples."""
         others = [replace(one, experiment=replace(one.experiment, samples=samples)) for one in self.others]
         return replace(self, experiment=replace(self.experiment, samples=samples), others=others)

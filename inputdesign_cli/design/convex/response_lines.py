@@ -38,9 +38,9 @@ class UnreachableError(IdesignError):
 
 @dataclass(frozen=True)
 class ResponseLines:
-    """What is measured at L lines: G (L, p, r), the noise Phi_v (L, p), and r_adm (L, p, r).
+    """Holds G (L, p, r), the noise Phi_v (L, p) and r_adm (L, p, r) at L lines.
 
-    `share`: r_adm is this much of |G|; None where it does not depend on G.
+    `share`: r_adm is this much of |G|; None if it does not depend on G.
     """
 
     G: ComplexArray
@@ -49,7 +49,7 @@ class ResponseLines:
     share: float | None = None
 
     def at(self, G: ComplexArray) -> ResponseLines:
-        """The same lines with another G (L, p, r); what is not bounded is not bounded there."""
+        """Return the lines with another G (L, p, r); an error without a bound has none there."""
         if self.share is None:
             return replace(self, G=G)
         return replace(self, G=G, admitted=np.where(np.isinf(self.admitted), np.inf, self.share * np.abs(G)))
@@ -59,7 +59,7 @@ class ResponseLines:
         return replace(self, G=self.G[kept], noise=self.noise[kept], admitted=self.admitted[kept])
 
     def needed(self, samples: int) -> NDArray[np.float64]:
-        """(L, r): the least powers with which deviations over so many samples are those admitted."""
+        """Return the least powers (L, r) whose deviations over `samples` samples are within r_adm."""
         return np.asarray(np.max(2.0 * self.noise[:, :, None] / self.admitted**2, axis=1) / samples)
 
     def deviations(
@@ -74,17 +74,17 @@ class ResponseLines:
         return np.asarray(np.sqrt(2.0 * level[:, :, None] / (samples * powers[:, None, :])))
 
     def ratios(self, deviations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(L,): the largest share of what is admitted at each line."""
+        """Return the largest ratio of deviation to r_adm at each line, (L,)."""
         return np.asarray(np.max(deviations / self.admitted, axis=(1, 2)))
 
 
 @dataclass(frozen=True)
 class ResponseProblem:
-    """Powers x of n lines (each of one input), in units of what meets r_adm just so in N samples: x >= 1.
+    """Powers x of n lines (each of one input), where x = 1 just meets r_adm in N samples: x >= 1.
 
     Attributes:
-        needed: (n,) that power.
-        price: (n,) what a unit of power costs.
+        needed: (n,) the power that just meets r_adm.
+        price: (n,) the cost of a unit of power.
         limits: on powers of inputs and outputs.
         rows: (limits, n) what a unit of power adds to each.
     """
@@ -96,7 +96,7 @@ class ResponseProblem:
 
     @cached_property
     def costs(self) -> Array:
-        """(n,): of the units of x."""
+        """Return the costs (n,) of the units of x."""
         return self.price * self.needed
 
     @cached_property
@@ -106,7 +106,7 @@ class ResponseProblem:
 
     @cached_property
     def lower(self) -> tuple[NDArray[np.float64], Array]:
-        """Those of limits from below."""
+        """Return the rows and bounds of limits from below, in the units of x."""
         return self._limited(False)
 
     def _limited(self, upper: bool) -> tuple[NDArray[np.float64], Array]:
@@ -125,7 +125,8 @@ class ResponseProblem:
 class ResponseDesign:
     """Powers (n,), and a value with the bound that multipliers of the limits prove for it.
 
-    The value is a cost, or s: variances are 1 / s of what is admitted, and so many times fewer samples do.
+    The value is a cost, or s. Variances are then 1 / s of the admissible ones, and 1 / s of the samples is
+    enough.
     """
 
     powers: Array
@@ -162,11 +163,13 @@ def cheapest(problem: ResponseProblem) -> ResponseDesign:
 
 
 def most_accurate(problem: ResponseProblem) -> ResponseDesign:
-    """The largest s with variances 1 / s of what is admitted; some limit is from above.
+    """Return the powers of the largest s; variances are 1 / s of the admissible ones.
+
+    Some limit is from above.
 
     Raises:
         UnreachableError: the limits contradict each other.
-        SpecError: `needs-limits` where none is felt.
+        SpecError: `needs-limits`, no limit bounds the power of these lines.
     """
     rows, floors = problem.lower
     caps, bounds = problem.upper
@@ -227,7 +230,7 @@ def _program(
 
 
 def _share(most: Array, taken: Array) -> float:
-    """The largest share, one at most, of what is taken that leaves nothing below zero."""
+    """Return the largest share, at most one, for which no entry of most - share * taken is negative."""
     positive = taken > 0
     return float(min(1.0, np.min(most[positive] / taken[positive], initial=1.0)))
 

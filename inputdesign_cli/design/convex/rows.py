@@ -46,7 +46,7 @@ def first_density_rows(problem: Problem) -> list[Row]:
 
 
 def on_basis(problem: Problem, row: Row) -> Row:
-    """The same row for the basis of `problem`."""
+    """Return the row for the basis of `problem`."""
     if row.limit is not None:
         return replace(row, functional=problem.limit_functionals[row.limit])
     assert row.density is not None

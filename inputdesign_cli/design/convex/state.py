@@ -125,7 +125,7 @@ class State:
     def _prune(self, proof: Proof) -> None:
         """Drop the cuts that have not bound for some rounds; each costs the solver a k x k cone.
 
-        Those that do not bind in one round often do in the next.
+        A cut that does not bind in one round often does in the next.
         """
         weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
         idle = np.where(weights > _BINDS * weights.sum(), 0, np.array(self.idle, dtype=int) + 1)
@@ -149,7 +149,7 @@ class State:
         return self.best.z, self.best.s
 
     def _grow(self, problem: Problem) -> None:
-        """The same state on a basis with more functions."""
+        """Extend the state to a basis with more functions."""
         more = problem.basis.size - self.best.z.size
         self.problem = problem
         self.best = replace(self.best, z=np.pad(self.best.z, (0, more)))
@@ -167,7 +167,7 @@ class State:
         return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
 
     def tight(self) -> State:
-        """The same, its best design with just the s that it needs: an interior one has room to spare."""
+        """Return the state, its best design with just the s it needs: an interior one has room to spare."""
         if self.problem.goal != "factor":
             return self
         worst = self.problem.demands.largest(self.best.informations, default=1.0)
@@ -175,7 +175,7 @@ class State:
         return replace(self, best=best)
 
     def moved_to(self, problem: Problem) -> State:
-        """The same knowledge for a richer family of spectra: its first face comes from the prices so far."""
+        """Return the state for a richer family of spectra: its first face comes from the prices so far."""
         assert self.solved is not None
         assert self.proof is not None
         z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
@@ -199,7 +199,7 @@ class State:
 
 
 def first_state(problem: Problem, start: Array, interior: Array | None, known: Sequence[Place]) -> State:
-    """What is known before the first round; the arguments are those of `exchange`."""
+    """Return the state before the first round; the arguments are the ones of `exchange`."""
     size, inner = problem.basis.size, None
     if interior is not None:
         inner = _inner(problem, interior[:size])

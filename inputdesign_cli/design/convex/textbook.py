@@ -45,7 +45,7 @@ def solve_on_grid(
     """Minimise the cost of a FIR spectrum of one input subject to the requirements at `frequencies` alone.
 
     Args:
-        requirements: those of the problem, to first order.
+        requirements: the problem's own, to first order.
         start: a spectrum of the right size (the white baseline), which scales the program.
 
     Raises:

@@ -27,13 +27,13 @@ _SUITED = 8.0  # how far from their own power coordinates serve
 
 
 def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
-    """The smallest white excitation power (per sample) that meets every requirement; 0 if none is needed.
+    """Return the smallest white excitation power (per sample) that meets every requirement, possibly 0.
 
     r_u falls monotonically as the power grows, so this is one scalar equation and needs no solver.
     The coordinates are whitened again at each new estimate of the power.
 
     Raises:
-        InfeasibleError: no power is enough, since the requirement is on what noise alone tells.
+        InfeasibleError: no power is enough, since only the noise informs on the required accuracy.
         OutOfTimeError: see `seconds_left`.
     """
     power = 1.0
@@ -42,7 +42,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         problem = trial.problem
         if suffices(problem, problem.baselines):
             return 0.0
-        # The ratio falls as the root of the power where the excitation alone tells what is asked.
+        # The ratio falls as the root of the power if only the excitation informs on the requirement.
         at_once = trial.at + 2.0 * trial.excess(trial.at)
         if abs(at_once - trial.at) <= _SUITED and abs(trial.excess(at_once)) <= _EXACT:
             return float(np.exp(at_once))
@@ -54,7 +54,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
                 if lo < _FAINT:
                     return 0.0  # nothing is asked
         except np.linalg.LinAlgError:
-            return 0.0  # the noise alone tells what is asked, and nothing of other parameters
+            return 0.0  # the noise alone meets the requirement, and has no information on other parameters
         found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
         if abs(found - power) <= 1e-3 * power:
             return found
@@ -86,7 +86,7 @@ class _Trial:
         return cls(experiment, factories, at, flat)
 
     def near(self, at: float) -> _Trial:
-        """The same, in other coordinates where what only the noise tells would be lost in these."""
+        """Return this trial, or one in coordinates for the power `at` if that is far from its own."""
         return self if abs(at - self.at) <= _SUITED else _Trial.of(self.experiment, self.factories, at)
 
     def excess(self, log_power: float) -> float:

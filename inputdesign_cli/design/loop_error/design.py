@@ -18,7 +18,7 @@ from inputdesign_cli.information.quadrature import Quadrature
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
-# Eigenvalue of the scaled information matrix below which parameters cannot be told apart.
+# Eigenvalue of the scaled information matrix below which parameters are not identifiable.
 _SINGULAR = 1e-13
 # Means over frequency that halving the panels moves by more than this are not trusted.
 _UNSETTLED = 1e-8
@@ -102,7 +102,7 @@ class LoopErrorDesign:
 
     @property
     def output_covariance(self) -> Array:
-        """(n, n) of what the input causes at the output."""
+        """Return the covariance (n, n) of the output due to the input."""
         G = self.problem.plant.plant_at(self.frequencies)
         return np.asarray(np.einsum("kab,k->ab", G @ self.spectrum @ adjoint(G), self.weights).real)
 
@@ -138,12 +138,15 @@ def design_loop_error(
 
 
 def flat(level: float, frequencies: int, inputs: int) -> ComplexArray:
-    """The spectrum level I at so many frequencies, (K, n, n)."""
+    """Return the spectrum level I at K = `frequencies` frequencies, (K, n, n)."""
     return np.broadcast_to(level * np.eye(inputs, dtype=complex), (frequencies, inputs, inputs))
 
 
 def _check_identifiable(problem: LoopErrorProblem, criterion: ParametricCriterion) -> None:
-    """White input tells all parameters apart, judged in coordinates where each alone has information one."""
+    """Raise `SpecError` (`not-identifiable`) unless white input identifies all parameters.
+
+    The matrix is judged in coordinates where each parameter alone has information one.
+    """
     rule = problem.rule(1)
     white = flat(1.0, rule.nodes.size, problem.plant.inputs)
     M = criterion.information(rule.nodes, white, rule.weights)

@@ -69,7 +69,7 @@ class DesiredLoop:
         """
         if self.outside is None or not self.outside.size:
             return None
-        # P = N / D with D = prod (z - z_i): its terms z^1 .. z^m are those of d log det G.
+        # P = N / D with D = prod (z - z_i): its terms z^1 .. z^m are the terms of d log det G.
         D = np.poly(self.outside).real[::-1]
         m, z = self.outside.size, 1 / unit_circle(rule.nodes)
         waves = rule.weights * z ** -np.arange(1, m + 1)[:, None]

@@ -20,7 +20,7 @@ class MatrixPlant(PolynomialModel):
 
     @classmethod
     def of(cls, channels: PolynomialModel) -> MatrixPlant:
-        """The same plant."""
+        """Build the plant from a polynomial model."""
         return cls(
             channels.B, channels.A, channels.F, channels.C, channels.D, channels.covariance, channels.first
         )

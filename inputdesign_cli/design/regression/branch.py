@@ -33,7 +33,7 @@ class Node:
 
 @dataclass
 class BranchAndBound:
-    """The state of a proof: boxes that are open, and the least bound of those that are done.
+    """Holds the state of a proof: boxes that are open, and the least bound of the closed ones.
 
     Attributes:
         nodes: relaxations solved so far.

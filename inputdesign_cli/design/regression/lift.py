@@ -10,7 +10,7 @@ and v = L1^T u, the bias b = P21 u - L2 and its products with w are linear in it
 tight: E[(1, w, b)(1, w, b)^T] >= 0, whose last block bounds E|b|^2 (with E[b] alone in its place the gap
 would shrink only linearly with the box), and in a box for rho_1 .. rho_{m-1}
 E[(rho_k - lower_k)(1, w)(1, w)^T] >= 0, and the like from above. As the box shrinks to a point the lift
-becomes exact; for m = 1 it is exact at once. Lifts of this kind are those of [lasserre-2001].
+becomes exact; for m = 1 it is exact at once. Lifts of this kind are due to [lasserre-2001].
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class Lift:
 
     @property
     def biases(self) -> int:
-        """Entries of b; none where bias does not count."""
+        """Return the number of entries of b, which is 0 if bias does not count."""
         return self.problem.n - self.problem.m if self.problem.biased else 0
 
     @property

@@ -150,5 +150,5 @@ def starts(problem: ToeplitzProblem, count: int, rng: np.random.Generator) -> li
 
 
 def best(shapes: Sequence[Autocorrelations], goal: Goal) -> Autocorrelations:
-    """The shape of least value; among those that miss the target the one of least bias."""
+    """Return the shape of least value; among shapes that miss the target, the one of least bias."""
     return min(shapes, key=lambda s: (goal.value(s), s.bias_squared))

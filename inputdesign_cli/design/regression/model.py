@@ -98,7 +98,7 @@ class Sensitivity:
 def energy_sensitivity(
     regression: Regression, energy: float, target: float, split: ErrorSplit
 ) -> Sensitivity:
-    """Of the least energy sigma^2 c / (gamma - alpha^2 |b|^2)."""
+    """Return the sensitivity of the least energy sigma^2 c / (gamma - alpha^2 |b|^2)."""
     slack = target - split.bias_squared
     alpha, sigma = regression.neglected_norm, np.sqrt(regression.variance)
     bias = split.bias_squared / alpha**2 if alpha > 0 else 0.0
@@ -110,7 +110,7 @@ def energy_sensitivity(
 
 
 def error_sensitivity(regression: Regression, energy: float, split: ErrorSplit) -> Sensitivity:
-    """Of the least error alpha^2 |b|^2 + sigma^2 c / E."""
+    """Return the sensitivity of the least error alpha^2 |b|^2 + sigma^2 c / E."""
     alpha, sigma = regression.neglected_norm, np.sqrt(regression.variance)
     return Sensitivity(
         neglected_norm=2.0 * split.bias_squared / alpha if alpha > 0 else 0.0,

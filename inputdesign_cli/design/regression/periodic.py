@@ -31,7 +31,7 @@ _STEP_TOLERANCE = 1e-10
 class PeriodicDesign:
     """Shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
 
-    `exact` tells that the Gram matrix is the one that was asked for.
+    `exact` says whether the Gram matrix is the one that was asked for.
     """
 
     shares: Array

@@ -1,6 +1,6 @@
 """Small convex programs over Toeplitz shapes: one step of sequential convex programming, and extensions.
 
-The unknown rho_1 .. rho_{n-1} ranges over all shapes (P >= 0) or over those of a periodic signal
+The unknown rho_1 .. rho_{n-1} ranges over all shapes (P >= 0) or over the shapes of a periodic signal
 (nonnegative powers on the lines of a grid).
 """
 

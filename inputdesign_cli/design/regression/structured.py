@@ -22,7 +22,7 @@ _STEP_TOLERANCE = 1e-10
 _NODES = {1: 400, 2: 400, 3: 400}
 _NODES_BEYOND = 100  # the boxes of m >= 4 are many and dear, and more of them close little
 _FAINT = 1e-5  # powers of lines below this share, in a design that is flat there
-# A target is out of reach if no energy up to so many times n sigma^2 |L1|^2 / gamma is enough; the largest
+# A target is out of reach if no energy up to this many n sigma^2 |L1|^2 / gamma is enough; the largest
 # of these for which the proof closes counts.
 _PROVED_MULTIPLES = (1e6, 1e4, 1e2)
 
@@ -43,11 +43,11 @@ class OutOfReachError(Exception):
 
 @dataclass(frozen=True)
 class ToeplitzDesign:
-    """A design and what is proved of it.
+    """A design and the bound that is proved for it.
 
     Attributes:
         R: (n, n) moments summed over the samples.
-        bound: no Toeplitz R does better, in the unit of what is minimised (energy or error).
+        bound: no Toeplitz R does better, in the unit of the objective (energy or error).
         assumed: the least eigenvalue of R11 / r_0 that the proof takes for granted; 0 if none.
         starts, solves, nodes: of the local search, of its small programs, of the branch and bound.
     """
@@ -65,7 +65,7 @@ class ToeplitzDesign:
 
 @dataclass(frozen=True)
 class Normalisation:
-    """From the units of `ToeplitzProblem` to those of the regression."""
+    """Converts the units of `ToeplitzProblem` into the units of the regression."""
 
     regression: Regression
 
@@ -160,7 +160,7 @@ def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorr
 
 
 def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Autocorrelations:
-    """The same design on lines at multiples of 15 degrees, if it is no worse for it.
+    """Return the design on lines at multiples of 15 degrees, if it is no worse for it.
 
     An optimum is flat, so a search knows rho only to the root of its tolerance; a constant or
     alternating signal, for one, is recognised here.

@@ -230,7 +230,7 @@ def _experiments(question: ModelQuestion, both: Array) -> int | None:
 def _topped_up(
     judged: Results, topped: Results, remarks: Sequence[Finding], needed: Callable[[Array], int | None]
 ) -> Results:
-    """Return the top-up, with what was found in the data beside it.
+    """Return the top-up, together with the findings on the data.
 
     Args:
         remarks: on the top-up.

@@ -47,15 +47,15 @@ from inputdesign_cli.records import Preparation, Record, read_data
 
 @dataclass(frozen=True)
 class ModelQuestion:
-    """What a spec asks, at one model.
+    """Holds the requirements of a spec at one model.
 
     Attributes:
         experiment: with that model and the loop, in the coordinates of the data: their information is I.
         confidence: the size of the confidence region of r_u.
         requirements: all that is asked, in these coordinates.
-        entries: what has r_u of every entry of G where no requirement has it.
+        entries: the model errors of every entry of G, for r_u if no requirement has it.
         top_up: designs what the model needs beside the data, with a record about the levels of the
-            inputs by name; None where the spec designs nothing.
+            inputs by name; None if the spec designs nothing.
     """
 
     experiment: Experiment
@@ -66,7 +66,7 @@ class ModelQuestion:
 
     @property
     def information(self) -> Array:
-        """(k, k): that of the data."""
+        """Return the information (k, k) of the data, which is I in these coordinates."""
         return np.eye(self.experiment.size)
 
     @property
@@ -82,22 +82,22 @@ class ModelQuestion:
 
 @dataclass(frozen=True)
 class Identification:
-    """What is to be estimated from data, and what is asked of the estimate.
+    """States what is to be estimated from data, and the accuracy required of the estimate.
 
     Attributes:
         nominal: the structure; its parameters are one of the starts.
         nominal_covariance: (k, k), of its parameters, zero where the spec states none.
         assessable: whether any accuracy is asked for that data could meet or miss.
         operating_point: by channel, what the spec says that signals vary about.
-        earlier: the prior as an estimate, which counts along; None where it has no values.
+        earlier: the prior as an estimate, which counts along; None if it has no values.
         has_prior: whether it states prior information.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
-        knowledge: what else it says of the parameters; None where it says nothing.
-        foreseen: the plants that the design was made for; None where it was made for the plant of the spec.
+        knowledge: what else it says of the parameters; None if it says nothing.
+        foreseen: the plants that the design was made for; None if it was made for the plant of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
-        with_noise: the same, where the noise of every output has C and D more than a model; None where no
-            other noise is tried.
+        with_noise: the same, where the noise of every output has C and D more than a model; None if no
+                other noise is tried.
     """
 
     header: Header
@@ -166,7 +166,7 @@ def _with_larger_noise(
             for k in np.flatnonzero(larger.nominal.in_plant):
                 start[k] = plant[larger.nominal.names[k]]
             other = estimated(larger, found.data, first, found.preparation, start=start)
-        except IdesignError:  # this noise cannot be stated of such a plant, or not estimated
+        except IdesignError:  # this plant cannot have this noise, or it cannot be estimated
             continue
         if other.estimate.converged and not other.estimate.coloured:
             return larger, replace(other, noise_refuted=noise_probability(estimate))

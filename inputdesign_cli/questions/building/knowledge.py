@@ -19,7 +19,7 @@ from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
 
 KEY = "uncertainty"
-# Confidences of an ellipsoid: of the plants that are possible, and of those that a design is made for.
+# Confidences of an ellipsoid: of the plants that are possible, and of the plants that a design is made for.
 _POSSIBLE, _DESIGNED = 0.999, 0.998
 # An estimate that is farther from the plant of the spec, in standard deviations, is of another plant.
 _AWAY = 3.0

@@ -141,7 +141,7 @@ def _check_applied(given: Path, due: str, match: Match, other: str | None, *, lo
             f"{given.name} was applied at {match.scale:.4g} times the scale of {due}",
             hint=f"mend the column if it is in another unit; if it was really applied so, say {forced}",
         )
-    # A reference is computed: no actuator clips it. The input of the loop is another signal that follows it.
+    # A reference is computed: no actuator clips it. The input of the loop only follows it.
     if not match.follows or (loop and match.spliced <= LIKE):
         raise DataError.because(
             "record-unlike",

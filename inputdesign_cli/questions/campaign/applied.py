@@ -23,19 +23,19 @@ _SPLICED = 0.6
 # How sure the scale of the plan must be, in standard deviations, since slow signals are alike by chance;
 # surer where the best places of samples were looked for.
 _MOVES, _PLACED = 1.8, 5.0
-# Coefficients of the regression that makes white what a record has besides its plan, in so many rounds.
+# Coefficients of the regression that whitens the difference of record and plan, and its rounds.
 _COLOUR, _ROUNDS = 2, 3
-# So many samples may be lost, or written twice; each time must explain more than so many of the others.
+# The most samples lost or written twice; each time must explain more than this number of others.
 _SLIPS, _PAYS = 5, 5.0
 # Another start explains so much more of the correlation.
 _BETTER = 0.02
-# A scale is off by more than this, by so many of its standard deviations, and explains most of what is off.
+# A scale is off by more than this, by this number of its standard deviations, and explains most of the error.
 _OFF, _SURE = 0.02, 3.0
 # An actuator that clips does so in samples beyond this share of half their range.
 _CLIPPED, _FEW = 0.95, 2
 # A channel is at rest in plans smaller than this share of the strongest; moved by half of that it is not.
 _AT_REST, _MOVED = 0.02, 0.5
-# What rounding to five digits leaves of a copy.
+# By how much rounding to five digits lowers the correlation of a copy.
 _COPY = 1e-10
 # Orders of more channels are not tried.
 _MOST = 6

@@ -63,9 +63,9 @@ class Foreseen:
 def that_agrees(
     knowledge: Knowledge | None, estimate: Estimate, near: Callable[[Array], Estimate]
 ) -> tuple[Estimate, tuple[Rival, ...]]:
-    """The likeliest minimum that agrees with what is known, and those that do not.
+    """Return the likeliest minimum that agrees with the knowledge, and the minima that do not.
 
-    Where none does, the knowledge is wrong and rules nothing out.
+    If none does, the knowledge is wrong and rules nothing out.
 
     Args:
         estimate: the likeliest of all, and its rivals.

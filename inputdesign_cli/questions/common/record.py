@@ -32,7 +32,7 @@ from inputdesign_cli.signal import (
 from inputdesign_cli.signal.evaluation import MET
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
-# those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
+# rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
 _TAKES_PART = 1e-6
 
@@ -133,7 +133,7 @@ def make_record(
         first: whether to take the first that meets the requirements, whatever it costs.
     """
     problem, settings = design.problem, request.settings
-    # In the coordinates of this design, which are those of its requirements.
+    # In the coordinates of this design, which its requirements use too.
     experiment = replace(problem.experiment, samples=experiment_samples)
     samples = request.length(experiment_samples)
     feasible = request.feasible(experiment_samples, least_period(experiment.inputs))
@@ -158,7 +158,7 @@ def make_record(
         return _worst_few({n: peak_share(others[n], bounds, record) for n in which}, MET)
 
     numbers, limiting = _binding(design), [0]
-    if len(plants) > 1 and bounds.hard:  # those that answer most to one record do so to others
+    if len(plants) > 1 and bounds.hard:  # plants that answer most to one record do so to others
         values = generator.values(np.random.default_rng(settings.seed))
         limiting += beyond_peaks(np.repeat(values, settings.hold, axis=0), range(1, len(plants)))
 

@@ -145,7 +145,7 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
     while discard > 0:
         weight = design.result.certificate.shares[1:]
         dear = [n for n in np.argsort(-weight, kind="stable").tolist() if weight[n] > _TAKES_PART]
-        # Half of those that bind at a time: a plant that goes frees others.
+        # Half of the binding plants at a time: a plant that goes frees others.
         gone = set(dear[: min(discard, max(len(dear) // 2, 1))])
         if not gone:
             break
@@ -182,7 +182,7 @@ def _worst(
 
 
 def delivered_samples(design: Design) -> int:
-    """Of the experiment: a whole number where the shortest one is sought."""
+    """Return the samples of the experiment, rounded up where the shortest one is sought."""
     if design.problem.goal != "samples":
         return design.problem.experiment.samples
     return max(int(np.ceil(design.result.s * (1 - 1e-9))), 1)
@@ -227,7 +227,7 @@ def tried_on(design: Design, samples: int, batch: Batch, above: float = 0.0) -> 
         if len(batch.plants) > 1:  # one of them is to blame, or more
             each = (batch.only([place]) for place in range(len(batch.plants)))
             return [tried for own in each for tried in tried_on(design, samples, own, above=above)]
-        (plant,) = batch.plants  # the experiment does not tell everything of it
+        (plant,) = batch.plants  # the experiment does not identify all of its parameters
         own = plant.at(plant.experiment)
         return [Tried(Kept(np.inf), (*own.requirements, *own.side))]
     asked = ((*scenario.requirements, *scenario.side) for scenario in at.scenarios)

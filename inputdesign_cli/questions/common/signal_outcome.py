@@ -189,7 +189,7 @@ def _moves(request: RecordRequest, units: Units, record: Record) -> dict[str, tu
 
 
 def _largest_moves(u: Array) -> Array:
-    """(r,): of inputs (n, r) that start from rest."""
+    """Return the largest moves (r,) of inputs (n, r) that start from rest."""
     return np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0)
 
 

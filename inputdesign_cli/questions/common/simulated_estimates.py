@@ -20,7 +20,7 @@ from inputdesign_cli.monte_carlo.study import Study, tried_on_truth
 _TO_CORRECT, _TO_CHECK = 2**60, 2**60 + 1
 # Samples of all runs: asymptotic theory holds for long records, and many of them take minutes.
 _MOST = 20_000_000
-# So many runs apply the same record of at least so many samples: what differs between them hardly counts.
+# Runs that share one record, and its least length: in long records their differences hardly count.
 _EACH, _LONG = 20, 100
 
 
@@ -91,5 +91,5 @@ class Simulator:
         return SimulatedEstimates(replace(self.nominal, samples=samples), excitation, self.runs, self.step)
 
     def of_record(self, record: Array) -> SimulatedEstimates | None:
-        """Of one record (samples, r)."""
+        """Return the estimates from one record (samples, r)."""
         return self.of(Recorded("design", record, self.step), len(record))

@@ -54,7 +54,7 @@ def tried_input(
     Args:
         predicted: what is compared with them.
         errors: of the runs, see `Trials.errors`.
-        modelled: runs in which the true system is the design model, if it is another one.
+        modelled: runs in which the true system is the design model, if the two differ.
     """
     trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
     within = _fractions(tried, predicted, errors)

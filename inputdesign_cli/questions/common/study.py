@@ -30,7 +30,7 @@ def with_study(
 
     Args:
         begun: when the study began, by `perf_counter`.
-        tables, curves: of the study; they take the place of those of the same stem.
+        tables, curves: of the study; they replace the ones of the same stem.
     """
     seconds = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - begun}
     return replace(

@@ -36,7 +36,7 @@ def spec_text(log: Record, found: Found, sources: Sequence[Path]) -> str:
     low, high = log.u.min(axis=0), log.u.max(axis=0)
     half = 0.5 * (high - low)
     half = np.where(half > 0.0, half, half.max())
-    # Six digits of what the input moves by: a level far from zero takes more.
+    # Six digits of the distance that the input moves: a level far from zero takes more.
     places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in half]
     levels, widths = (
         [round(float(x), n) for x, n in zip(values, places, strict=True)]
@@ -125,9 +125,9 @@ def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
 
 
 def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:
-    """The block with roots of C and D no nearer to the unit circle than a record of so many samples tells.
+    """Return the block with roots of C and D not too near to the unit circle, and the letters that changed.
 
-    With it the letters of those that were nearer.
+    Their modulus is at most 1 - 1 / samples: a record of this length cannot resolve nearer roots.
     """
     drawn = dict(noise)
     for letter in {"C", "D"} & noise.keys():

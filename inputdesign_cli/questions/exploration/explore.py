@@ -45,7 +45,7 @@ from inputdesign_cli.questions.exploration.outcome import (
 from inputdesign_cli.questions.frequency_response.measured import silent_entry
 from inputdesign_cli.records import Preparation, Record, read_logs
 
-# Where more shifts appear, once these are left out so often, the plant is another than any that is tried.
+# Where more shifts appear, once these are left out so often, the plant is none of the models tried.
 _MOST_SHIFTS = 2
 
 

@@ -23,7 +23,7 @@ from inputdesign_cli.questions.exploration.explore import Exploration
 from inputdesign_cli.questions.exploration.outcome import validation_curves, validation_of
 from inputdesign_cli.records import Preparation, Record, read_data, read_sheet, with_channels
 
-# Past inputs explain what a judged model leaves: by chance alone, so seldom.
+# Probability that past inputs explain the residuals of a model by chance alone.
 _SURELY = 1e-6
 
 

@@ -107,7 +107,7 @@ def _at_lines(
         raise DataError.because("not-exciting", f"{name}: {why}", hint=REMEDY)
     judged = judge_lines(terms, found, counted, excited)
     seen = [*missing, *counted.findings, *inputs_do_not_repeat(judged.differing, periods.period)]
-    # Periods of outputs differ by those of inputs that do not repeat.
+    # Periods of outputs differ if the inputs do not repeat.
     if judged.differing <= UNLIKE:
         judged = _doubted(question, terms, found, counted, judged)
     return Measured(data, of_periods(found, periods.period), judged, tuple(seen))

@@ -77,7 +77,7 @@ def build_given(spec: Spec) -> GivenTask:
     check_signal(spec)
     experiment = build_experiment(spec)
     requirements = build_requirements(spec, experiment)
-    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
     check_pairs(spec, experiment.model.names)
     asked = GivenAsked(
         requirements,

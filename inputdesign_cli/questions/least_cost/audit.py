@@ -31,14 +31,14 @@ from inputdesign_cli.questions.least_cost.outcome import Designed
 
 # Two ways to the same number may differ by this share of it.
 _APART = 1e-6
-# A plant that keeps less than this share of what is admitted is not looked at again.
+# A plant that keeps less than this share of the limit is not looked at again.
 _DOUBTFUL = 0.9
 _NODES_AT_ONCE = 1024
 # Steps of the grid, a fortieth of the distance to a pole each, to an interval of the rule; fewer where the
 # spectrum itself varies faster.
 _STEPS = 4
 _FAST = 200
-# The highest peaks on the grid are looked at more closely, so many points at a time. Where r_adm of a plant
+# The highest peaks on the grid are looked at more closely, `_INSIDE` points at a time. Where r_adm of a plant
 # passes that of its floor they have kinks, at which what is missed is in proportion to the last step.
 _PEAKS, _ZOOMS, _INSIDE = 8, 8, 17
 _KNOWN = ("white", "fir", "polynomial")
@@ -213,7 +213,7 @@ class _Reread:
 
     @cached_property
     def _experiment(self) -> Experiment:
-        """That of the delivered length, in the coordinates in which the requirements are stated."""
+        """Return the experiment of the delivered length, in the coordinates of the requirements."""
         return replace(self.scenario.experiment, samples=self.done.experiment.samples)
 
     @cached_property

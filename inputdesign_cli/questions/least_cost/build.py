@@ -48,7 +48,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     experiment = build_experiment(spec)
     requirements, side = build_asked(spec, experiment)
     goal, cost = _GOALS[spec.goal], build_cost(spec)
-    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
     check_pairs(spec, experiment.model.names)
     check_signal(spec)
     basis = build_basis(spec, experiment.inputs, excitation_band(spec))

@@ -32,7 +32,7 @@ from inputdesign_cli.spectrum import flat_basis
 _RECORDS = 4
 # Simulated experiments correct the design this often at the most, until they change alpha by this share.
 _CORRECTIONS, _CORRECTED = 5, 0.01
-# Where other runs do not bear the correction out, so many times as many correct.
+# If other runs do not confirm the correction, this multiple of runs corrects it.
 _SETS = 4
 
 MakeDesign = Callable[[Question, Confidence], Designed]
@@ -167,7 +167,7 @@ class ExactConfidence:
         return max(error.worst(information).ratio for error in errors)
 
     def _first_alpha(self) -> float:
-        """That of white excitation where the least cost is sought, lest the first design be out of reach."""
+        """Return alpha of white excitation for the least cost, lest the first design be out of reach."""
         question, experiment = self.question, self.question.experiment
         power = white_power(question) if question.goal == "cost" else 0.0
         if power == 0.0:

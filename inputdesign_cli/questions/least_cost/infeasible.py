@@ -110,7 +110,7 @@ def _together(unreachable: UnreachableError, question: Question) -> str:
     upper = {limit.key: limit for limit in question.limits if limit.upper}
     raised = [limit for limit in question.limits if limit.upper]
     densities = [density for density in question.densities if density.upper]
-    # The optimum of the goal "factor" meets the accuracy within limits and densities so many times as large.
+    # The optimum of the goal "factor" meets the accuracy if limits and densities are multiplied by it.
     factor = unreachable.nearest.objective if densities else needed_factor(unreachable, raised)
     if factor is None:
         return "no change of the upper limits is enough"
@@ -126,7 +126,7 @@ def _together(unreachable: UnreachableError, question: Question) -> str:
 
 
 def _own_factor(limit: PowerLimit, factor: float) -> float:
-    """By what the number of the spec is multiplied where its power is multiplied by `factor`."""
+    """Return the factor of the number in the spec if its power is multiplied by `factor`."""
     return float(np.sqrt(factor)) if limit.implied else factor
 
 

@@ -219,7 +219,7 @@ def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
 
 
 def _objective(design: Design) -> Objective:
-    """Return the value with its bounds, as far as they are proved."""
+    """Return the value with the bounds that are proved."""
     found, anything = design.result, design.any_spectrum
     value, bound = found.objective, found.certificate.bound
     any_bound = 0.0 if anything is None else anything.certificate.bound

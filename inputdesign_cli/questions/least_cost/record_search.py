@@ -41,13 +41,13 @@ from inputdesign_cli.signal import LONG, Record
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
 _ROOM = 1.02
 _TOLERANCE = 1e-5
-# Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
+# Where nothing meets the accuracy, this number of longer records is tried, if not too long.
 _LENGTHS, _LONGER, _TRIED, _ROUGH = 4, 1.03, 20_000, 1e-4
-# So many candidates of a long record: luck averages out.
+# Number of candidates of a long record: luck averages out.
 _ENOUGH = 3
-# A record that needs more than so many times the length, by a pilot of it, is not made of that length.
+# No record of a length is made if its pilot needs more than this multiple of that length.
 _FAR_FROM = 1.03
-# Spectra are compared on so many frequencies, by the share of their power that lies elsewhere.
+# Spectra are compared on this number of frequencies, by the share of their power that differs.
 _LINES, _SAME_SHAPE = 256, 0.01
 _WORDS = {
     "filtered_noise": "noise",

@@ -48,7 +48,7 @@ from inputdesign_cli.questions.common.spectrum import axis
 from inputdesign_cli.questions.least_cost.floor import Floor, floor_at, floor_of, floor_use
 from inputdesign_cli.questions.least_cost.outcome import Designed, costs_of
 
-# A plant binds when it keeps all but this share of what is admitted.
+# A plant binds when it is within this share of its limit.
 _BINDS = 1e-5
 _LISTED = 12
 # Estimates that are foreseen, and the share of them that counts.
@@ -118,7 +118,7 @@ def plants_kept(
         kept: the numbers of the plants that count.
         at_each: what these keep, the plant of the spec first.
         binding: places among them.
-        floors: of those that count.
+        floors: of the plants that count.
     """
     numbers = [0, *(number + 1 for number in kept)]
     worst = int(np.argmax([one.share for one in at_each]))

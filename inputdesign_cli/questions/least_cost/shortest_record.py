@@ -22,7 +22,7 @@ _GROWTH, _MOST_GROWTHS = 1.03, 100.0
 _FAR = 1.5
 _FINE, _STEP = 0.01, 0.009
 _LENGTHS = 24
-_FALLS = 0.9  # of what seemed to be needed before
+_FALLS = 0.9  # of the length that seemed to be needed before
 _BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
 # A way that missed nearby, and by so much, is not tried: other phases change a ratio by less as a rule.
 _NEARBY, _HOPELESS, _HOPELESS_LONG = 1.2, 1.15, 1.01
@@ -145,7 +145,7 @@ class ShortestRecord:
         """Try ever longer records until one meets the accuracy, or none is worth trying."""
         while self._found is None and self._lengths < _LENGTHS:
             low = self._low
-            # Where what is needed was told too low again and again, it is no guide.
+            # An estimate of the needed length that was repeatedly too low is no guide.
             least, margin = (_MARGIN, _MARGIN) if low > LONG else (_GROWTH, 1.0)
             growth = min(least ** min(2.0**self._lengths, _MOST_GROWTHS), _LEAP)
             self._high = self._rounded(

@@ -33,7 +33,7 @@ from inputdesign_cli.questions.least_cost.outcome import Answer
 _LENGTHS, _DIFFERENCE, _STEPS = (1.0, 0.5, 0.25, 0.1, 0.03), 0.01, 15
 _GAIN = 1e-5
 _STARTS = 3  # beside the plant of the spec
-# Plants are added until the worst one is missed by no more than this, and no more than so many.
+# Plants are added until the worst one is missed by no more than this, and no more than this number.
 _NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
 
 
