@@ -73,8 +73,8 @@ def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(he
     path = heater_record("a.csv", 720, 1)
     lines = path.read_text().splitlines()
     path.write_text("\n".join([f"{lines[0]},u2", *(f"{line},0.5" for line in lines[1:])]))
-    notes = assess(parse_spec(HEATER), path).results.result["notes"]
-    assert any("u2 is not used" in note for note in notes)
+    findings = assess(parse_spec(HEATER), path).results.outcome.findings
+    assert ["u2"] in [one.figures["columns"] for one in findings if one.code == "columns-unused"]
 
 
 def test_a_drift_is_told_from_noise(heater_record):
