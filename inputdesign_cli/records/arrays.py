@@ -134,7 +134,8 @@ def _sheet(
             else:
                 arrays[name] = owner, array
     if len({*steps}) > 1 or not all(0.0 < step < np.inf for step in steps):
-        raise unreadable(path, key, f"states no clear sample time: {steps}", "keep one, a positive number")
+        stated = " and ".join(f"{step:g}" for step in steps)
+        raise unreadable(path, key, f"states the sample time {stated}", "keep one, a positive number")
     held = "; ".join(f"{name} holds {what}" for name, what in list(left_out.items())[:5])
     if not arrays:
         raise unreadable(path, key, f"holds no arrays of numbers{f' ({held})' if held else ''}", hint)

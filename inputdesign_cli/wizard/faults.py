@@ -49,7 +49,7 @@ _TERMS = {"nominal plant": "plant as stated", "the offset": "the operating point
 _PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)+")
 _LINES_THERE = re.compile(r"holds (\d+) .* (\d+) are asked")
 _LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
-_QUIETER = re.compile(r"less of a margin than (\w+): ([\d.]+) .*such as \w+: ([\d.]+)")
+_QUIETER = re.compile(r"less of a margin than (\w+): ([\d.]+) .*for example \w+: ([\d.]+)")
 # How to ask for a margin that is weaker than a first value, for example a second one.
 _WEAKER = {
     "max_sensitivity_db": ("more than {} dB", "{} dB"),
