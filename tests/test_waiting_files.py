@@ -16,6 +16,7 @@ from inputdesign_cli.sweeps.layout import at_work
 from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.campaigns import SPEC, applied
 from tests.support.commands import caller
+from tests.support.outcomes import typed
 from tests.test_architecture import FILES, ROOT
 
 OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loadtxt", "genfromtxt", "cmp"}
@@ -119,7 +120,7 @@ def test_a_pipe_in_a_campaign_is_not_waited_for(campaign, tmp_path, monkeypatch,
 
 
 def a_run() -> Results:
-    return Results({"format": 1, "title": "one", "status": "optimal"}, "title: one\n", "s", {}, {}, {})
+    return Results(typed({"format": 1, "title": "one", "status": "optimal"}), "title: one\n")
 
 
 @pytest.mark.parametrize("name", ["result.json", "spec.yaml", "signal.csv", "report.html", "figures.json"])
