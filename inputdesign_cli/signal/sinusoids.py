@@ -70,26 +70,26 @@ class Sinusoids:
         return np.where(self.real, np.where(np.cos(phases) >= 0, 0.0, np.pi), phases)
 
     def record(self, phases: Array, gains: ComplexArray | None = None) -> Array:
-        """(samples,): the sum, or what filters of these `gains` (L,) at the lines make of it."""
-        vector = self.amplitudes * np.exp(1j * phases)
-        if gains is not None:
-            vector = vector * gains
+        """Return the sum (.., samples), or what filters of `gains` (.., L) at the lines make of it."""
+        vectors = self._vectors(phases, gains)
         if self.harmonics is None:
-            return (self._table @ vector).real
-        spectrum = np.zeros(self.samples // 2 + 1, dtype=complex)
-        spectrum[self.harmonics] = vector * np.where(self.real, 1.0, 0.5) * self.samples
-        return np.fft.irfft(spectrum, self.samples)
+            return (vectors @ self._table.T).real
+        spectra = np.zeros((*vectors.shape[:-1], self.samples // 2 + 1), dtype=complex)
+        spectra[..., self.harmonics] = vectors * np.where(self.real, 1.0, 0.5) * self.samples
+        return np.fft.irfft(spectra, self.samples)
 
-    def slopes(self, phases: Array, weight: Array, gains: ComplexArray | None = None) -> Array:
-        """(L,): sum_t weight_t d record_t / d phase; zero where there is only a sign."""
+    def slopes(self, phases: Array, weights: Array, gains: ComplexArray | None = None) -> Array:
+        """Return sum_t weight_t d record_t / d phase (.., L); zero where there is only a sign."""
         if self.harmonics is None:
-            transform = weight @ self._table
+            transform = weights @ self._table
         else:
-            transform = np.fft.rfft(weight)[self.harmonics].conj()
+            transform = np.fft.rfft(weights)[..., self.harmonics].conj()
+        return np.where(self.real, 0.0, -(self._vectors(phases, gains) * transform).imag)
+
+    def _vectors(self, phases: Array, gains: ComplexArray | None) -> ComplexArray:
+        """(.., L): complex amplitudes behind the filters."""
         vector = self.amplitudes * np.exp(1j * phases)
-        if gains is not None:
-            vector = vector * gains
-        return np.where(self.real, 0.0, -(vector * transform).imag)
+        return vector if gains is None else vector * gains
 
 
 def select(line_power: NDArray, lines: Selection) -> NDArray:
