@@ -22,7 +22,6 @@ from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.live.pages import Stamp
-    from inputdesign_cli.live.painters import Painters
     from inputdesign_cli.live.server import Board
 
 _LOOK = 0.1  # seconds between looks at the file while it is solved
@@ -88,14 +87,13 @@ def watch(
     or the sweep in it, and follows that. It is served to this machine only, until Ctrl-C.
     """
     from inputdesign_cli.live.pages import message_page
-    from inputdesign_cli.live.painters import painters
     from inputdesign_cli.live.server import Board, serving
 
     if str(spec) == STANDARD_STREAM:
         raise typer.BadParameter("standard input cannot be followed: name a file", param_hint="SPEC")
     board = Board()
     board.show(message_page(spec.name, "Computing .."))
-    with serving(board, port) as address, painters() as drawing:
+    with serving(board, port) as address:
         typer.echo(address)
         typer.echo(f"follows {spec}; open the address in a browser, Ctrl-C ends it", err=True)
         if spec.is_dir():
@@ -103,12 +101,10 @@ def watch(
         if fast:
             changes = replace(changes, overrides=[*(changes.overrides or []), "solver.any_spectrum=false"])
         place = Place(output, spec.stem, [spec], overwrite)
-        _follow_spec(spec, changes, place, board, drawing, figures)
+        _follow_spec(spec, changes, place, board, figures)
 
 
-def _follow_spec(
-    spec: Path, changes: Changes, place: Place, board: Board, drawing: Painters, figures: bool
-) -> None:
+def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figures: bool) -> None:
     """Solve and show, again and again."""
     from inputdesign_cli.live.pages import Followed, stamp, wait_for_change
     from inputdesign_cli.questions.verbs import run_verb
@@ -132,10 +128,9 @@ def _follow_spec(
                 )
                 # The answer at once; then what the page draws; then the figures that are files.
                 board.show(solved(pictures=False).page)
-                followed = solved(painters=drawing.executor)
+                followed = solved()
                 board.show(followed.page)
                 typer.echo(followed.told, err=True)
-                drawing.get_ready()
                 if figures and stamp(files) == before:
                     keep(results, place, Shown(quiet=True))
         except IdesignError as error:

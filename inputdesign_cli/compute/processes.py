@@ -39,29 +39,6 @@ class Processes:
             yield from pool.run(function, jobs)
 
 
-class StandingProcesses(Processes):
-    """Processes that stay from one run to the next, with what they have imported, until they are ended."""
-
-    def __init__(self, count: int) -> None:
-        super().__init__(count)
-        object.__setattr__(self, "_pool", _Pool(count))
-
-    _pool: _Pool
-
-    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
-        """Yield every job with its answer, in the order in which they are finished."""
-        return self._pool.run(function, jobs)
-
-    def start(self) -> None:
-        """Start them all; in the main thread they are deaf to its interrupts."""
-        for _ in range(self.count):
-            self._pool.submit(os.getpid)
-
-    def end(self) -> None:
-        """End them all."""
-        self._pool.close()
-
-
 class _Pool:
     """An executor of the standard library that is replaced where one of its processes was killed."""
 

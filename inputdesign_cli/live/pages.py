@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location
 from inputdesign_cli.report.render import filled
 from inputdesign_cli.report.run_page import run_page
@@ -66,17 +65,9 @@ class Followed:
         """The same while it is computed anew."""
         return replace(self, state="computing", told="The file was saved: computing ..", errors=())
 
-    def solved(
-        self,
-        run: Path,
-        clock: str,
-        seconds: float,
-        *,
-        pictures: bool = True,
-        painters: Executor | None = None,
-    ) -> Followed:
+    def solved(self, run: Path, clock: str, seconds: float, *, pictures: bool = True) -> Followed:
         """With the design in `run` and nothing wrong; without `pictures` these are still being drawn."""
-        made = run_page(run, pictures=pictures, painters=painters) | {"clock": clock}
+        made = run_page(run, pictures=pictures) | {"clock": clock}
         told = (
             f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
         )

@@ -19,44 +19,15 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.report.hover import SOURCE
+from inputdesign_cli.report.render import script, script_source
 
 HOST = "127.0.0.1"
 # Seconds that a page waits for news before it asks again, and that a client may take for its request.
 _PATIENCE, _SLOWEST = 20.0, 30.0
 _POLICY = (
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'self' "
-    + SOURCE
-    + "; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'self' {script_source()}; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-# Takes the new page as soon as there is one, and keeps what is folded out and where one has scrolled to.
-SCRIPT = """\
-"use strict";
-(async () => {
-  let version = document.documentElement.dataset.version;
-  const state = document.getElementById("connection");
-  for (;;) {
-    try {
-      const found = await (await fetch("news?version=" + version)).json();
-      state.textContent = "";
-      if (String(found.version) !== version) {
-        const text = await (await fetch("./")).text();
-        const page = new DOMParser().parseFromString(text, "text/html");
-        const open = [...document.querySelectorAll("details")].map((part) => part.open);
-        document.title = page.title;
-        document.querySelector("main").replaceWith(page.querySelector("main"));
-        document.dispatchEvent(new Event("replaced"));
-        document.querySelectorAll("details").forEach((part, i) => { part.open = open[i] || false; });
-        version = page.documentElement.dataset.version;
-      }
-    } catch (error) {
-      state.textContent = "idesign watch has ended: what stands here is not followed any more.";
-      await new Promise((done) => setTimeout(done, 1000));
-    }
-  }
-})();
-"""
 
 
 class Board:
@@ -151,7 +122,7 @@ class _Handler(BaseHTTPRequestHandler):
             page, version = self.shown.page
             self._answer("text/html", page.replace("<html ", f'<html data-version="{version}" ', 1))
         elif asked.path == f"{self.path_prefix}follow.js":
-            self._answer("text/javascript", SCRIPT)
+            self._answer("text/javascript", script("follow.js"))
         elif asked.path == f"{self.path_prefix}news":
             given = parse_qs(asked.query).get("version", ["0"])[0]
             version = int(given) if given.isdecimal() and len(given) < 10 else 0

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.outcome.curves import Curves
@@ -36,22 +35,15 @@ class Chart:
     readings: str = ""
 
 
-def run_charts(run: Path, files: object, time_unit: str, by: Executor) -> dict[str, Chart]:
+def run_charts(run: Path, files: object, time_unit: str) -> dict[str, Chart]:
     """The charts of a run by file stem, drawn for a page; of an older run the pictures that it has.
 
     Args:
         run: its directory.
         files: the names that its result lists.
         time_unit: of the spec.
-        by: draws them.
     """
-    jobs = [(stem, curves, time_unit) for stem, curves in read_curves(run).items()]
-    drawn: dict[str, Chart] = {}
-    for done in by.run(_readable, jobs):
-        if done.answer is None:
-            raise done.error or RuntimeError(f"{done.job[0]} was not drawn")
-        drawn[done.job[0]] = done.answer
-    charts = {stem: drawn[stem] for stem, _, _ in jobs}
+    charts = {stem: _readable(stem, curves, time_unit) for stem, curves in read_curves(run).items()}
     for name in files if isinstance(files, list) else ():
         stem, _, kind = name.rpartition(".")
         if kind in _PICTURES and stem not in charts and (run / name).is_file():
@@ -59,9 +51,7 @@ def run_charts(run: Path, files: object, time_unit: str, by: Executor) -> dict[s
     return charts
 
 
-def _readable(job: tuple[str, Curves, str]) -> Chart:
-    """The chart of a file stem, of its curves and the unit of time."""
-    stem, curves, time_unit = job
+def _readable(stem: str, curves: Curves, time_unit: str) -> Chart:
     caption = _caption(stem, curves)
     return readable_chart(
         lambda seen: draw(curves, time_unit, "svg", narrow=True, seen=seen),

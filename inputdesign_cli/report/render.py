@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -12,14 +13,12 @@ from typing import TYPE_CHECKING
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.record import RESULT, readable
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.hover import SCRIPT
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markupsafe import Markup
 
 _GENERATOR = b'<meta name="generator" content="idesign '
 
@@ -67,14 +66,17 @@ def _filled(
 
 def filled(template: str, content: Mapping[str, object]) -> str:
     """Return a template with its content; whatever text comes from a spec or a result is escaped."""
-    return _templates().get_template(template).render(version=__version__, hover=_script(), **content)
+    return _templates().get_template(template).render(version=__version__, **content)
 
 
-@cache
-def _script() -> Markup:
-    from markupsafe import Markup
+def script(name: str) -> str:
+    """Return a script of the pages, `hover.js` or `follow.js`."""
+    return _templates().get_template(name).render()
 
-    return Markup(SCRIPT)
+
+def script_source() -> str:
+    """Return the source by which the policy of a server lets the script inside a page run, and no other."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script('hover.js').encode()).digest()).decode()}'"
 
 
 @cache

@@ -6,7 +6,6 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
-from inputdesign_cli.compute.executor import Executor, InProcess
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.objectives import objective
@@ -44,13 +43,12 @@ _NOT_NUMBERS = frozenset(
 _MOST_ENTRIES = 16
 
 
-def run_page(run: Path, *, pictures: bool = True, painters: Executor | None = None) -> dict[str, object]:
+def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
     """Return the content of the template for a run, with pictures or not.
 
     Args:
         run: its directory.
         pictures: whether they are drawn.
-        painters: draw them (default: this process).
 
     Raises:
         DataError: as `read_run`, and `run-unreadable` where an entry is not what idesign writes.
@@ -64,11 +62,7 @@ def run_page(run: Path, *, pictures: bool = True, painters: Executor | None = No
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
         raise DataError.because("run-unreadable", message, hint="run the spec again") from error
-    charts = (
-        run_charts(run, outcome.provenance.get("files", ()), question.time_unit, painters or InProcess())
-        if pictures
-        else {}
-    )
+    charts = run_charts(run, outcome.provenance.get("files", ()), question.time_unit) if pictures else {}
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}

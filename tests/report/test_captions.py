@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli.compute.executor import InProcess
 from inputdesign_cli.outcome.curves import (
     BoundCurves,
     BoundPanel,
@@ -107,5 +106,5 @@ def test_every_kind_of_figure_has_a_caption():
 )
 def test_figures_of_a_run_are_captioned_by_what_they_show(stem, name, said, tmp_path):
     (tmp_path / FIGURES).write_bytes(curves_json({stem: CURVES[name]}))
-    chart = run_charts(tmp_path, {}, "s", InProcess())[stem]
+    chart = run_charts(tmp_path, {}, "s")[stem]
     assert said in chart.caption

@@ -4,7 +4,7 @@ import re
 
 import html5lib
 
-from inputdesign_cli.report.hover import SCRIPT
+from inputdesign_cli.report.render import script
 
 SPEC = """\
 title: "Heat <script>alert(1)</script> & flow"
@@ -22,7 +22,7 @@ XHTML = "{http://www.w3.org/1999/xhtml}"
 def parse(text):
     """The page, which must be valid HTML; whatever points out of it is an error."""
     page = html5lib.HTMLParser(strict=True).parse(text)
-    assert [script.text for script in page.findall(f".//{XHTML}script")] == [SCRIPT]
+    assert [one.text for one in page.findall(f".//{XHTML}script")] == [script("hover.js")]
     for element in page.iter():
         for name, value in element.attrib.items():
             assert not name.startswith("on"), "a script"
