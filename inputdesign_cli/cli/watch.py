@@ -39,6 +39,12 @@ def report(
             parser=path_option,
         ),
     ] = None,
+    bibtex: Annotated[
+        bool,
+        typer.Option(
+            "--bibtex", help="Print the sources of the methods that the run used, and write no page."
+        ),
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a run or a sweep as one HTML page.
@@ -49,8 +55,11 @@ def report(
     with status(f"{directory}: writing ...", quiet=quiet):
         from inputdesign_cli.outcome.record import PAGE
         from inputdesign_cli.outcome.run_directory import replace_text
-        from inputdesign_cli.report.render import is_page, report_text
+        from inputdesign_cli.report.render import bibtex_text, is_page, report_text
 
+        if bibtex:
+            typer.echo(bibtex_text(directory), nl=False)
+            return
         if str(output) == STANDARD_STREAM:
             typer.echo(report_text(directory))
             return

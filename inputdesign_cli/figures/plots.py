@@ -52,18 +52,14 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
 }
 
 
-def draw(
-    curves: Curves,
-    time_unit: str = "s",
-    file_type: FileType = "png",
-    *,
-    narrow: bool = False,
-    seen: Callable[[Figure], object] | None = None,
-) -> bytes:
-    """The figure of `curves` as a file, see `rendered`; frequencies are labelled rad per `time_unit`."""
-    return rendered(
-        lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type, narrow=narrow, seen=seen
-    )
+def painter(curves: Curves, time_unit: str = "s") -> Callable[[Figure], None]:
+    """Return what draws curves on an empty page; frequencies are labelled rad per `time_unit`."""
+    return lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit)
+
+
+def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> bytes:
+    """Return the figure of curves as a file, see `rendered`."""
+    return rendered(painter(curves, time_unit), file_type)
 
 
 def figure(results: Results, name: str) -> Figure:
@@ -72,12 +68,11 @@ def figure(results: Results, name: str) -> Figure:
     Raises:
         KeyError: the run has no such figure.
     """
-    curves = results.curves[name]
-    return painted(lambda page: _DRAWN_BY[type(curves)](page, curves, results.time_unit))
+    return painted(painter(results.curves[name], results.time_unit))
 
 
 def draw_all(results: Results, file_type: str = "png") -> dict[str, bytes]:
-    """The figures of a run by their file names: bound.png, spectrum.png, .., or in another format."""
+    """Return the figures of a run by their file names: bound.png, spectrum.png, .., or in another format."""
     kind = FILE_TYPES[file_type]
     return {
         f"{stem}.{kind}": draw(curves, results.time_unit, kind) for stem, curves in results.curves.items()

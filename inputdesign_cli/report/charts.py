@@ -1,4 +1,4 @@
-"""The charts of a report, drawn from figures.json of a run as SVG within the page."""
+"""The charts of a page: SVG within the page, drawn from the curves of a run or the table of a sweep."""
 
 from __future__ import annotations
 
@@ -9,55 +9,36 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.figures.plots import painter
 from inputdesign_cli.figures.readings import readings
+from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.curves_file import read_curves
-from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.described import captioned, described
+from inputdesign_cli.report.captions import captioned
 from inputdesign_cli.report.numbers import spoken
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_PICTURES = {"png": "image/png", "svg": "image/svg+xml"}
 # Figures of simulated runs: there is one of each for every input that was tried.
 _OF_RUNS = ("errors", "cloud", "disturbance")
 
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture for an <img>: its data, its text, a caption, and values for who points at it (JSON)."""
+    """A picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
 
     uri: str
-    alt: str
     caption: str
     readings: str = ""
 
 
-def run_charts(run: Path, files: object, time_unit: str) -> dict[str, Chart]:
-    """The charts of a run by file stem, drawn for a page; of an older run the pictures that it has.
-
-    Args:
-        run: its directory.
-        files: the names that its result lists.
-        time_unit: of the spec.
-    """
-    charts = {stem: _readable(stem, curves, time_unit) for stem, curves in read_curves(run).items()}
-    for name in files if isinstance(files, list) else ():
-        stem, _, kind = name.rpartition(".")
-        if kind in _PICTURES and stem not in charts and (run / name).is_file():
-            charts[stem] = file_chart(run / name)
-    return charts
-
-
-def _readable(stem: str, curves: Curves, time_unit: str) -> Chart:
-    caption = _caption(stem, curves)
-    return readable_chart(
-        lambda seen: draw(curves, time_unit, "svg", narrow=True, seen=seen),
-        described(curves, time_unit) or caption,
-        caption,
-    )
+def run_charts(run: Path, time_unit: str) -> dict[str, Chart]:
+    """Return the charts of the run in a directory by file stem; `time_unit` is that of the spec."""
+    return {
+        stem: chart(painter(curves, time_unit), _caption(stem, curves))
+        for stem, curves in read_curves(run).items()
+    }
 
 
 def _caption(stem: str, curves: Curves) -> str:
@@ -67,21 +48,9 @@ def _caption(stem: str, curves: Curves) -> str:
     return f"{caption[:-1]}: {spoken(name)}." if kind in _OF_RUNS and name else caption
 
 
-def readable_chart(drawn: Callable[[Callable[[Figure], object]], bytes], alt: str, caption: str) -> Chart:
-    """A chart of which values can be read; `drawn` makes the SVG and hands its page to what it is given."""
+def chart(paint: Callable[[Figure], object], caption: str) -> Chart:
+    """Return the chart that `paint` draws on an empty page; in an image its ids meet no others of a page."""
     panels: list[dict[str, object]] = []
-    content = drawn(lambda page: panels.extend(readings(page)))
-    told = json.dumps(panels, separators=(",", ":")) if panels else ""
-    return Chart(_svg_uri(content), alt, caption, told)
-
-
-def _svg_uri(content: bytes) -> str:
-    """An SVG file as a data URI: in an image its ids meet no others of the page."""
-    return "data:image/svg+xml;base64," + base64.b64encode(content).decode()
-
-
-def file_chart(path: Path) -> Chart:
-    """A figure of an older run as it is: what it shows is not known."""
-    data = base64.b64encode(read_regular(path)).decode()
-    caption = f"The figure {spoken(path.stem)} of the run."
-    return Chart(f"data:{_PICTURES[path.suffix[1:]]};base64,{data}", caption, caption)
+    content = rendered(paint, "svg", narrow=True, seen=lambda page: panels.extend(readings(page)))
+    uri = "data:image/svg+xml;base64," + base64.b64encode(content).decode()
+    return Chart(uri, caption, json.dumps(panels, separators=(",", ":")) if panels else "")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from inputdesign_cli.outcome import Assessment, Outcome, RequirementMet, Simulation
+from inputdesign_cli.outcome import Outcome, RequirementMet, Simulation
 from inputdesign_cli.outcome.exploration import Fit
 from inputdesign_cli.outcome.loop_error import LossMoments, TheoreticalLoss
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
@@ -24,21 +24,13 @@ def estimate_table(outcome: Outcome) -> Rows | None:
     found = outcome.identification
     if found is None or found.theta is None or found.standard_deviation is None:
         return None
-    deviations = found.standard_deviation
-    rows = tuple(
-        (name, _beside(value, deviations[name]), f"{deviations[name]:.2g}", _limits(value, deviations[name]))
-        for name, value in found.theta.items()
-    )
-    return Rows(("parameter", "estimate", "standard deviation", "95 % limits"), rows)
-
-
-def _limits(value: float, deviation: float) -> str:
-    return f"{value - _NORMAL * deviation:.4g} to {value + _NORMAL * deviation:.4g}"
-
-
-def _beside(value: float, deviation: float) -> str:
-    """An estimate; zero where it is nothing beside its standard deviation."""
-    return "0" if abs(value) < _NOTHING * deviation else f"{value:.6g}"
+    rows = []
+    for name, value in found.theta.items():
+        spread = found.standard_deviation[name]
+        said = "0" if abs(value) < _NOTHING * spread else f"{value:.6g}"
+        limits = f"{value - _NORMAL * spread:.4g} to {value + _NORMAL * spread:.4g}"
+        rows.append((name, said, f"{spread:.2g}", limits))
+    return Rows(("parameter", "estimate", "standard deviation", "95 % limits"), tuple(rows))
 
 
 def estimate_facts(outcome: Outcome) -> Iterator[Fact]:
@@ -46,21 +38,18 @@ def estimate_facts(outcome: Outcome) -> Iterator[Fact]:
     found = outcome.identification
     if found is not None and found.variance is not None:
         value = found.variance
-        if isinstance(value, float):
-            yield "noise", f"variance {value:.5g}", ""
-        else:
-            yield "noise", f"covariance [{'; '.join(listed(row) for row in value)}]", ""
+        single = isinstance(value, float)
+        text = f"variance {value:.5g}" if single else f"covariance [{'; '.join(map(listed, value))}]"
+        yield "noise", text, ""
     fit = None if found is None else found.fit_percent
     if fit is not None:
         several = "" if isinstance(fit, float) else "s"
         yield "fit", f"simulation explains {_per_cent(fit)} of the output{several}", ""
     unseen = outcome.validation
     if unseen is not None:
-        simulation, prediction = map(
-            _per_cent, (unseen.simulation_fit_percent, unseen.prediction_fit_percent)
-        )
-        text = f"simulation explains {simulation}, one-step prediction {prediction} of {_judging(outcome)}"
-        yield "validated", text, ""
+        simulated = f"simulation explains {_per_cent(unseen.simulation_fit_percent)}"
+        predicted = f"one-step prediction {_per_cent(unseen.prediction_fit_percent)}"
+        yield "validated", f"{simulated}, {predicted} of {_judging(outcome)}", ""
     tests = {} if found is None else {"whiteness": found.whiteness, "independence": found.independence}
     named = [f"{name} {test.probability:.2g}" for name, test in tests.items() if test is not None]
     if named:
@@ -89,24 +78,15 @@ def estimate_answer(outcome: Outcome) -> str:
     found, response = outcome.identification, outcome.frequency_response
     if response is not None and (found is None or found.theta is None):
         return f"The frequency response was measured at {response.frequencies} frequencies."
-    estimated = f"The model was estimated from {outcome.samples} samples{_explained(outcome)}."
-    return " ".join([estimated, *_unseen(outcome)])
-
-
-def _explained(outcome: Outcome) -> str:
-    """Say how much of the output a simulation of the model explains."""
-    fit = None if outcome.identification is None else outcome.identification.fit_percent
-    if fit is None:
-        return ""
-    return f"; simulated from the input alone, it explains {_per_cent(fit)} of these data"
-
-
-def _unseen(outcome: Outcome) -> Iterator[str]:
-    """Say how much of unseen data the structure explains, where a part of the record was kept for that."""
-    split = outcome.exploration is not None and outcome.exploration.split != "none"
-    if outcome.validation is not None and (split or outcome.exploration is None):
-        explained = _per_cent(outcome.validation.simulation_fit_percent)
-        yield f"The same structure, estimated from one part of them alone, explains {explained} of the other."
+    said = f"The model was estimated from {outcome.samples} samples"
+    fit = None if found is None else found.fit_percent
+    if fit is not None:
+        said += f"; simulated from the input alone, it explains {_per_cent(fit)} of these data"
+    explored, unseen = outcome.exploration, outcome.validation
+    if unseen is None or (explored is not None and explored.split == "none"):
+        return f"{said}."
+    explains = f"explains {_per_cent(unseen.simulation_fit_percent)} of the other"
+    return f"{said}. The same structure, estimated from one part of them alone, {explains}."
 
 
 # Why data leave a verdict open, by `assessment.causes`.
@@ -154,7 +134,12 @@ def verdict(outcome: Outcome) -> Iterator[str]:
             "the experiment below is what the model of these data still needs: after both the error is "
             f"{assessment.left:.4g} of what is admitted{right}; assess both records together"
         )
-    yield from _open_structure(assessment)
+    worst_open = max(assessment.neglected or (), key=lambda entry: entry.may_move, default=None)
+    if worst_open is not None and worst_open.may_move > 1.0:
+        yield (
+            f"that structure is open: one more parameter ({worst_open.parameter}), which these data do not "
+            f"rule out, may move G by up to {worst_open.may_move:.3g} times what is admitted (95 %)"
+        )
 
 
 def _from_rest(outcome: Outcome) -> str:
@@ -165,17 +150,6 @@ def _from_rest(outcome: Outcome) -> str:
     growth = details["begun_anywhere"]
     otherwise = "nothing is promised" if growth is None else f"{growth:.3g} times as much"
     return f" and the record begins at rest, its levels known (--operating-point; else {otherwise})"
-
-
-def _open_structure(assessment: Assessment) -> Iterator[str]:
-    """Name the parameter that these data do not rule out and that may move G most."""
-    entries = assessment.neglected or ()
-    worst = max(entries, key=lambda entry: entry.may_move, default=None)
-    if worst is not None and worst.may_move > 1.0:
-        yield (
-            f"that structure is open: one more parameter ({worst.parameter}), which these data do not "
-            f"rule out, may move G by up to {worst.may_move:.3g} times what is admitted (95 %)"
-        )
 
 
 def requirement_table(outcome: Outcome, time_unit: str) -> Rows | None:
@@ -244,35 +218,39 @@ def simulation_answer(outcome: Outcome) -> Iterator[str]:
 
 
 _COLUMNS: dict[str, Callable[[TriedInput], str]] = {
-    "loss": lambda entry: _mean(entry.loss),
-    "mean squared error": lambda entry: _squared_error(entry),
-    "theory": lambda entry: _theory(entry),
-    "mean estimate": lambda entry: _mean_estimate(entry),
-    "deviations over theory": lambda entry: _range(entry),
-    "worst over admitted": lambda entry: "" if entry.worst_ratio is None else shown(entry.worst_ratio),
-    "within r_adm": lambda entry: (
-        _share(entry.within_r_adm, entry.within_r_adm_limits) if entry.within_r_adm_true is None else ""
+    "loss": lambda one: _spread(one.loss),
+    "mean squared error": lambda one: (
+        "" if one.mse is None else _SPREAD.format(one.mse, one.mse_standard_error or 0.0)
     ),
-    "errors within r_adm of the plant of the spec": lambda entry: (
-        _share(entry.within_r_adm, entry.within_r_adm_limits) if entry.within_r_adm_true is not None else ""
+    "theory": lambda one: _theory(one),
+    "mean estimate": lambda one: (
+        listed(one.mean_estimate) if one.mse is not None and isinstance(one.mean_estimate, np.ndarray) else ""
     ),
-    "were the design model true": lambda entry: (
+    "deviations over theory": lambda one: _range(one),
+    "worst over admitted": lambda one: "" if one.worst_ratio is None else shown(one.worst_ratio),
+    "within r_adm": lambda one: _share(
+        one.within_r_adm, one.within_r_adm_limits, one.within_r_adm_true is None
+    ),
+    "errors within r_adm of the plant of the spec": lambda one: _share(
+        one.within_r_adm, one.within_r_adm_limits, one.within_r_adm_true is not None
+    ),
+    "were the design model true": lambda one: (
         ""
-        if entry.on_design_model is None
-        else _share(entry.on_design_model.within_r_adm, entry.on_design_model.within_r_adm_limits)
+        if one.on_design_model is None
+        else _share(one.on_design_model.within_r_adm, one.on_design_model.within_r_adm_limits)
     ),
-    "within r_u": lambda entry: _share(entry.within_r_u, entry.within_r_u_limits),
-    "cost": lambda entry: "" if entry.cost is None else f"{entry.cost:.5g}",
-    "errors within r_adm of the true plant": lambda entry: _share(
-        entry.within_r_adm_true, entry.within_r_adm_true_limits
+    "within r_u": lambda one: _share(one.within_r_u, one.within_r_u_limits),
+    "cost": lambda one: "" if one.cost is None else f"{one.cost:.5g}",
+    "errors within r_adm of the true plant": lambda one: _share(
+        one.within_r_adm_true, one.within_r_adm_true_limits
     ),
-    "over the spectrum that knows the plant": lambda entry: _mean_and_tail(entry.cost_over_oracle),
-    "over the record of that": lambda entry: _mean_and_tail(entry.cost_over_oracle_record),
-    "true ratio": lambda entry: _mean_and_tail(entry.true_ratio),
-    "samples": lambda entry: "" if entry.samples is None else f"{entry.samples.mean:.0f}",
-    "ended": lambda entry: _endings(entry),
-    "unstable loops": lambda entry: str(entry.unstable or ""),
-    "not settled": lambda entry: str(entry.not_converged or ""),
+    "over the spectrum that knows the plant": lambda one: _mean_and_tail(one.cost_over_oracle),
+    "over the record of that": lambda one: _mean_and_tail(one.cost_over_oracle_record),
+    "true ratio": lambda one: _mean_and_tail(one.true_ratio),
+    "samples": lambda one: "" if one.samples is None else f"{one.samples.mean:.0f}",
+    "ended": lambda one: ", ".join(f"{number} {way}" for way, number in _endings(one).items() if number),
+    "unstable loops": lambda one: str(one.unstable or ""),
+    "not settled": lambda one: str(one.not_converged or ""),
 }
 
 
@@ -296,8 +274,8 @@ def _reached(entry: RequirementMet) -> str:
     return f"{_named(entry)} reaches {entry.worst_ratio:.4g}"
 
 
-def _share(value: float | None, limits: Limits | None) -> str:
-    if value is None or limits is None:
+def _share(value: float | None, limits: Limits | None, wanted: bool = True) -> str:
+    if value is None or limits is None or not wanted:
         return ""
     low, high = (100 * limit for limit in limits)
     return f"{100 * value:.1f} %{BREAK}95 % limits {low:.1f} to {high:.1f}"
@@ -315,31 +293,18 @@ def _mean_and_tail(found: Spread | None) -> str:
     return "" if found is None else f"{found.mean:.3g}{BREAK}95 % below {found.quantile_95:.3g}"
 
 
-def _endings(entry: TriedInput) -> str:
-    ways = {
-        "stopped": entry.stopped,
-        "missed": entry.missed,
-        "undecided": entry.undecided,
-        "unplanned": entry.unplanned,
-    }
-    return ", ".join(f"{number} {way}" for way, number in ways.items() if number)
+def _endings(entry: TriedInput) -> dict[str, int | None]:
+    ways = {"stopped": entry.stopped, "missed": entry.missed, "undecided": entry.undecided}
+    return ways | {"unplanned": entry.unplanned}
 
 
-def _mean(found: LossMoments | None) -> str:
+def _spread(found: LossMoments | None) -> str:
     return "" if found is None else _SPREAD.format(found.mean, found.sd)
-
-
-def _squared_error(entry: TriedInput) -> str:
-    return "" if entry.mse is None else _SPREAD.format(entry.mse, entry.mse_standard_error or 0.0)
 
 
 def _theory(entry: TriedInput) -> str:
     if entry.theory is None:
         return ""
-    return _mean(entry.theory.loss) if isinstance(entry.theory, TheoreticalLoss) else shown(entry.theory.mse)
-
-
-def _mean_estimate(entry: TriedInput) -> str:
-    if entry.mse is None or not isinstance(entry.mean_estimate, np.ndarray):
-        return ""
-    return listed(entry.mean_estimate)
+    return (
+        _spread(entry.theory.loss) if isinstance(entry.theory, TheoreticalLoss) else shown(entry.theory.mse)
+    )

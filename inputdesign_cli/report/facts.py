@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from inputdesign_cli.outcome import (
-    ClosedLoopError,
-    Loop,
-    MeasuredLines,
-    Objective,
-    Outcome,
-    RequirementMet,
-    Robust,
-    Signal,
-)
+from inputdesign_cli.outcome import ClosedLoopError, Loop, MeasuredLines, Objective, Outcome, Robust, Signal
 from inputdesign_cli.outcome.design import Coverage
 from inputdesign_cli.outcome.objectives import objective
 from inputdesign_cli.outcome.robust import ActivePlant, FreshPlants, SearchedPlant
@@ -61,7 +52,7 @@ def _value_and_cost(outcome: Outcome) -> Iterator[Fact]:
     kind = None if found is None else found.kind
     if found is not None:
         name = cost if kind == "least_cost" else objective(kind).name
-        value, by = _clean(found.value, found.kind), _paid(outcome)
+        value, by = shown(found.value), _paid(outcome)
         if kind == "shortest_experiment":
             value, by = str(length(outcome)), f"by the spectrum alone {value}"
         yield name, value, "; ".join(filter(None, [by, white(outcome)]))
@@ -93,26 +84,15 @@ def _accuracy(outcome: Outcome, time_unit: str) -> Iterator[Fact]:
         at = "" if error.worst_frequency is None else f" at {error.worst_frequency:.4g} rad/{time_unit}"
         of = "" if outcome.robust is None else "at the plant of the spec"
         yield "model error", f"r_u / r_adm at most {error.worst_ratio:.6g}{at}", of
-    for requirement in _requirements(outcome):
+    assessed = () if outcome.assessment is None else outcome.assessment.requirements
+    for requirement in outcome.requirements if outcome.requirements is not None else assessed:
         if requirement.loop is not None:
             yield _loop(requirement.loop, time_unit)
     lines = outcome.frequency_response
     if lines is not None and lines.worst_ratio is not None:
         yield _lines(lines, time_unit)
     if error is not None and error.confidence is not None:
-        kept = error.confidence
-        yield (
-            "confidence",
-            _kept(kept),
-            f"asked {100 * (kept.asked or 0.0):g} %; chi-squared would take alpha "
-            f"{kept.chi_squared_alpha or 0.0:.4g}, not {error.alpha:.4g}",
-        )
-
-
-def _requirements(outcome: Outcome) -> tuple[RequirementMet, ...]:
-    if outcome.requirements is not None:
-        return outcome.requirements
-    return () if outcome.assessment is None else outcome.assessment.requirements
+        yield _kept(error.confidence, error.alpha)
 
 
 def _of_structure(found: ClosedLoopError) -> Fact:
@@ -125,14 +105,16 @@ def _of_structure(found: ClosedLoopError) -> Fact:
     return "for this structure", shown(design.value), compared
 
 
-def _kept(found: Coverage) -> str:
+def _kept(found: Coverage, alpha: float | None) -> Fact:
     """How many estimates meet the bounds: from simulated experiments, or drawn by asymptotic theory."""
-    if found.kept is None or found.kept_limits is None:
-        share = _share(found.exact, found.exact_limits)
-        return f"{share} of {found.draws} estimates drawn by asymptotic theory meet it"
-    beyond = found.kept_limits[0] > (found.asked or 0.0) + _ROOM
-    more = ", more than asked: it costs more than it need" if beyond else ""
-    return f"{_share(found.kept, found.kept_limits)} of {found.runs} simulated experiments meet it{more}"
+    share = _share(found.exact, found.exact_limits)
+    text = f"{share} of {found.draws} estimates drawn by asymptotic theory meet it"
+    if found.kept is not None and found.kept_limits is not None:
+        beyond = found.kept_limits[0] > (found.asked or 0.0) + _ROOM
+        more = ", more than asked: it costs more than it need" if beyond else ""
+        text = f"{_share(found.kept, found.kept_limits)} of {found.runs} simulated experiments meet it{more}"
+    chi_squared = f"chi-squared would take alpha {found.chi_squared_alpha or 0.0:.4g}, not {alpha:.4g}"
+    return "confidence", text, f"asked {100 * (found.asked or 0.0):g} %; {chi_squared}"
 
 
 def _share(value: float, limits: tuple[float, float]) -> str:
@@ -142,11 +124,10 @@ def _share(value: float, limits: tuple[float, float]) -> str:
 
 def _limits(outcome: Outcome) -> Iterator[str]:
     """Which limits the design exhausts, and how far single samples of the record use theirs."""
-    binding = [_limit(limit.name) for limit in outcome.limits or () if limit.binding]
+    binding = dict.fromkeys(_limit(limit.name) for limit in outcome.limits or () if limit.binding)
     shares = {} if outcome.signal is None else outcome.signal.of_limits or {}
     if binding:
-        by = " by the spectrum" if shares else ""
-        yield f"{', '.join(dict.fromkeys(binding))} exhausted{by}"
+        yield f"{', '.join(binding)} exhausted{' by the spectrum' if shares else ''}"
     if shares:
         taken = sorted(shares, key=lambda name: -shares[name])
         yield f"single samples take {', '.join(f'{100 * shares[k]:.3g} % of {_limit(k)}' for k in taken)}"
@@ -199,68 +180,50 @@ def _paid(outcome: Outcome) -> str:
 
 def _robust(found: Robust, target: Objective | None) -> Iterator[Fact]:
     """What holds at the plants that the true one might be, and at others drawn in the same way."""
+    best = target is not None and target.kind == "accuracy_factor"
     again = f"{found.rejected} that were unstable, or no plants, were drawn again" if found.rejected else ""
     yield "plants", _held_at(found), again
     if found.floor is not None:
-        raised, lost = len(found.floor.raised), len(found.floor.lost)
-        never = f"; at {lost} of them no model keeps what is asked" if lost else ""
-        yield (
-            "floor",
-            f"of these plants {raised} are held to {found.floor.share:g} of the r_adm of the plant of "
-            f"the spec only{never}",
-            "see the notes",
-        )
+        never = f"; at {len(found.floor.lost)} of them no model keeps what is asked" * bool(found.floor.lost)
+        held = f"of these plants {len(found.floor.raised)} are held to {found.floor.share:g} of the r_adm"
+        yield "floor", f"{held} of the plant of the spec only{never}", "see the notes"
     bound = [_bound_by(item) for item in found.active[:3]]
     if found.missed is not None:
         yield "least served", f"{bound[0]}: {found.worst_share:.4g} of what is admitted", ""
     elif bound:
         yield "binding", ", ".join(bound) + (", .." if len(found.active) > len(bound) else ""), ""
     if found.dearest is not None:
-        number = found.dearest.scenario
-        at = f"plant {number}" if number else "the plant of the spec"
+        at = f"plant {found.dearest.scenario}" if found.dearest.scenario else "the plant of the spec"
         yield "dearest", f"{at}, where it costs {shown(found.dearest.cost)}", ""
     if found.searched is not None:
         tried = f"searched by ascent from {found.searched.tried} plants, not proved"
         yield "worst plant", _worst_found(found.searched, target), tried
-    if found.fresh is not None:
-        yield from _fresh(found.fresh, best=target is not None and target.kind == "accuracy_factor")
+    fresh = found.fresh
+    if fresh is not None:
+        low, high = (f"{100 * share:.3g}" for share in fresh.limits)
+        share = f"{per_cent(fresh.share)} ({low} to {high})"
+        drawn = f"of {fresh.draws} more, drawn alike, {_missed(fresh, best)}: {share}"
+        lost = f", {fresh.lost} of which no model keeps what is asked" if fresh.lost else ""
+        floor = f"{fresh.raised} are held to the floor only{lost}" if fresh.raised else ""
+        yield "fresh plants", drawn, floor or "said of plants drawn as the spec says, not of the true plant"
+    if fresh is not None and fresh.beyond_limits is not None:
+        peaks = fresh.beyond_limits
+        beyond = f"{peaks.draws} go beyond, up to {per_cent(peaks.largest)} of a limit"
+        text = (
+            f"single samples keep them at the plants that the design is for; of {fresh.draws} more {beyond}"
+        )
+        yield "limits there", text, "without noise"
 
 
 def _held_at(found: Robust) -> str:
-    kept = found.scenarios - found.discarded
+    added = 0 if found.searched is None else found.searched.added
+    kept = found.scenarios - found.discarded - added
     left = f"; {found.discarded} are left out" if found.discarded else ""
     drawn = "listed" if found.source == "scenarios" else "drawn"
-    added = 0 if found.searched is None else found.searched.added
     sought = f" and {added} that a search found" if added else ""
     asked = "what is asked" if found.floor is None else "what is asked, or the floor below,"
     holds = f"is missed at {found.missed} of" if found.missed else "holds at"
-    return f"{asked} {holds} the plant of the spec and {kept - added} {drawn}{sought}{left}"
-
-
-def _fresh(found: FreshPlants, *, best: bool) -> Iterator[Fact]:
-    low, high = (f"{100 * share:.3g}" for share in found.limits)
-    yield (
-        "fresh plants",
-        f"of {found.draws} more, drawn alike, {_missed(found, best)}: {per_cent(found.share)} "
-        f"({low} to {high})",
-        _held(found) or "said of plants drawn as the spec says, not of the true plant",
-    )
-    if found.beyond_limits is not None:
-        peaks = found.beyond_limits
-        yield (
-            "limits there",
-            f"single samples keep them at the plants that the design is for; of {found.draws} more "
-            f"{peaks.draws} go beyond, up to {per_cent(peaks.largest)} of a limit",
-            "without noise",
-        )
-
-
-def _held(found: FreshPlants) -> str:
-    """What counts as met where r_adm is the floor at some of the fresh plants."""
-    if not found.raised:
-        return ""
-    lost = f", {found.lost} of which no model keeps what is asked" if found.lost else ""
-    return f"{found.raised} are held to the floor only{lost}"
+    return f"{asked} {holds} the plant of the spec and {kept} {drawn}{sought}{left}"
 
 
 def _missed(found: FreshPlants, best: bool) -> str:
@@ -278,15 +241,14 @@ def _missed(found: FreshPlants, best: bool) -> str:
 def _worst_found(found: SearchedPlant, target: Objective | None) -> str:
     """How bad the worst plant is: its ratio, relative to the ratio that is reached where that is best."""
     share, kind = found.share, None if target is None else target.kind
-    if kind in (None, "least_cost", "shortest_experiment"):
+    if target is None or kind in ("least_cost", "shortest_experiment"):
         return f"{share:.4g} of what is admitted is the worst that was found in {found.region}"
-    best = target is not None and kind == "accuracy_factor"
-    reached = f": {share * target.value:.4g} of what is admitted" if best and target is not None else ""
+    reached = f": {share * target.value:.4g} of what is admitted" if kind == "accuracy_factor" else ""
+    design = f"those that the design is for{reached}"
     if share <= 1.0 + _AS_MUCH:
-        none = f"none was found in {found.region} that errs more"
-        return f"{none} than those that the design is for{reached}"
-    more = f"errs {per_cent(share - 1.0)} more than those that the design is for"
-    return f"the worst that was found in {found.region} {more}{reached}"
+        return f"none was found in {found.region} that errs more than {design}"
+    more = per_cent(share - 1.0)
+    return f"the worst that was found in {found.region} errs {more} more than {design}"
 
 
 def _bound_by(item: ActivePlant) -> str:
@@ -308,20 +270,13 @@ def white(outcome: Outcome) -> str:
     multiple = kind in ("least_cost", "closed_loop_error")
     if value is None or (multiple and (found.ratio is None or not value)):
         return ""
-    said = f"white excitation: {_clean(value, kind)}"
+    said = f"white excitation: {shown(value)}"
     if not multiple or found.ratio is None:
         return said
     said += ", as much" if f"{found.ratio:.3g}" == "1" else f", {found.ratio:.3g} times as much"
     loop = outcome.closed_loop_error
     asymptotic = loop is not None and loop.covariance == "asymptotic"
     return f"{said}, both by asymptotic theory with model order factor 1" if asymptotic else said
-
-
-def _gap(relative: float) -> str:
-    """How near the proof comes to the value."""
-    return (
-        f", gap {relative:.1e}" if relative >= _CLOSED else f", gap below {_CLOSED:.0e}".replace("e-0", "e-")
-    )
 
 
 def proofs(outcome: Outcome) -> Iterator[str]:
@@ -337,8 +292,10 @@ def proofs(outcome: Outcome) -> Iterator[str]:
         family = f"no {outcome.moments.structure} moments get"
     for bound, side in ((found.lower_bound, "below"), (found.upper_bound, "above")):
         if bound is not None and found.relative_gap != 1.0:  # 1 stands for "nothing is proved yet"
-            gap = "" if found.relative_gap is None else _gap(found.relative_gap)
-            yield f"{family} {side} {shown(bound)}{gap}"
+            gap = "below 1e-6" if (found.relative_gap or 0.0) < _CLOSED else f"{found.relative_gap:.1e}"
+            yield f"{family} {side} {shown(bound)}" + (
+                f", gap {gap}" if found.relative_gap is not None else ""
+            )
     side = "above" if objective(found.kind).maximised else "below"
     if found.any_spectrum_bound is not None:
         yield f"no spectrum at all gets {side} {shown(found.any_spectrum_bound)}"
@@ -346,9 +303,8 @@ def proofs(outcome: Outcome) -> Iterator[str]:
         yield f"no moments at all get {side} {shown(found.any_structure_bound)}"
 
 
-def _clean(value: float, kind: str) -> str:
-    """Seven digits; a logarithm (criterion D) that is zero up to rounding is zero."""
-    return shown(0.0 if kind == "D" and abs(value) < 1e-12 else value)
+def _closed(gap: float) -> str:
+    return "below 1e-6" if gap < _CLOSED else f"{gap:.1e}"
 
 
 def _signal(outcome: Outcome, signal: Signal) -> Iterator[str]:

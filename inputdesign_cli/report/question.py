@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from inputdesign_cli.outcome.objectives import objective
 from inputdesign_cli.report.numbers import spoken
 from inputdesign_cli.specification import PolynomialPlant, Spec, parse_spec
+from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
 from inputdesign_cli.specification.models.uncertainty import SOURCES
@@ -69,13 +70,11 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
 
 
 def _units(spec: Spec) -> str:
-    """In which units the numbers are."""
+    """Return in which units the numbers are."""
     named = [f"{name} in {one.unit}" for name, one in (spec.channels or {}).items() if one.unit]
     signals = ", ".join(named) or "signals in the units of the spec"
-    return (
-        f"{signals}; powers are mean squares, in the squares of these; time in {spec.time_unit}, frequencies "
-        f"in rad/{spec.time_unit}"
-    )
+    clock = f"time in {spec.time_unit}, frequencies in rad/{spec.time_unit}"
+    return f"{signals}; powers are mean squares, in the squares of these; {clock}"
 
 
 def _family(spec: Spec) -> str:
@@ -87,33 +86,24 @@ def _system(spec: Spec) -> str:
     plant = spec.plant
     if plant.kind == "regression":
         return "The system is a linear regression with neglected regressors."
+    kinds = {"state_space": "a state-space", "continuous": "a continuous-time"}
+    kind = _structure(plant, spec.noise) if plant.kind == "polynomial" else kinds[plant.kind]
     size = f"{_count(plant.inputs, 'input')} and {_count(plant.outputs, 'output')}"
-    kind = "state-space" if plant.kind == "state_space" else "continuous-time"
-    if plant.kind == "polynomial":
-        kind = _structure(plant, spec.noise)
     clock = f", sampled every {spec.sample_time:g} {spec.time_unit}" if plant.sampled else ""
-    article = "an" if kind[0] in "AEFIOaeio" else "a"
-    called = [
+    called = "; ".join(
         f"{name} is {one.name or 'measured'}{f' in {one.unit}' if one.unit else ''}"
         for name, one in (spec.channels or {}).items()
-    ]
-    words = f" {'; '.join(called)}." if called else ""
-    return f"The system is {article} {kind} system with {size}{clock}.{words}"
+    )
+    return f"The system is {kind} system with {size}{clock}.{f' {called}.' if called else ''}"
 
 
 def _structure(plant: PolynomialPlant, noise: Noise) -> str:
-    dynamic = {
-        "A": plant.A != (1.0,),
-        "C": noise.C != (1.0,),
-        "D": noise.D != (1.0,),
-        "F": plant.F is not None,
-    }
-    present = "".join(name for name, there in dynamic.items() if there)
+    there = {"A": plant.A != (1.0,), "C": noise.C != (1.0,), "D": noise.D != (1.0,), "F": plant.F is not None}
     names = {
-        "": "finite impulse response", "A": "ARX", "AC": "ARMAX", "F": "output-error",
-        "CF": "Box-Jenkins", "DF": "Box-Jenkins", "CDF": "Box-Jenkins",
+        "": "a finite impulse response", "A": "an ARX", "AC": "an ARMAX", "F": "an output-error",
+        "CF": "a Box-Jenkins", "DF": "a Box-Jenkins", "CDF": "a Box-Jenkins",
     }  # fmt: skip
-    return names.get(present, "general polynomial")
+    return names.get("".join(name for name, is_there in there.items() if is_there), "a general polynomial")
 
 
 def _experiment(spec: Spec) -> str:
@@ -142,56 +132,57 @@ def _uncertain(spec: Spec) -> list[str]:
     return [f"What is asked must hold for this plant and {number} drawn from {drawn}."]
 
 
+_SENTENCES = {
+    "information": "The information matrix must exceed a given matrix.",
+    "application": "The confidence region of the model must lie where the application tolerates it.",
+    "weighted_variance": "The weighted variance of the frequency response is bounded.",
+    "standard_deviation": "Standard deviations of parameters are bounded.",
+    "closed_loop_error": "A controller is designed on the model; what counts is the error of its loop.",
+}
+
+
 def _accuracy(spec: Spec) -> list[str]:
-    accuracy = spec.accuracy
-    sentences = []
-    error = accuracy.error
-    if error is not None:
-        size = (
-            f"alpha = {error.alpha:g}" if error.alpha else f"{100 * (error.probability or 0):g} % confidence"
-        )
-        if error.relative is not None:
-            bound = f"{100 * error.relative:g} % of |G|"
-        elif error.absolute is not None:
-            bound = f"{error.absolute:g}"
-        elif error.table is not None:
-            bound = f"the table {error.table}"
-        else:
-            bound = "what keeps the sensitivity of the loop within its bound"
-        band = "every frequency"
-        if error.band is not None:
-            low, high = error.band
-            band += f" from {low:g} to {high:.6g} rad/{spec.time_unit}"
-        what = f"the error r_u of the model ({size})"
-        if error.calibrated is not None:
-            what = f"the error of {100 * (error.calibrated.exact or 0):g} % of the estimates"
-        sentences.append(f"At {band}, {what} must not exceed the admissible error r_adm: {bound}.")
-    lines = accuracy.frequency_response
-    if lines is not None:
-        most = "what the table admits" if lines.absolute is None else f"{lines.absolute:g}"
-        most = most if lines.relative is None else f"{100 * lines.relative:g} % of |G|"
+    accuracy, sentences = spec.accuracy, []
+    if accuracy.error is not None:
+        sentences.append(_model_error(accuracy.error, spec.time_unit))
+    if accuracy.frequency_response is not None:
         sentences.append(
             "The frequency response is measured line by line, without a model, by an input that repeats: its "
-            f"standard deviation must not exceed {most} at any line."
+            f"standard deviation must not exceed {_admitted(accuracy.frequency_response)} at any line."
         )
-    others = {
-        "information": "The information matrix must exceed a given matrix.",
-        "application": "The confidence region of the model must lie where the application tolerates it.",
-        "weighted_variance": "The weighted variance of the frequency response is bounded.",
-        "standard_deviation": "Standard deviations of parameters are bounded.",
-        "closed_loop_error": "A controller is designed on the model; what counts is the error of its loop.",
-    }
-    sentences += [others[name] for name, value in accuracy if name in others and value is not None]
-    if accuracy.mean_squared_error is not None:
-        target = accuracy.mean_squared_error.target
-        most = "is to be small" if target is None else f"must not exceed {target:g}"
+    sentences += [text for name, text in _SENTENCES.items() if dict(accuracy)[name] is not None]
+    squared = accuracy.mean_squared_error
+    if squared is not None:
+        most = "is to be small" if squared.target is None else f"must not exceed {squared.target:g}"
         sentences.append(
             f"The mean squared error of the estimate, bias and variance together, {most}, whatever the "
-            f"neglected parameters up to a norm of {accuracy.mean_squared_error.neglected_norm:g}."
+            f"neglected parameters up to a norm of {squared.neglected_norm:g}."
         )
     if accuracy.criterion is not None:
         sentences.append(f"What counts is criterion {accuracy.criterion} of the information matrix.")
     return sentences
+
+
+def _model_error(error: ModelError, time_unit: str) -> str:
+    size = f"alpha = {error.alpha:g}" if error.alpha else f"{100 * (error.probability or 0):g} % confidence"
+    what = f"the error r_u of the model ({size})"
+    if error.calibrated is not None:
+        what = f"the error of {100 * (error.calibrated.exact or 0):g} % of the estimates"
+    band = ""
+    if error.band is not None:
+        band = f" from {error.band[0]:g} to {error.band[1]:.6g} rad/{time_unit}"
+    admitted = f"the admissible error r_adm: {_admitted(error)}"
+    return f"At every frequency{band}, {what} must not exceed {admitted}."
+
+
+def _admitted(bound: ModelError | FrequencyResponse) -> str:
+    if bound.relative is not None:
+        return f"{100 * bound.relative:g} % of |G|"
+    if bound.absolute is not None:
+        return f"{bound.absolute:g}"
+    if bound.table is not None:
+        return f"the table {bound.table}"
+    return "what keeps the sensitivity of the loop within its bound"
 
 
 def _limits(spec: Spec) -> list[str]:
@@ -199,17 +190,18 @@ def _limits(spec: Spec) -> list[str]:
     return [f"Limits hold for: {', '.join(names)}."] if names else []
 
 
+_GOALS = {
+    "identify": "the model that explains the recorded data, and how sure it is.",
+    "assess": "do the recorded data meet this accuracy; if not, which experiment is still needed?",
+    "campaign": "an experiment in parts, each designed on the data so far, until these meet the accuracy.",
+    "analyse": "what accuracy the given excitation buys.",
+}
+
+
 def _goal(spec: Spec, verb: str) -> str:
-    if verb == "identify":
-        return "Asked: the model that explains the recorded data, and how sure it is."
-    if verb == "assess":
-        return "Asked: do the recorded data meet this accuracy; if not, which experiment is still needed?"
-    if verb == "campaign":
-        return (
-            "Asked: an experiment in parts, each designed on the data so far, until these meet the accuracy."
-        )
-    if not spec.designs or verb == "analyse":
-        return "Asked: what accuracy the given excitation buys."
+    verb = verb if verb in ("identify", "assess", "campaign") or spec.designs else "analyse"
+    if verb in _GOALS:
+        return f"Asked: {_GOALS[verb]}"
     family, stated = _SPECTRA.get(_family(spec), ""), spec.spectrum
     among = f" among {family}" if family else ""
     if isinstance(stated, FirSpectrum | PolynomialSpectrum) and stated.order:

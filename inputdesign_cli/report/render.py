@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.record import RESULT, readable
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.run_page import run_page
-from inputdesign_cli.report.sweep_page import sweep_page
+from inputdesign_cli.report.run_page import run_page, run_sources
+from inputdesign_cli.report.sweep_page import sweep_page, sweep_sources
 from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:
@@ -24,18 +24,39 @@ _GENERATOR = b'<meta name="generator" content="idesign '
 
 
 def report_text(directory: Path) -> str:
-    """The page about a run directory or about the directory of a sweep.
+    """Return the page about a run directory or about the directory of a sweep.
 
     Raises:
         DataError: `run-missing`, `run-incomplete`, `run-unreadable`.
     """
-    if (directory / "sweep.json").is_file():
+    if _is_sweep(directory):
         return _filled("sweep.html", directory, "sweep.csv", sweep_page)
+    return _filled("run.html", directory, RESULT, run_page)
+
+
+def bibtex_text(directory: Path) -> str:
+    """Return the sources of the methods that a run or a sweep used, as a BibTeX file.
+
+    Raises:
+        DataError: as `report_text`.
+    """
+    found = sweep_sources(directory) if _is_sweep(directory) else run_sources(directory)
+    return "\n".join(source.bibtex for source in found)
+
+
+def _is_sweep(directory: Path) -> bool:
+    """Return whether there is a sweep; else there is a run.
+
+    Raises:
+        DataError: `run-missing`, there is neither.
+    """
+    if (directory / "sweep.json").is_file():
+        return True
     if (directory / RESULT).is_file():
-        return _filled("run.html", directory, RESULT, run_page)
+        return False
     message = f"{directory} holds neither a finished run nor a sweep"
     hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
-    raise DataError.because("run-missing", message, hint)
+    raise DataError.because("run-missing", message, hint=hint)
 
 
 def is_page(file: Path) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError, SpecError
@@ -24,8 +24,8 @@ from inputdesign_cli.report.evidence import (
 )
 from inputdesign_cli.report.facts import facts, length, proofs, white
 from inputdesign_cli.report.numbers import provenance, shown
-from inputdesign_cli.report.question import read_question
-from inputdesign_cli.report.sources import assumptions, citations
+from inputdesign_cli.report.question import Question, read_question
+from inputdesign_cli.report.sources import Source, assumptions, citations
 
 # Headings and the charts that belong under them; charts of data and of simulated runs have their own.
 _SECTIONS = (
@@ -56,13 +56,8 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
     result = read_run(run)
     outcome = read_outcome(run, result)
     verb = _verb(outcome)
-    text = read_regular(run / "spec.yaml").decode()
-    try:
-        question = read_question(text, str(run / "spec.yaml"), verb)
-    except SpecError as error:
-        message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
-        raise DataError.because("run-unreadable", message, hint="run the spec again") from error
-    charts = run_charts(run, outcome.provenance.get("files", ()), question.time_unit) if pictures else {}
+    question, text = _asked(run, verb)
+    charts = run_charts(run, question.time_unit) if pictures else {}
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
@@ -73,6 +68,8 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
     estimated, simulated = estimate_table(outcome), simulation_table(outcome.simulation)
     cited, assumed = citations(question, outcome), assumptions(question, outcome)
     top_up = None if outcome.assessment is None else outcome.assessment.top_up_status
+    made_from, environment = (outcome.provenance.get(name) for name in ("made_from", "environment"))
+    sources = [Path(str(name)).name for name in made_from] if isinstance(made_from, list) else []
     return {
         "title": question.title or run.resolve().name,
         "contents": [
@@ -106,13 +103,13 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
         "simulated_runs": None if outcome.simulation is None else outcome.simulation.runs,
         "run_charts": runs,
         "assumptions": assumed,
-        "command": _command(verb, outcome),
+        "command": _command(verb, outcome, sources),
         "explored": outcome.exploration is not None,
         "campaign": verb == "campaign",
-        "files": _data_files(outcome),
+        "files": sources[1:],
         "spec": text,
         "provenance": provenance(
-            _environment(outcome),
+            environment if isinstance(environment, Mapping) else {},
             [
                 ("SHA-256 of spec.yaml", str(outcome.provenance.get("spec_sha256", "")), ""),
                 ("seed of the signal", str(question.seed), ""),
@@ -123,44 +120,48 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
     }
 
 
+def run_sources(run: Path) -> list[Source]:
+    """Return the sources of the methods that a run used.
+
+    Raises:
+        DataError: as `run_page`.
+    """
+    outcome = read_outcome(run)
+    return citations(_asked(run, _verb(outcome))[0], outcome)
+
+
+def _asked(run: Path, verb: str) -> tuple[Question, str]:
+    """Return the question of a run, and the text of its spec."""
+    file = run / "spec.yaml"
+    text = read_regular(file).decode()
+    try:
+        return read_question(text, str(file), verb), text
+    except SpecError as error:
+        message = f"{file} is no spec of this version: {error}"
+        raise DataError.because("run-unreadable", message, hint="run the spec again") from error
+
+
 def _verb(outcome: Outcome) -> str:
-    if outcome.campaign is not None:
-        return "campaign"
-    if outcome.assessment is not None:
-        return "assess"
-    if outcome.identification is not None:
-        return "identify"
-    if outcome.simulation is not None:
-        return "simulate"
-    return "analyse" if outcome.objective is None else "solve"
+    found = {
+        "campaign": outcome.campaign,
+        "assess": outcome.assessment,
+        "identify": outcome.identification,
+        "simulate": outcome.simulation,
+        "solve": outcome.objective,
+    }
+    return next((verb for verb, part in found.items() if part is not None), "analyse")
 
 
-def _environment(outcome: Outcome) -> Mapping[str, object]:
-    found = outcome.provenance.get("environment", {})
-    return found if isinstance(found, Mapping) else {}
-
-
-def _sources(outcome: Outcome) -> list[str]:
-    """The names of the files that the run was made from, the spec first."""
-    found = outcome.provenance.get("made_from", ())
-    return [Path(str(name)).name for name in found] if isinstance(found, list) else []
-
-
-def _data_files(outcome: Outcome) -> list[str]:
-    """The names of the records that the run was made from."""
-    return _sources(outcome)[1:]
-
-
-def _command(verb: str, outcome: Outcome) -> str:
+def _command(verb: str, outcome: Outcome, sources: Sequence[str]) -> str:
     """Return the command that makes the run again, with its data and what was removed from them."""
     if outcome.exploration is not None:
-        names = _sources(outcome) or ["DATA"]
         columns = ",".join(f"{role}={column}" for role, column in outcome.exploration.channels.items())
-        return shlex.join(["idesign", "explore", *names, *(["--columns", columns] if columns else [])])
+        options = ["--columns", columns] if columns else []
+        return shlex.join(["idesign", "explore", *(sources or ["DATA"]), *options])
     found = outcome.identification
     if verb not in ("assess", "identify") or found is None:
         return f"idesign {verb} spec.yaml"
-    data = _data_files(outcome) or ["DATA"]
+    data = sources[1:] or ["DATA"]
     words = [verb, "spec.yaml", *data] if verb == "assess" else [verb, *data, "--spec", "spec.yaml"]
     if verb == "identify" and found.theta is None:
         words.append("--frequency-response")

@@ -2,43 +2,41 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.report.question import Question
 
-_LEAST_COSTLY = (
-    "X. Bombois and G. Scorletti, Design of least costly identification experiments, Journal Européen des "
-    "Systèmes Automatisés 46 (2012) 587-610."
-)
-_ASYMPTOTIC = (
-    "C. R. Rojas, H. Hjalmarsson and R. Hildebrand, MIMO experiment design based on asymptotic model order "
-    "theory."
-)
-_MEAN_SQUARED = (
-    "D. Eckhard, H. Hjalmarsson, C. R. Rojas and M. Gevers, Mean-squared error experiment design for linear "
-    "regression models."
-)
-_SPECTRAL = (
-    "M. Mohan, Mithun and B. Bhikkaji, Optimal input design for system identification using spectral "
-    "decomposition."
-)
-_EQUIVALENCE = (
-    "J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canadian Journal of Mathematics "
-    "12 (1960) 363-366: the idea behind the bound over every spectrum."
-)
-_SCENARIOS = (
-    "M. C. Campi and S. Garatti, The exact feasibility of randomized solutions of uncertain convex programs, "
-    "SIAM Journal on Optimization 19 (2008) 1211-1230.",
-    "M. C. Campi and S. Garatti, Wait-and-judge scenario optimization, Mathematical Programming 167 (2018) "
-    "155-189.",
-)
-_FREQUENCY_RESPONSE = (
-    "R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, second edition, "
-    "Wiley, 2012: frequency responses from periodic excitation."
-)
-_PREDICTION_ERROR = (
-    "L. Ljung, System Identification: Theory for the User, second edition, Prentice Hall, 1999: prediction "
-    "errors and their asymptotic covariance."
-)
+_ENTRY = re.compile(r"^@\w+\{([^,]+),\n(.*?)^\}\n", re.MULTILINE | re.DOTALL)
+_FIELD = re.compile(r"^  (\w+) = \{(.*)\},$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A publication: its entry in BibTeX, and its fields by name."""
+
+    bibtex: str
+    fields: Mapping[str, str]
+
+    def __str__(self) -> str:
+        """Authors, title, where it appeared, and the year."""
+        *others, last = self.fields["author"].split(" and ")
+        authors = f"{', '.join(others)} and {last}" if others else last
+        names = ("journal", "volume", "edition", "publisher", "eprint", "year", "pages")
+        known = {name: self.fields[name].replace("--", "-") for name in names if name in self.fields}
+        forms = {"edition": "{} edition,", "publisher": "{},", "eprint": "arXiv:{},", "year": "({})"}
+        where = " ".join(forms.get(name, "{}").format(text) for name, text in known.items())
+        return f"{authors}, {self.fields['title']}{f', {where}' if where else ''}."
+
+
+@cache
+def _known() -> Mapping[str, Source]:
+    text = (resources.files(__package__) / "sources.bib").read_text(encoding="utf-8")
+    return {found[1]: Source(found[0], dict(_FIELD.findall(found[2]))) for found in _ENTRY.finditer(text)}
 
 
 def assumptions(question: Question, outcome: Outcome) -> list[str]:
@@ -90,25 +88,20 @@ def assumptions(question: Question, outcome: Outcome) -> list[str]:
     return said
 
 
-def citations(question: Question, outcome: Outcome) -> list[str]:
-    """The sources of the methods that were used."""
+def citations(question: Question, outcome: Outcome) -> list[Source]:
+    """Return the sources of the methods that were used."""
     kind = None if outcome.objective is None else outcome.objective.kind
-    cited = []
-    lines = "frequency_response" in question.asked
-    if lines:
-        cited.append(_FREQUENCY_RESPONSE)
-    if kind in ("least_cost", "shortest_experiment") and not question.regression and not lines:
-        cited.append(_LEAST_COSTLY)
-    if "closed_loop_error" in question.asked:
-        cited.append(_ASYMPTOTIC)
-    if "mean_squared_error" in question.asked:
-        cited.append(_MEAN_SQUARED)
-    if question.family == "polynomial":
-        cited.append(_SPECTRAL)
-    if outcome.robust is not None and outcome.robust.risk is not None:
-        cited += _SCENARIOS
-    if outcome.objective is not None and outcome.objective.any_spectrum_bound is not None:
-        cited.append(_EQUIVALENCE)
-    if not question.regression and not lines:
-        cited.append(_PREDICTION_ERROR)
-    return cited
+    lines, linear = "frequency_response" in question.asked, question.regression
+    used = {
+        "pintelon-schoukens-2012": lines,
+        "bombois-least-costly": kind in ("least_cost", "shortest_experiment") and not (linear or lines),
+        "rojas-asymptotic": "closed_loop_error" in question.asked,
+        "eckhard-mse": "mean_squared_error" in question.asked,
+        "mohan-spectral": question.family == "polynomial",
+        "campi-garatti-2008": outcome.robust is not None and outcome.robust.risk is not None,
+        "campi-garatti-2018": outcome.robust is not None and outcome.robust.risk is not None,
+        "kiefer-wolfowitz-1960": outcome.objective is not None
+        and outcome.objective.any_spectrum_bound is not None,
+        "ljung-1999": not (linear or lines),
+    }
+    return [_known()[key] for key, is_used in used.items() if is_used]

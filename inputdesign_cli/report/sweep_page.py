@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import bound_of, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
 from inputdesign_cli.outcome.run_directory import read_outcome
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.charts import Chart, readable_chart
+from inputdesign_cli.report.charts import Chart, chart
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
-from inputdesign_cli.report.sources import citations
+from inputdesign_cli.report.sources import Source, citations
 from inputdesign_cli.sweeps.kept import run_flaw
 
 MOST_ROWS = 200
@@ -73,6 +70,16 @@ def sweep_page(root: Path) -> dict[str, object]:
         "provenance": provenance(summary.environment or {}),
         "citations": cited,
     }
+
+
+def sweep_sources(root: Path) -> list[Source]:
+    """Return the sources of the methods that the first point with a result used.
+
+    Raises:
+        DataError: as `read_sweep`.
+    """
+    question, first = _first_run(read_sweep(root), root)
+    return citations(question, first) if question else []
 
 
 def _check_points(table: SweepTable, root: Path) -> None:
@@ -128,14 +135,7 @@ def _charts(table: SweepTable) -> list[Chart]:
         "map": "The result over both keys; hatched where a point has none.",
         "moments": "The second moments of the regressors over the key.",
     }
-    return [
-        readable_chart(partial(_drawn, paint), f"{captions[name]} Drawn from sweep.csv.", captions[name])
-        for name, paint in sweep_figures(table)
-    ]
-
-
-def _drawn(paint: Callable[[Figure], None], seen: Callable[[Figure], object]) -> bytes:
-    return rendered(paint, "svg", narrow=True, seen=seen)
+    return [chart(paint, captions[name]) for name, paint in sweep_figures(table)]
 
 
 def _failures(table: SweepTable) -> list[tuple[str, str, str]]:

@@ -12,9 +12,9 @@ import pytest
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from inputdesign_cli.figures.plots import draw, draw_all
+from inputdesign_cli.figures.plots import draw, draw_all, painter
 from inputdesign_cli.figures.readings import readings
-from inputdesign_cli.figures.style import TYPE_SIZE
+from inputdesign_cli.figures.style import TYPE_SIZE, rendered
 from inputdesign_cli.outcome.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
 from inputdesign_cli.outcome.results import Results
 from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound
@@ -31,7 +31,7 @@ def drawn(name, narrow=False):
         texts = [(t.get_text(), t.get_window_extent(renderer)) for t in headings(page)]
         found.append((page.bbox.padded(1.0), texts))
 
-    return draw(CURVES[name], narrow=narrow, seen=seen), *found[0]
+    return rendered(painter(CURVES[name]), narrow=narrow, seen=seen), *found[0]
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -164,5 +164,5 @@ def test_a_limiting_frequency_far_outside_does_not_push_the_axes_aside():
 )
 def test_who_reads_values_is_told_of_which_panel_and_axis(curves, told):
     found = []
-    draw(curves, seen=lambda page: found.extend(readings(page)))
+    rendered(painter(curves), seen=lambda page: found.extend(readings(page)))
     assert [panel["y"] for panel in found] == told

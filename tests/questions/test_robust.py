@@ -222,7 +222,7 @@ def test_what_is_said_is_said_under_the_prior():
     question = read_question(found.resolved_spec)
     assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
     assert "true plant" in assumptions(question, found.outcome)[0]
-    assert sum("Campi" in source for source in citations(question, found.outcome)) == 2
+    assert sum("Campi" in str(source) for source in citations(question, found.outcome)) == 2
 
 
 def test_limits_on_powers_bind_the_record_at_every_plant():

@@ -19,8 +19,8 @@ from inputdesign_cli.outcome.curves import (
 )
 from inputdesign_cli.outcome.curves_file import curves_json
 from inputdesign_cli.outcome.record import FIGURES
+from inputdesign_cli.report.captions import captioned
 from inputdesign_cli.report.charts import run_charts
-from inputdesign_cli.report.described import captioned
 from tests.support.curves import CURVES
 
 # What was told of figures of which nobody knows what they show.
@@ -106,5 +106,5 @@ def test_every_kind_of_figure_has_a_caption():
 )
 def test_figures_of_a_run_are_captioned_by_what_they_show(stem, name, said, tmp_path):
     (tmp_path / FIGURES).write_bytes(curves_json({stem: CURVES[name]}))
-    chart = run_charts(tmp_path, {}, "s")[stem]
+    chart = run_charts(tmp_path, "s")[stem]
     assert said in chart.caption

@@ -10,15 +10,15 @@ import shutil
 from contextlib import suppress
 from datetime import datetime
 from functools import reduce
+from importlib import resources
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from inputdesign_cli import load_spec, solve
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.report.facts import facts
-from inputdesign_cli.report.render import report_text
+from inputdesign_cli.report.render import bibtex_text, report_text
 from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.outcomes import typed
 from tests.support.pages import XHTML, parse, words
@@ -157,21 +157,27 @@ def test_the_same_run_gives_the_same_page(runs):
     assert report_text(runs / "open") == report_text(runs / "open")
 
 
-def test_figures_without_a_known_table_are_taken_as_they_are(runs, tmp_path):
-    run = tmp_path / "run"
-    write_run(solve(load_spec(runs / "open.yaml")), run)
-    result = json.loads((run / "result.json").read_text())
-    (run / "loss.png").write_bytes(b"\x89PNG not really")
-    result |= {
-        "files": [*result["files"], "loss.png"],
-        "simulation": {"runs": 10, "seed": 1, "inputs": {"white": {"a": 0.5}}},
-    }
-    (run / "result.json").write_text(json.dumps(result))
-    page = parse(report_text(run))
-    assert "data:image/png;base64," in [i.get("src")[:22] for i in page.iter(f"{XHTML}img")]
-    assert "Further figures" in words(page)
-    assert "inputs.white.a" in words(page)
-    assert "idesign simulate spec.yaml" in words(page)
+def test_a_simulation_of_an_unknown_kind_is_among_all_numbers(runs, tmp_path):
+    shutil.copytree(runs / "open", tmp_path / "run")
+    file = tmp_path / "run" / "result.json"
+    simulation = {"runs": 10, "seed": 1, "inputs": {"white": {"a": 0.5}}}
+    file.write_text(json.dumps({**json.loads(file.read_text()), "simulation": simulation}))
+    said = words(parse(report_text(tmp_path / "run")))
+    assert "inputs.white.a" in said
+    assert "idesign simulate spec.yaml" in said
+
+
+def test_the_sources_of_a_run_are_those_of_the_bibliography(runs):
+    """As the page lists them, each under a key of docs/references.md."""
+    text = bibtex_text(runs / "open")
+    keys = re.findall(r"^@\w+\{(.*),$", text, re.MULTILINE)
+    assert keys == ["bombois-least-costly", "kiefer-wolfowitz-1960", "ljung-1999"]
+    assert text.count("{") == text.count("}")
+    said = words(parse(report_text(runs / "open")))
+    assert all(title in said for title in re.findall(r"title = \{(.*)\}", text))
+    known = (resources.files("inputdesign_cli.report") / "sources.bib").read_text()
+    listed = (Path(__file__).parents[2] / "docs" / "references.md").read_text()
+    assert all(f"### {key}\n" in listed for key in re.findall(r"^@\w+\{(.*),$", known, re.MULTILINE))
 
 
 def test_the_page_of_a_sweep(runs, tmp_path):

@@ -1,4 +1,4 @@
-"""Describe figures: captions for the curves drawn, and sentences for readers who do not see them."""
+"""Captions of figures: what the curves of each kind show."""
 
 from __future__ import annotations
 
@@ -14,15 +14,10 @@ from inputdesign_cli.outcome.curves import Curves
 OF_DATA = "data"  # what r_u of an estimate is called
 
 
-def described(curves: Curves, time_unit: str) -> str | None:
-    """Return the sentence, frequencies in rad per `time_unit`, or None if the caption says as much."""
-    tell = _TOLD.get(type(curves))
-    return None if tell is None else tell(curves, f"rad/{time_unit}")
-
-
 def captioned(curves: Curves) -> str:
     """Return the caption, which depends on the curves in this figure."""
-    return _CAPTIONED[type(curves)](curves)
+    found = _CAPTIONS[type(curves)]
+    return found if isinstance(found, str) else found(curves)
 
 
 def _bound_caption(curves: of.BoundCurves) -> str:
@@ -93,107 +88,50 @@ def _orders_caption(curves: of.OrderCurves) -> str:
     )
 
 
-def _bound(curves: of.BoundCurves, unit: str) -> str:
-    stated = [panel for panel in curves.panels if panel.r_adm is not None]
-    if not stated:
-        return "Model error r_u and the gain |G| against frequency."
-    worst = max(float(np.nanmax(panel.r_u / panel.r_adm)) for panel in stated if panel.r_adm is not None)
-    return f"Model error r_u and admissible error r_adm against frequency; the largest ratio is {worst:.6g}."
-
-
-def _nyquist(curves: of.NyquistCurves, unit: str) -> str:
-    nearest = float((np.abs(1.0 + curves.loop) - curves.radius).min())
-    told = f", of which {curves.circle:.4g} is asked" if curves.circle is not None else ""
-    return (
-        "Nyquist plot of the loop C G with the discs in which the data leave it: they stay "
-        f"{nearest:.4g} away from -1{told}."
-    )
-
-
-def _spectrum(curves: of.SpectrumCurves, unit: str) -> str:
-    power = np.trace(curves.spectrum, axis1=1, axis2=2).real
-    peak = float(curves.frequency[int(np.argmax(power))])
-    if curves.lines:
-        return f"Powers of {power.size} sinusoids against frequency, the largest at {peak:.3g} {unit}."
-    return f"Spectral density of the excitation against frequency, with its peak at {peak:.3g} {unit}."
-
-
-def _optimality(curves: of.OptimalityCurves, unit: str) -> str:
-    return f"Worth of a unit of cost against frequency; its maximum is {curves.ratio.max():.4g}."
-
-
-def _signal(curves: of.SignalCurves, unit: str) -> str:
-    names = ", ".join(panel.name for panel in curves.predicted)
-    below = f" Below: the output to be expected of {names}." if names else ""
-    return f"The signal {', '.join(curves.channels)} against time, and the distribution of its values.{below}"
-
-
-def _fan(curves: of.FanCurves, unit: str) -> str:
-    worst = max(float(np.max(curves.ratios, initial=0.0)), float(curves.nominal.max()))
-    return f"r_u / r_adm against frequency at {len(curves.ratios)} plants; the largest is {worst:.4g}."
-
-
-def _always(caption: str) -> Callable[[Curves], str]:
-    """One caption for all figures of a kind."""
-    return lambda _: caption
-
-
 # Every kind has its caption.
-_CAPTIONED: Mapping[type[Curves], Callable[[Any], str]] = {
+_CAPTIONS: Mapping[type[Curves], str | Callable[[Any], str]] = {
     of.BoundCurves: _bound_caption,
-    of.CampaignCurves: _always(
+    of.CampaignCurves: (
         "The worst ratio at the estimate and the energy applied, after each part of the campaign."
     ),
-    of.CloudCurves: _always("The estimates of all runs, with the ellipses of theory."),
-    of.DeviationCurves: _always(
+    of.CloudCurves: "The estimates of all runs, with the ellipses of theory.",
+    of.DeviationCurves: (
         "The standard deviation of the measured frequency response at every line, against what is admitted."
     ),
-    of.DirectionCurves: _always(
+    of.DirectionCurves: (
         "The gains of the plant, and how the design shares its power among their directions."
     ),
-    of.EllipseCurves: _always("The confidence ellipses that the design buys, for pairs of parameters."),
-    of.ErrorBandCurves: _always("The errors |G_hat - G_0| of the models of all runs, against r_u and r_adm."),
-    of.ErrorCurves: _always(
-        "The mean squared error against the energy of the regressors, bias and variance apart."
-    ),
-    of.EstimateCurves: _always(
-        "The estimates after each part of the campaign, with two standard deviations."
-    ),
+    of.EllipseCurves: "The confidence ellipses that the design buys, for pairs of parameters.",
+    of.ErrorBandCurves: "The errors |G_hat - G_0| of the models of all runs, against r_u and r_adm.",
+    of.ErrorCurves: ("The mean squared error against the energy of the regressors, bias and variance apart."),
+    of.EstimateCurves: ("The estimates after each part of the campaign, with two standard deviations."),
     of.FanCurves: _fan_caption,
     of.FitCurves: _fit_caption,
-    of.LossCurves: _always("The loss in simulated experiments."),
-    of.MomentsCurves: _always("The second moments of the regressors."),
+    of.LossCurves: "The loss in simulated experiments.",
+    of.MomentsCurves: "The second moments of the regressors.",
     of.NyquistCurves: _nyquist_caption,
-    of.OptimalityCurves: _always(
+    of.OptimalityCurves: (
         "The certificate of the bound over every spectrum: what a unit of cost buys at each frequency, "
         "relative to the best. It is nowhere above one, and one where power pays."
     ),
     of.OrderCurves: _orders_caption,
-    of.RatioCurves: _always(
+    of.RatioCurves: (
         "The largest r_u / r_adm of the true plant in simulated campaigns and in experiments in one shot: "
         "beyond one what is asked is missed, far below one power was wasted."
     ),
-    of.ResidualCurves: _always(
+    of.ResidualCurves: (
         "Correlations of the residuals with themselves and with past inputs; chance leaves them within the "
         "grey."
     ),
-    of.ResponseCurves: _always(
+    of.ResponseCurves: (
         "What the data say of G without a model, with the range that holds |G| with 95 % at each frequency, "
         "beside the model. Chance takes a right model out of the range, too, at up to 5 % of the frequencies."
     ),
     of.SignalCurves: _signal_caption,
     of.SpectrumCurves: _spectrum_caption,
-    of.TradeCurves: _always(
+    of.TradeCurves: (
         "What campaigns and experiments in one shot cost, against the share of runs whose model is within "
         "r_adm of the true plant. Costs are over that of the spectrum of the design that knows the plant; "
         "the record that such a design delivers costs something else (dotted)."
     ),
-}
-_TOLD: Mapping[type[Curves], Callable[[Any, str], str]] = {
-    of.BoundCurves: _bound,
-    of.FanCurves: _fan,
-    of.NyquistCurves: _nyquist,
-    of.OptimalityCurves: _optimality,
-    of.SignalCurves: _signal,
-    of.SpectrumCurves: _spectrum,
 }
