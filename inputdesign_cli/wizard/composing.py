@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +11,8 @@ from inputdesign_cli.errors import IdesignError, OutputError
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.grammar import seconds, sensible, short
-from inputdesign_cli.wizard.log_noise import log_noise_lines
-from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
+from inputdesign_cli.wizard.means import input_range, limit_lines, limited, loop_line, signal_lines
+from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import understand_plant
 from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, complete, known_from
 from inputdesign_cli.wizard.stated_plants import PlantAnswer
@@ -27,7 +28,6 @@ _DRAWN = (
     "  worst_case: 0.95  # and at the worst ones that a search finds there",  # in intervals: everywhere
     "  fresh: 200",
 )
-_FIRST = "{type: fir, order: 20}"
 # Answers that go with every other, in place of answers that are not asked for yet.
 _MEANWHILE = {
     "plant": "heater",
@@ -114,28 +114,39 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     duration = min(there, _MOST * step)
     controller = loop_line(said["loop"], plant)
     asked = wished(said["wish"], plant, controller is not None, duration)
+    # Lines of a response are one over the time apart: it takes all of it.
     nonparametric = any("frequency_response" in line for line in asked)
     limits = limit_lines(span, said["limits"], there if nonparametric else duration, step)
-    if duration < there and not nonparametric:  # lines of a response are one over the time apart
+    if duration < there and not nonparametric:
         limits[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
     known = _uncertain(plant)
+    unused = [_UNUSED] if nonparametric and known else []
+    loop = ["experiment:", f"  controller: {controller}  # u = r - C y; r is designed"]
     heads = [
         "# Written by `idesign wizard`: every line follows from an answer. Change what you know better.",
-        f"title: {_quoted(said['wish'])}",
+        f"title: {json.dumps(said['wish'], ensure_ascii=False)}",
         *_head(plant),
         *(f"# against this model: {one}" for one in plant.against),
-        *_noise(plant, said, folder),
-        *([f"# {_UNUSED}"] if nonparametric and known else known),
+        *noise_lines(said["noise"], said["drift"], folder, plant),
+        *([f"# {one}" for one in unused] or known),
+        *([] if controller is None else loop),
+        *asked,
+        "objective: best_accuracy  # use all that is allowed",
+        *limits,
     ]
-    if controller is not None:
-        heads += ["experiment:", f"  controller: {controller}  # u = r - C y; r is designed"]
-    heads += [*asked, "objective: best_accuracy  # use all that is allowed", *limits]
-    notes = [f"against the model of {plant.source}: {one}" for one in plant.against]
-    notes += [_UNUSED] if nonparametric and known else []
-    tails = signal_lines(said["signals"], said["converter"], span, said["limits"])
+    fitted = limited(said["limits"])[1] is not None
+    tails = signal_lines(said["signals"], said["converter"], span, fitted=fitted)
     tails += ["  periods: 5"] if nonparametric else []  # equal ones, of which the first is transient
-    spectrum = None if nonparametric else _FIRST
-    return Draft(tuple(heads), tuple(tails), plant.files, spectrum, folder, said, there, tuple(notes))
+    return Draft(
+        tuple(heads),
+        tuple(tails),
+        plant.files,
+        None if nonparametric else "{type: fir, order: 20}",
+        folder,
+        said,
+        there,
+        (*(f"against the model of {plant.source}: {one}" for one in plant.against), *unused),
+    )
 
 
 def _head(plant: PlantAnswer) -> list[str]:
@@ -148,12 +159,6 @@ def _head(plant: PlantAnswer) -> list[str]:
     return [f"sample_time: {short(plant.sample_time)}  # {why}", "time_unit: s", *plant.lines]
 
 
-def _noise(plant: PlantAnswer, said: Mapping[str, str], folder: Path) -> list[str]:
-    if plant.explored is None:
-        return noise_lines(said["noise"], said["drift"], folder, plant.sample_time)
-    return log_noise_lines(plant.explored, plant.source, said["noise"], said["drift"], folder)
-
-
 def _uncertain(plant: PlantAnswer) -> list[str]:
     """Return the lines of `uncertainty`, if something is said of it."""
     if plant.covariance is not None:
@@ -162,10 +167,6 @@ def _uncertain(plant: PlantAnswer) -> list[str]:
         return []
     listed = [f"    {name}: [{short(low)}, {short(high)}]" for name, (low, high) in plant.intervals.items()]
     return ["uncertainty:  # how well it is known", "  intervals:", *listed, *_DRAWN]
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 class Conversation:

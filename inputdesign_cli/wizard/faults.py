@@ -45,17 +45,17 @@ _HINTS = {
     "coarse-converter": "move the operating point, or let the converter reach further",
     "data-missing-column": "name the columns in the first line of the file: time, u, y (at rest: y)",
 }
-_TERMS = {"nominal plant": "plant as stated", "the offset": "the operating point"}
-_PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)+")
-_LINES_THERE = re.compile(r"holds (\d+) .* (\d+) are asked")
-_LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
-_QUIETER = re.compile(r"less of a margin than (\w+): ([\d.]+) .*for example \w+: ([\d.]+)")
-# How to ask for a margin that is weaker than a first value, for example a second one.
-_WEAKER = {
-    "max_sensitivity_db": ("more than {} dB", "{} dB"),
-    "phase_margin": ("less than {} degrees", "{} degrees"),
-    "gain_margin": ("a gain margin below {}", "gain margin {}"),
+# Terms of the spec -> words of the answers.
+_TERMS = {
+    r"\bnominal plant\b": "plant as stated",
+    r"\bthe offset\b": "the operating point",
+    r"tune the controller .* or (?=ask for less)": "",
+    r"\bmax_sensitivity_db: ([\d.]+)": r"\1 dB",
+    r"\bphase_margin: ([\d.]+)": r"\1 degrees",
+    r"\bgain_margin: ([\d.]+)": r"gain margin \1",
+    r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)*\.(\w+)": r"the \1",
 }
+_LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 
 
 @contextmanager
@@ -80,28 +80,20 @@ def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     asked = question(_question(one, said) or key or "wish")
     if one.message.startswith(f"{asked.asks} ({asked.key}): "):
         return one  # by a block inside
-    why = _MESSAGES.get(one.code) or _in_words(one.message)
-    lines = _LINES_THERE.search(one.message) if one.code == "too-few-lines" else None
-    if lines is not None:
-        why = f"{lines[1]} frequencies between these two repeat within the time, and {lines[2]} are needed"
     place = one.location if one.location and not one.location.file.startswith("<") else None
     hint = "; ".join(filter(None, (_remedy(one, asked.key), f"allowed: {asked.allowed}")))
-    return replace(
-        one, message=f"{asked.asks} ({asked.key}): {why}", hint=hint, key=asked.key, location=place
-    )
+    message = f"{asked.asks} ({asked.key}): {_in_words(_MESSAGES.get(one.code, one.message))}"
+    return replace(one, message=message, hint=hint, key=asked.key, location=place)
 
 
 def _remedy(one: Diagnostic, key: str) -> str:
-    if quieter := _QUIETER.search(one.hint):
-        weaker, such = _WEAKER[quieter[1]]
-        asks = f"ask for {weaker.format(quieter[2])} (the nearer, the longer the experiment)"
-        return f"{asks}, for example {such.format(quieter[3])}"
+    if one.code == "admissible-not-positive":
+        return _in_words(one.hint)
     if one.code == "too-few-lines":
         enough = _LONG_ENOUGH.search(one.hint)
         return f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
-    if one.code == "infinite-information" and key != "loop":
-        return ""  # a controller holds it already
-    return _HINTS.get(one.code, "")
+    held = one.code == "infinite-information" and key != "loop"  # a controller holds it already
+    return "" if held else _HINTS.get(one.code, "")
 
 
 def _question(one: Diagnostic, said: Mapping[str, str]) -> str:
@@ -116,8 +108,8 @@ def _question(one: Diagnostic, said: Mapping[str, str]) -> str:
     return next(found, one.key if one.key in KEYS else "")
 
 
-def _in_words(message: str) -> str:
-    """Return a message without paths and terms of the spec."""
+def _in_words(text: str) -> str:
+    """Return a message or a hint without paths and terms of the spec."""
     for term, words in _TERMS.items():
-        message = message.replace(term, words)
-    return _PATH.sub(lambda path: "the " + path[0].rpartition(".")[2].replace("_", " "), message)
+        text = re.sub(term, words, text)
+    return text

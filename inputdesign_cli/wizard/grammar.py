@@ -16,6 +16,7 @@ PLUS_MINUS = r"(?:plus/minus|plus or minus|\+/?-|±)"
 UNIT = r"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)[^\s\d,;|+±-][^\s,;|]*)?"
 _PER_CENT = r"\s*(?:%|per ?cent\b)"
 _OF = r"\s*(?:(?:of|about|is|ca\.?|up to)\b\s*|[:=]\s*)*"
+_WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*{NUMBER}{_PER_CENT})?"
 _MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
 # Kinds of units -> each unit in the one that a spec has.
 _SCALES = {
@@ -42,12 +43,11 @@ def sensible(text: str, key: str) -> str:
     Raises:
         SpecError: `bad-answer`.
     """
-    for found in re.findall(rf"(?<![\w.]){NUMBER}", text):
+    for found in re.findall(rf"{ALONE}{NUMBER}", text):
         if float(found) and not SMALLEST <= abs(float(found)) <= LARGEST:
             why = f"{found} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
             raise bad_answer(key, why)
-    strange = re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I)
-    if strange is not None:
+    if strange := re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I):
         raise bad_answer(key, f"{strange[1]} is no number")
     return text
 
@@ -66,9 +66,8 @@ class Phrase:
         """
         self.text, self.key, self._left = text, key, text
         if comma := re.search(r"\d+,\d+", text):
-            raise bad_answer(
-                key, f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
-            )
+            why = f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
+            raise bad_answer(key, why)
 
     def take(self, pattern: str) -> re.Match[str] | None:
         """Read the first piece that matches."""
@@ -93,16 +92,13 @@ class Phrase:
             SpecError: `bad-answer`.
         """
         found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}")
-        if found is not None:
-            return _scaled(found[1], found[2], kind)
-        if named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
+        if found is None and named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
             raise bad_answer(self.key, f'"{alone[0]}" has no number behind it')
-        return None
+        return None if found is None else _scaled(found[1], found[2], kind)
 
     def known_within(self, words: str, kind: str) -> tuple[float, float | None] | None:
         """Read as `after` does, and the share "within 30 %" that may stand behind the unit."""
-        within = rf"(?:\s*(?:within|{PLUS_MINUS})\s*{NUMBER}{_PER_CENT})?"
-        found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}{within}")
+        found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}{_WITHIN}")
         if found is None:
             return None
         return _scaled(found[1], found[2], kind), None if found[3] is None else float(found[3]) / 100.0

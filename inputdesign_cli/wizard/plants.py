@@ -17,7 +17,6 @@ from inputdesign_cli.wizard.stated_plants import TEMPLATES, PlantAnswer, plant_o
 
 _LEAST_ROWS = 10  # of a step response
 _LONGER = 2.0  # a time constant of more records than this is none
-_GAP = 1.5  # sample times from one row to the next: a sample is missing
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
 _REJECTED = (
@@ -54,47 +53,48 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
 
 def _stepped(path: Path, stem: str) -> PlantAnswer:
     """Estimate gain, time constant and dead time from a record that begins at rest."""
-    from inputdesign_cli import parse_spec, questions
+    from inputdesign_cli import questions
     from inputdesign_cli.questions.building.tables import read_columns
 
     found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
     t, u, y = found["time"], found["u"], found["y"]
     begun, step, moves, answers = _step_in(path.name, t, u, y)
     rise = (y - y[0]) / answers
-    slow = max(float(t[int(np.argmax(rise > 0.632))] - t[begun]), step)
-    gain = answers / moves
-    late = max(float(t[int(np.argmax(rise > 0.05))] - t[begun]), step)
-    structure = parse_spec(
-        f"sample_time: {step!r}\nplant: {{continuous: {{gain: {gain!r}, time_constant: {slow!r}, "
-        f"dead_time: {late!r}}}, sample: zoh}}\n",
-        design=False,
-    )
+    late, slow = (max(float(t[int(np.argmax(rise > part))] - t[begun]), step) for part in (0.05, 0.632))
     point = {"u1": float(u[0]), "y1": float(np.mean(y[: max(begun, 1)]))}
+    structure = _lag(f"sample_time: {step!r}\n", gain=answers / moves, time_constant=slow, dead_time=late)
     identified = questions.identify(structure, path, operating_point=point)
     model, failed = identified.files["model.yaml"], identified.result["identification"]["failed"]
-    name, fitted = f"{stem}-model.yaml", parse_spec(model.decode(), design=False).plant
-    assert fitted.kind == "continuous"
-    values = {one.label: one.value for one in fitted.named_parameters}
+    values = dict(identified.result["identification"]["theta"])
     lasts = float(t[-1] - t[begun])
     if values["time_constant"] > _LONGER * lasts:
         raise bad_answer(
             "plant",
             f"the output in {path.name} still goes on as an integrator would, {short(lasts)} s after the "
-            "step: it shows no gain and no time constant; record until it settles, or write a plant that "
-            'integrates as a file, {"num": [0.05], "den": [1, 0], "delay": 5}',
+            "step: record until it settles, or write a plant that integrates as a file, "
+            '{"num": [0.05], "den": [1, 0], "delay": 5}',
         )
     listed = ", ".join(f"{label}: {short(value)}" for label, value in values.items())
     return PlantAnswer(
         (f"plant:  # estimated from {path.name}", f"  continuous: {{{listed}}}", "  sample: zoh"),
         values["time_constant"],
         values=values,
-        files={name: model},
-        covariance=name,
+        files={f"{stem}-model.yaml": model},
+        covariance=f"{stem}-model.yaml",
         sampling=step,
         tunable=True,
         source=path.name,
         against=() if not failed else (_REJECTED.format(", ".join(failed).replace("_", " "), path.name),),
     )
+
+
+def _lag(clock: str, noise: str = "", **values: float) -> Spec:
+    """Return a spec of a gain, a lag and a dead time, which are to be estimated."""
+    from inputdesign_cli import parse_spec
+
+    listed = ", ".join(f"{name}: {value!r}" for name, value in values.items())
+    text = f"{clock}plant: {{continuous: {{{listed}}}, sample: zoh}}\n{noise}"
+    return parse_spec(text, design=False)
 
 
 def _step_in(name: str, t: Array, u: Array, y: Array) -> tuple[int, float, float, float]:
@@ -105,24 +105,17 @@ def _step_in(name: str, t: Array, u: Array, y: Array) -> tuple[int, float, float
     """
     if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
         raise bad_answer("plant", f"{name} needs {_LEAST_ROWS} rows at least, at times that grow")
-    step, moved = float(np.median(np.diff(t))), np.abs(u - u[0])
-    if np.any(wide := np.diff(t) > _GAP * step):
-        row, longest = int(np.argmax(wide)) + 3, float(np.max(np.diff(t)))
-        raise bad_answer(
-            "plant",
-            f"the times in {name} have a gap before line {row} ({short(longest)} s, where rows are "
-            f"{short(step)} s apart): a step response is one record without gaps; cut it to the part that "
-            "has the step, or fill it in",
-        )
+    moved = np.abs(u - u[0])
     begun, last = int(np.argmax(moved > 0.5 * np.max(moved))), slice(-max(t.size // 20, 1), None)
     moves, answers = float(np.mean(u[last] - u[0])), float(np.mean(y[last]) - y[0])
-    if not np.any(moved) or begun + 5 >= t.size:
-        raise bad_answer("plant", f"the input in {name} does not step")
-    if abs(moves) < 0.5 * np.max(moved):
-        raise bad_answer("plant", f"the input in {name} does not stay where it has stepped to")
-    if not answers:
-        raise bad_answer("plant", f"the output in {name} does not answer the step")
-    return begun, step, moves, answers
+    faults = {
+        f"the input in {name} does not step": not np.any(moved) or begun + 5 >= t.size,
+        f"the input in {name} does not stay where it has stepped to": abs(moves) < 0.5 * np.max(moved),
+        f"the output in {name} does not answer the step": not answers,
+    }
+    if fault := next((text for text, holds in faults.items() if holds), None):
+        raise bad_answer("plant", fault)
+    return begun, float(np.median(np.diff(t))), moves, answers
 
 
 def _explored(path: Path, stem: str) -> PlantAnswer:
@@ -134,23 +127,21 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
     if "model.yaml" not in found.results.files:
         why = "; ".join(found.reasons) or "no model deserves trust"
         raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
-    model = found.results.files["model.yaml"]
+    model, against = found.results.files["model.yaml"], found.against
     spec = parse_spec(model.decode(), name, design=False)
-    step, plant = spec.sample_time, spec.plant
+    plant, tunable, head = spec.plant, _is_process(spec), f"the plant, explored in {path.name}"
     assert plant.kind != "regression"
-    lines = (f"include: [{name}]  # the plant, explored in {path.name}",)
-    channels, against = max(plant.inputs, plant.outputs), found.against
-    tunable = _is_process(spec)
+    channels = max(plant.inputs, plant.outputs)
     if not tunable and channels == 1 and (first := _first_order(path, spec)) is not None:
-        lines = (f"include: [{name}]  # {path.name}: a gain, a lag and a dead time explain it, too",)
         model, tunable, against = first, True, ()
         spec = parse_spec(model.decode(), name, design=False)
+        head = f"{path.name}: a gain, a lag and a dead time explain it, too"
     return PlantAnswer(
-        lines,
-        20.0 * step,
+        (f"include: [{name}]  # {head}",),
+        20.0 * spec.sample_time,
         files={name: _NOISE_BLOCK.sub("", model.decode()).encode()},  # that stands in the spec
         covariance=name if channels == 1 else None,
-        sampling=step,
+        sampling=spec.sample_time,
         tunable=tunable,
         channels=channels,
         explored=spec,
@@ -172,15 +163,14 @@ def _is_process(spec: Spec) -> bool:
 
 def _first_order(path: Path, explored: Spec) -> bytes | None:
     """Return model.yaml of a gain, a lag and a dead time in noise that may drift, if no test objects."""
-    from inputdesign_cli import parse_spec, questions
+    from inputdesign_cli import questions
 
     step = explored.sample_time
     clock = f"sample_time: {step!r}\ntime_unit: {explored.time_unit}\n"
-    process = f"{{gain: 1, time_constant: {10 * step!r}, dead_time: {1.5 * step!r}}}"
-    begun = f"{clock}plant: {{continuous: {process}, sample: zoh}}\n"
     for noise in _NOISES:
+        structure = _lag(clock, noise, gain=1.0, time_constant=10.0 * step, dead_time=1.5 * step)
         try:
-            found = questions.identify(parse_spec(begun + noise, design=False), path, remove_means=True)
+            found = questions.identify(structure, path, remove_means=True)
         except IdesignError:
             continue
         if not found.result["identification"]["failed"]:

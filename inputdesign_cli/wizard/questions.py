@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from importlib import resources
 from pathlib import Path
 from typing import TypeVar
+
+import yaml
 
 from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.wording import unknown_word
@@ -24,62 +27,18 @@ class Question:
     default: str | None = None
 
 
-QUESTIONS = (
-    Question(
-        "plant",
-        "What do you know of the plant?",
-        'a template (heater, tank, motor, axis, column); "gain 2, time constant 180 s, dead time 25 s, each '
-        'within 30 %"; "step FILE" or "log FILE" (columns u and y); or FILE.json with num and den in s',
-    ),
-    Question(
-        "wish",
-        "What is the model for?",
-        '"PI loop with 6 dB" (or PID; 29 degrees, gain margin 2); "own loop with 6 dB, Kp 1.5, Ti 180"; '
-        '"prediction within 5 % up to 0.05"; "parameters within 5 %"; '
-        '"Bode plot within 5 % from 0.001 to 0.05" (rad/s)',
-    ),
-    Question(
-        "range", "How far may the input move?", '"plus/minus 5 around 40", "35 to 45", or "plus/minus 5"'
-    ),
-    Question("time", "How much time is there?", '"1 h", "45 min", "3600 s"', "1 h"),
-    Question(
-        "limits",
-        "How fast may the input move, and how far the output?",
-        '"none", "rate 0.5" (per second), "output 3", or both',
-        "none",
-    ),
-    Question(
-        "noise",
-        "What is the noise of the output?",
-        '"standard deviation 0.2", "resolution 0.1" (of the sensor), or "rest FILE" (column y, u at rest)',
-    ),
-    Question(
-        "drift",
-        "Does the output drift?",
-        '"yes", "no", or "not known": then a log decides; without a log it does not',
-        "not known",
-    ),
-    Question(
-        "loop",
-        "Does the experiment run in open loop, or under a controller?",
-        '"open", "PI Kp 1, Ti 60", or "as the plant" (a template knows it)',
-        "as the plant",
-    ),
-    Question(
-        "signals", "Which signals can the hardware apply?", '"any", "two levels", "three levels"', "any"
-    ),
-    Question("converter", "Is the input quantised?", '"no", or "12 bits up to 100"', "no"),
+QUESTIONS = tuple(
+    Question(**entry)
+    for entry in yaml.safe_load((resources.files(__package__) / "questions.yaml").read_text(encoding="utf-8"))
 )
 KEYS = tuple(question.key for question in QUESTIONS)
 _ALL = f"the questions are {', '.join(KEYS)}"
+AS_LOG = "as the log"
 
 
 def question(key: str) -> Question:
     """Return the question of a key."""
     return next(one for one in QUESTIONS if one.key == key)
-
-
-AS_LOG = "as the log"
 
 
 def known_from(answers: Mapping[str, str]) -> dict[str, str]:
@@ -116,11 +75,8 @@ def file_of(key: str, path: Path) -> Path:
     """
     if path.is_file():
         return path
-    if path.is_dir():
-        raise bad_answer(key, f"{path} is a folder")
-    if path.exists():
-        raise bad_answer(key, f"{path} is a pipe or a device, not a file")
-    raise bad_answer(key, f"there is no file {path}")
+    there = f"{path} is a folder" if path.is_dir() else f"{path} is a pipe or a device, not a file"
+    raise bad_answer(key, there if path.exists() else f"there is no file {path}")
 
 
 @dataclass(frozen=True)
@@ -179,16 +135,14 @@ def _of_file(file: Path) -> Answers:
         raise SpecError.because("bad-answer", message, _ALL, location=begins)
     answers = Answers(places=dict.fromkeys((one.key for one in QUESTIONS if one.default is None), begins))
     for key, value in tree.data.items():
-        place = tree.places.location(tree.places.mark((key,)))
+        answers.places[key] = tree.places.location(tree.places.mark((key,))) or begins
         if isinstance(value, dict | list):
             what = "a mapping" if isinstance(value, dict) else "a list"
             message, hint = f"the answer to {key} is {what}", 'an answer is one text: put it in quotes ("..")'
-            raise SpecError.because("bad-answer", message, hint, key, place)
+            raise SpecError.because("bad-answer", message, hint, key, answers.places[key])
         # YAML reads yes and no as truth values; 1 and 0 are numbers.
         plain = {True: "yes", False: "no"}[value] if isinstance(value, bool) else value
         answers.texts[key] = "" if plain is None else str(plain)
-        if place is not None:
-            answers.places[key] = place
     return answers
 
 

@@ -6,13 +6,13 @@ Every number is that of a design that was computed.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.outcome.results import Json, Result, Results
+from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
@@ -27,147 +27,93 @@ _LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What is said of the best record within the means; one is enough for the `ratio` of its errors."""
-
-    ratio: float
-    sentences: tuple[str, ...]
-
-    @property
-    def enough(self) -> bool:
-        """Whether the means are enough."""
-        return self.ratio <= 1.0
-
-
-def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> Verdict:
-    """Compare a design with what is asked, and look for a length that would do at its estimates, too.
+def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> Iterator[str]:
+    """Say whether a design is enough for what is asked, and which length would do, at its estimates, too.
 
     Args:
         there: seconds that may be taken, where the experiment is shorter.
     """
     ratio, taken = float(result["signal"]["worst_ratio"]), result["samples"] * spec.sample_time
-    others, surely = _Others(result.get("robust", {})), ratio * _scatter(result)
-    said = [
-        f"{lasting(taken)} at {_used(spec, result)} is {others.enough(ratio)}: the model that it leaves errs "
-        f"{ratio:.3g} times as much as is admitted."
-    ]
+    robust, surely = result.get("robust", {}), ratio * _scatter(result)
+    yield (
+        f"{lasting(taken)} at {_used(spec, result)} is {_enough(ratio, robust)}: the model that it leaves "
+        f"errs {ratio:.3g} times as much as is admitted."
+    )
     if ratio <= 1.0 < surely:
-        said.append(
+        yield (
             "But assess judges at the estimated plant, which scatters: where the plant is the worst that "
             f"you allow, 5 % of experiments would give one at which it errs {surely:.3g} times as "
             "much or more, and be called missed."
         )
     if (found := _length_that_does(spec, surely, solve)) is not None:
         needed = found * spec.sample_time
-        said.append(f"{lasting(needed)} would do (a record of {found} samples was designed, and does).")
+        yield f"{lasting(needed)} would do (a record of {found} samples was designed, and does)."
         if there is not None and taken < needed <= there:
-            said.append(
+            yield (
                 f"Of the {lasting(there)} that there are, {lasting(taken)} were used, which are "
                 f"{result['samples']} samples: write duration: {short(needed)} into the spec, and solve it."
             )
-    said += [*_margins(spec, result, others, ratio <= 1.0), *others.sentences(ratio)]
+    yield from _margins(spec, result, enough=ratio <= 1.0)
+    if robust.get("scenarios"):
+        yield from _elsewhere(ratio, robust)
     if result.get("foreseen", {}).get("rivals"):
-        said.append(
+        yield (
             "Another dead time would explain this record nearly as well, and assess may not decide between "
             "the two: say how well you know it (each within 30 %)."
         )
-    return Verdict(ratio, tuple(said))
 
 
-@dataclass(frozen=True)
-class _Others:
-    """What is known of other plants within what was said: the entry `robust` of a result."""
+def _enough(ratio: float, robust: Mapping[str, Any]) -> str:
+    """Return whether a ratio of errors is enough, and for which of the plants that were tried."""
+    fresh = robust.get("fresh") or {}
+    if ratio > 1.0:
+        return "not enough"
+    if _without_margin(robust):
+        return "enough wherever this controller has the margin"
+    if not fresh.get("missed") or fresh["largest"] * ratio <= 1.0:
+        return "enough"
+    return (
+        f"enough at the plant as you stated it and at {robust['scenarios']} others, but not at "
+        "every one within what you said of it"
+    )
 
-    robust: Mapping[str, Json]
 
-    @property
-    def fresh(self) -> Mapping[str, Json]:
-        """How the design does at plants that it was not designed for."""
-        return self.robust.get("fresh") or {}
+def _without_margin(robust: Mapping[str, Any]) -> list[str]:
+    """Return at how many plants of which the controller has no margin even if they were known exactly."""
+    fresh, lost = robust.get("fresh") or {}, len(robust.get("floor", {}).get("lost", ()))
+    said = [f"{lost} of the {robust.get('scenarios')} other plants that were tried"] if lost else []
+    said += [f"{fresh['lost']} of {fresh['draws']} more"] if fresh.get("lost") else []
+    return said or ["a plant within what you said"] * ("lost" in robust.get("searched", {}))
 
-    @property
-    def lost(self) -> list[str]:
-        """At how many plants of which the controller has no margin even if they were known exactly."""
-        others, fresh = self.robust.get("scenarios"), self.fresh
-        known = {
-            f"{{}} of the {others} other plants that were tried": len(self._floor["lost"]),
-            f"{{}} of {fresh.get('draws')} more": fresh.get("lost", 0),
-        }
-        said = [text.format(number) for text, number in known.items() if number]
-        return said or ["a plant within what you said"] * ("lost" in self.robust.get("searched", {}))
 
-    @property
-    def barely(self) -> int:
-        """The number of plants at which the controller has a margin, and r_adm is the floor."""
-        raised, lost = (len(self._floor[key]) + int(self.fresh.get(key, 0)) for key in ("raised", "lost"))
-        return raised - lost
-
-    @property
-    def _floor(self) -> Mapping[str, Json]:
-        return {"raised": [], "lost": [], "worst": []} | self.robust.get("floor", {})
-
-    def enough(self, ratio: float) -> str:
-        """Return whether a ratio of errors is enough, and for which of the plants that were tried."""
-        if ratio > 1.0:
-            return "not enough"
-        if self.lost or self.barely:
-            room = "this controller has the margin with room to spare, as it does not at every plant"
-            return f"enough wherever {room}"
-        if not self.fresh.get("missed") or self.fresh["largest"] * ratio <= 1.0:
-            return "enough"
-        return (
-            f"enough at the plant as you stated it and at {self.robust['scenarios']} others, but not at "
-            "every one within what you said of it"
+def _elsewhere(ratio: float, robust: Mapping[str, Any]) -> Iterator[str]:
+    """Say at which plants errors and limits were tried, and how that ended."""
+    searched, fresh = robust.get("searched"), robust.get("fresh") or {}
+    number = robust["scenarios"] - (searched or {}).get("added", 0)
+    at = f"at the plant as you stated it and at {number} others within what you said of it"
+    if searched:
+        at = at.replace(" and", ",") + f", and at the worst one that a search found ({_values(searched)})"
+    yield f"This was tried {at}."
+    if not fresh:
+        return
+    worst, draws, peaks = max(fresh["largest"], 1.0) * ratio, fresh["draws"], fresh.get("beyond_limits")
+    if fresh["missed"]:
+        yield (
+            f"Of {draws} more of them {fresh['missed']} would be known less well: there it errs up to "
+            f"{worst:.3g} times as much as is admitted, which is "
+            f"{'enough, too' if worst <= 1.0 else 'too much'}."
         )
-
-    def sentences(self, ratio: float) -> list[str]:
-        """Return at which plants errors and limits were tried, and how that ended."""
-        if not self.robust.get("scenarios"):
-            return []
-        searched, fresh = self.robust.get("searched"), self.fresh
-        number = self.robust["scenarios"] - (searched or {}).get("added", 0)
-        at = f"at the plant as you stated it and at {number} others within what you said of it"
-        if searched:
-            at = at.replace(" and", ",") + f", and at the worst one that a search found ({_values(searched)})"
-        said = [f"This was tried {at}."]
-        if not fresh:
-            return said
-        worst, draws, peaks = max(fresh["largest"], 1.0) * ratio, fresh["draws"], fresh.get("beyond_limits")
-        if fresh["missed"]:
-            said.append(
-                f"Of {draws} more of them {fresh['missed']} would be known less well: there it errs up to "
-                f"{worst:.3g} times as much as is admitted, which is "
-                f"{'enough, too' if worst <= 1.0 else 'too much'}."
-            )
-        else:
-            said.append(f"Nor is it worse at {draws} more of them.")
-        if peaks:
-            beyond = f", and at {draws} more; noise comes on top of that."
-            if peaks["draws"]:
-                beyond = (
-                    f", without noise; at {peaks['draws']} of {draws} more they go beyond, up to "
-                    f"{per_cent(peaks['largest'])} of a limit. Leave some room."
-                )
-            said.append(f"Input and output stay within your limits {at}{beyond}")
-        return said
-
-    def no_margin(self, wished: str) -> str:
-        """Return that the controller does not keep the margin at some plants, and the worst of them."""
-        known = [*self._floor["worst"], self.robust.get("searched", {})]
-        worst = max((one for one in known if "peak" in one), key=lambda one: one["peak"], default=None)
-        example = ""
-        if worst is not None:
-            example = f", such as {_values(worst)}, where |S| reaches {_decibels(worst['peak'])}"
-        return (
-            f"But at {' and at '.join(self.lost)} this controller does not keep {wished} even if the plant "
-            f"were known exactly{example}. No experiment changes that: if the true plant is one of these, "
-            "the verdict of assess will be undecided. A slower controller (a smaller Kp), one that is tuned "
-            "to the plant, or a smaller margin helps."
-        )
+    else:
+        yield f"Nor is it worse at {draws} more of them."
+    if peaks:
+        beyond = f", and at {draws} more; noise comes on top of that."
+        if peaks["draws"]:
+            share = f"up to {per_cent(peaks['largest'])} of a limit. Leave some room."
+            beyond = f", without noise; at {peaks['draws']} of {draws} more they go beyond, {share}"
+        yield f"Input and output stay within your limits {at}{beyond}"
 
 
-def _values(plant: Mapping[str, Json]) -> str:
+def _values(plant: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} {value:.3g}" for name, value in plant["parameters"].items())
 
 
@@ -175,31 +121,33 @@ def _decibels(peak: float) -> str:
     return f"{20.0 * np.log10(peak):.3g} dB"
 
 
-def _margins(spec: Spec, result: Result, others: _Others, enough: bool) -> list[str]:
-    """Return what is promised of the loop where the record is `enough`, and where the promise ends."""
-    kept = spec.accuracy.loop
+def _margins(spec: Spec, result: Result, *, enough: bool) -> Iterator[str]:
+    """Say what is promised of the loop where the record is enough, and where the promise ends."""
+    kept, robust = spec.accuracy.loop, result.get("robust", {})
     loop = next((item["loop"] for item in result.get("requirements", []) if "loop" in item), None)
     if kept is None or not loop:
-        return []
-    wished, said = _decibels(kept.peak), list[str]()
-    if others.lost:
-        said.append(others.no_margin(wished))
+        return
+    wished, lost = _decibels(kept.peak), _without_margin(robust)
+    if lost:
+        known = [*robust.get("floor", {}).get("worst", ()), robust.get("searched", {})]
+        worst = max((one for one in known if "peak" in one), key=lambda one: one["peak"], default=None)
+        example = ""
+        if worst is not None:
+            example = f", such as {_values(worst)}, where |S| reaches {_decibels(worst['peak'])}"
+        yield (
+            f"But at {' and at '.join(lost)} this controller does not keep {wished} even if the plant "
+            f"were known exactly{example}. No experiment changes that: if the true plant is one of these, "
+            "the verdict of assess will be undecided. A slower controller (a smaller Kp), one that is tuned "
+            "to the plant, or a smaller margin helps."
+        )
     if enough:
         sure = 100.0 * (kept.confidence or DEFAULT_CONFIDENCE)
-        where = "At the other plants that were tried the" if others.lost or others.barely else "The"
-        said.append(
-            f"{where} peak of |S| of the loop stays below {wished} for every plant within the error of the "
-            f"model (r_u, to first order, {sure:.3g} % confidence): "
-            f"a gain margin of {loop['gain_margin']:.3g} and a phase margin of {loop['phase_margin']:.3g} "
-            "degrees are kept."
+        yield (
+            f"{'At the other plants that were tried the' if lost else 'The'} peak of |S| of the loop stays "
+            f"below {wished} for every plant within the error of the model (r_u, to first order, {sure:.3g} "
+            f"% confidence): a gain margin of {loop['gain_margin']:.3g} and a phase margin of "
+            f"{loop['phase_margin']:.3g} degrees are kept."
         )
-    if others.barely:
-        said.append(
-            f"At {others.barely} of the plants that were tried the controller has hardly any room left. "
-            "There the error is held against a share of the room at the plant as you stated it, and whether "
-            "the margin is kept this experiment may leave open."
-        )
-    return said
 
 
 def _used(spec: Spec, result: Result) -> str:

@@ -30,18 +30,13 @@ class _Tried:
 
     draft: Draft
     value: float
-    bound: float | None
+    bound: float
     rivals: bool
-
-    @property
-    def near(self) -> bool:
-        """Whether no other spectrum can be much better."""
-        return self.bound is not None and self.value <= _ENOUGH * self.bound
 
     def commented(self) -> Draft:
         """Return the draft; its comment says how much better another spectrum may be."""
         comment = f"{self.draft.why}; longer ones are no better, as far as was tried"
-        if self.bound is not None and self.value <= _BEYOND * self.bound:
+        if self.value <= _BEYOND * self.bound:
             gap = max(self.value / self.bound - 1.0, _LEAST_GAP)
             comment = f"{self.draft.why}: no other is better by more than {per_cent(gap, 2)}"
         return replace(self.draft, why=comment)
@@ -60,9 +55,13 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
         return draft
     tried: list[_Tried] = []
     for words, what in _spectra(draft.spec().experiment.samples):
+        one = replace(draft, spectrum=words, why=what)
         with in_their_words(draft.said):
-            tried.append(_solved(replace(draft, spectrum=words, why=what), solve))
-        if tried[-1].near and not tried[-1].rivals:
+            result = solve(one.spec().with_(uncertainty=None, **{"signal.candidates": 1}))
+        value, bound = (result["objective"].get(name) for name in ("value", "any_spectrum_bound"))
+        rivals = bool(result.get("foreseen", {}).get("rivals"))
+        tried.append(_Tried(one, float(value), float(bound or 0.0), rivals))
+        if value <= _ENOUGH * tried[-1].bound and not rivals:
             break
     clear = [one for one in tried if not one.rivals] or tried
     least = min(one.value for one in clear)
@@ -77,10 +76,3 @@ def _spectra(samples: int) -> list[tuple[str, str]]:
         *((f"{{type: fir, order: {order}}}", f"filtered noise of order {order}") for order in _ORDERS),
         *((f"{{type: multisine, lines: {number}}}", f"{number} sinusoids") for number in lines),
     ]
-
-
-def _solved(draft: Draft, solve: Solve) -> _Tried:
-    result = solve(draft.spec().with_(uncertainty=None, **{"signal.candidates": 1}))
-    objective, rivals = result["objective"], result.get("foreseen", {}).get("rivals", [])
-    bound = objective.get("any_spectrum_bound")
-    return _Tried(draft, float(objective["value"]), None if bound is None else float(bound), bool(rivals))

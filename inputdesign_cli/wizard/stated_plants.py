@@ -1,12 +1,10 @@
-"""What is known of a plant, and plants that are stated: by the name of a template, by numbers, or in JSON."""
+"""What is known of a plant, and plants that are stated: by a template, in numbers, or in JSON."""
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
@@ -16,12 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.wizard.grammar import LARGEST, NUMBER, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import LARGEST, Phrase, needed, short
 from inputdesign_cli.wizard.questions import bad_answer
 
 _QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
-_STEPS = (1.0, 2.0, 5.0, 10.0)
-_OF_DEAD_TIME = 0.5  # the sample time of a plant without a time constant
 
 
 @dataclass(frozen=True)
@@ -69,7 +65,7 @@ class PlantAnswer:
 def _round_step(wanted: float) -> float:
     """Round down to 1, 2 or 5 times a power of ten."""
     decade = 10.0 ** np.floor(np.log10(wanted))
-    return float(decade * max(step for step in _STEPS if step * decade <= wanted * (1 + 1e-9)))
+    return float(decade * max(step for step in (1.0, 2.0, 5.0, 10.0) if step * decade <= wanted * (1 + 1e-9)))
 
 
 def _around(values: Mapping[str, float], shares: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -86,11 +82,6 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     Raises:
         SpecError: `bad-answer`.
     """
-    for words in _QUANTITIES.values():
-        said = re.findall(rf"\b(?:{words})\b[^,;]*?{NUMBER}", text, re.I)
-        if len(said) > 1:
-            what = words.split("|")[0]
-            raise bad_answer("plant", f"it says the {what} more than once: {' and '.join(said)}")
     phrase = Phrase(text, "plant")
     kinds = dict.fromkeys(_QUANTITIES, "time") | {"gain": "gain"}
     read = {name: phrase.known_within(words, kinds[name]) for name, words in _QUANTITIES.items()}
@@ -119,21 +110,16 @@ def _template(lines: str, slow: float, controller: str | None = None, **values: 
     return PlantAnswer((*lines.split("\n"), "  sample: zoh"), slow, around, values, controller)
 
 
-def _lag(words: str, head: str) -> PlantAnswer:
-    stated = plant_of_words(f"{words}, within 20 %", head)
-    return replace(stated, lines=(*stated.lines[:2], "  sample: zoh"))
-
-
 TEMPLATES = {
-    "heater": _lag("gain 2.1, time constant 180 s, dead time 25 s",
-                   "plant:  # template heater: degrees over per cent of power"),
+    "heater": plant_of_words("gain 2.1, time constant 180 s, dead time 25 s, within 20 %",
+                              "plant:  # template heater: degrees over per cent of power"),
     "tank": _template(
         "plant:  # template tank: level over valve, it integrates\n"
         "  parameters: {k: 0.05, L: 5}\n  continuous: {numerator: [k], denominator: [1, 0], delay: L}",
         60.0, "{pid: {Kp: 0.8, Ti: 60}}", k=0.05, L=5.0,
     ),
-    "motor": _lag("gain 0.1, time constant 0.5 s, dead time 0.02 s",
-                  "plant:  # template motor: speed over voltage"),
+    "motor": plant_of_words("gain 0.1, time constant 0.5 s, dead time 0.02 s, within 20 %",
+                             "plant:  # template motor: speed over voltage"),
     "axis": _template(
         "plant:  # template axis: a flexible axis, its first resonance\n"
         "  continuous: {gain: 1, damping: 0.1, natural_frequency: 30}",
@@ -171,7 +157,7 @@ def system_of(path: Path) -> PlantAnswer:
         SpecError, DataError: `bad-answer`.
     """
     try:
-        found = System.model_validate(json.loads(read_regular(path), object_pairs_hook=_once))
+        found = System.model_validate(json.loads(read_regular(path)))
     except (OSError, ValueError, RecursionError) as error:
         why = str(error)
         if isinstance(error, ValidationError):
@@ -179,13 +165,13 @@ def system_of(path: Path) -> PlantAnswer:
             why = ": ".join(filter(None, (".".join(map(str, first["loc"])), first["msg"])))
         why = f'{path.name} does not hold {{"num": [2], "den": [180, 1], "delay": 25}} or the like: {why}'
         raise DataError(bad_answer("plant", why).diagnostics) from None
-    num, den, late = (*(np.trim_zeros(part, "f") for part in (found.num, found.den)), found.delay)
+    num, den = (np.trim_zeros(part, "f") for part in (found.num, found.den))
     faults = {
         f"the system of {path.name} is sampled (dt), and is to be in s": bool(found.dt),
         f"num of {path.name} is zero": not num,
         f"den of {path.name} is zero": not den,
         f"num of {path.name} has more entries than den": len(num) > len(den),
-        f"the delay in {path.name} is negative": late < 0.0,
+        f"the delay in {path.name} is negative": found.delay < 0.0,
     }
     if fault := next((text for text, holds in faults.items() if holds), None):
         raise bad_answer("plant", fault)
@@ -193,60 +179,38 @@ def system_of(path: Path) -> PlantAnswer:
         num, den = num[:-1], den[:-1]
     integrates, poles = den[-1] == 0.0, np.roots(den)
     decays = -poles.real[poles.real < 0]
-    if not decays.size and not (integrates and late):
-        raise bad_answer("plant", _NO_TIME[integrates].format(file=path.name))
-    lines, values = (_integrating if integrates else _as_given)(num, den, late)
+    if not decays.size and not (integrates and found.delay):
+        hint = ': write its dead time ("delay": 5), however small, or the lag of its actuator into den'
+        why = f"the system of {path.name} has no stable pole, which would show how fast it is to be sampled"
+        raise bad_answer("plant", why + hint * integrates)
+    values, lines = _named(num, den, found.delay) if integrates else ({}, _as_given(num, den, found.delay))
     return PlantAnswer(
         (f"plant:  # from {path.name}", *lines, "  sample: zoh"),
-        float(1.0 / decays.min()) if decays.size else late,
+        float(1.0 / decays.min()) if decays.size else found.delay,
         values=values,
-        sampling=None if decays.size else _round_step(_OF_DEAD_TIME * late),
+        sampling=None if decays.size else _round_step(found.delay / 2.0),
         why_sampling="half the dead time, or a little less, for it has no time constant",
         tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
     )
 
 
-_NO_TIME = {
-    True: 'the system of {file} integrates and has no other pole and no delay, which would show how fast it '
-    'is to be sampled: write its dead time ("delay": 5), however small, or the lag of its actuator into '
-    'den, as in "den": [10, 1, 0]',
-    False: "the system of {file} has no stable pole: its time constant is not known",
-}  # fmt: skip
-
-
-def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """Return a mapping in JSON; a key that stands there twice is a ValueError."""
-    names = [name for name, _ in pairs]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise ValueError(f"it says {twice} more than once")
-    return dict(pairs)
-
-
-def _as_given(num: Sequence[float], den: Sequence[float], late: float) -> tuple[list[str], dict[str, float]]:
+def _as_given(num: Sequence[float], den: Sequence[float], late: float) -> list[str]:
     delay = f", delay: {short(late)}" if late else ""
-    return [f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}"], {}
+    return [f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}"]
 
 
-def _integrating(
-    num: Sequence[float], den: Sequence[float], late: float
-) -> tuple[list[str], dict[str, float]]:
-    """Name every coefficient that is to be estimated; a pole at zero is known.
-
-    The first entry of `den` has no name, since only ratios can be estimated.
-    """
-    names = [
-        [f"{letter}{power}" for power in reversed(range(len(part)))]
-        for letter, part in (("b", num), ("a", den))
-    ]
-    entries = dict(zip(chain(*names), chain(num, den), strict=True))
-    values = {name: entry for name, entry in entries.items() if entry and name != names[1][0]}
-    above, below = (
-        ", ".join(name if name in values else repr(entries[name]) for name in part) for part in names
-    )
+def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dict[str, float], list[str]]:
+    """Name every coefficient that is to be estimated; a pole at zero is known, and so is the first of den."""
+    values: dict[str, float] = {}
+    rows = []
+    for letter, part in (("b", num), ("a", den)):
+        powers = [f"{letter}{power}" for power in reversed(range(len(part)))]
+        entries = dict(zip(powers, part, strict=True))
+        free = powers if letter == "b" else powers[1:]
+        values |= {name: entries[name] for name in free if entries[name]}
+        rows.append(", ".join(name if name in values else repr(v) for name, v in entries.items()))
     values |= {"L": late} if late else {}
     listed = ", ".join(f"{name}: {value!r}" for name, value in values.items())
     delay = ", delay: L" if late else ""
-    return [
-        f"  parameters: {{{listed}}}",
-        f"  continuous: {{numerator: [{above}], denominator: [{below}]{delay}}}  # it is known to integrate",
-    ], values
+    written = f"{{numerator: [{rows[0]}], denominator: [{rows[1]}]{delay}}}"
+    return values, [f"  parameters: {{{listed}}}", f"  continuous: {written}  # it is known to integrate"]

@@ -237,7 +237,7 @@ def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
     with pytest.raises(SpecError) as caught:
         compose({**ENGINEER, "wish": "PI loop with 0.5 dB"}, "x", tmp_path).validate()
     hint = caught.value.diagnostics[0].hint
-    least = re.search(r"more than ([\d.]+) dB", hint)
+    least = re.search(r"less of a margin than ([\d.]+) dB", hint)
     assert least is not None
     barely = float(least[1]) + 0.1
     compose({**ENGINEER, "wish": f"PI loop with {barely:.3g} dB"}, "x", tmp_path).validate()

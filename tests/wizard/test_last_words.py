@@ -53,7 +53,7 @@ def told(ratio=0.5, there=None, solve=None, limits=None, **robust):
     signal = {"worst_ratio": ratio, "input_peak": [1.25 if limits else 5.0], "of_limits": {"rate": 1.0}}
     result = {"samples": 720, "signal": signal, **({"robust": robust} if robust else {})}
     missing = {"signal": {}}
-    return " ".join(verdict(spec, result, solve or (lambda other: missing), there).sentences)
+    return " ".join(verdict(spec, result, solve or (lambda other: missing), there))
 
 
 def told_of_the_margin(**robust):
@@ -62,7 +62,7 @@ def told_of_the_margin(**robust):
     loop = {"gain_margin": 2.0, "phase_margin": 29.0}
     signal = {"worst_ratio": 0.3, "input_peak": [5.0]}
     result = {"samples": 720, "signal": signal, "requirements": [{"loop": loop}], "robust": robust}
-    return " ".join(verdict(spec, result, lambda other: {"signal": {}}).sentences)
+    return " ".join(verdict(spec, result, lambda other: {"signal": {}}))
 
 
 def test_no_margin_is_promised_at_a_plant_that_the_controller_does_not_fit():
@@ -74,12 +74,11 @@ def test_no_margin_is_promised_at_a_plant_that_the_controller_does_not_fit():
     said = told_of_the_margin(
         scenarios=30, floor=floor, fresh={"missed": 0, "largest": 0.9, "draws": 200, "raised": 55, "lost": 51}
     )
-    assert "enough wherever this controller has the margin with room to spare" in said
+    assert "enough wherever this controller has the margin:" in said
     assert "at 2 of the 30 other plants that were tried and at 51 of 200 more" in said
     assert "such as gain 1.2, dead_time 24, where |S| reaches 13.5 dB" in said
     assert "the verdict of assess will be undecided" in said
     assert "At the other plants that were tried the peak of |S|" in said
-    assert "At 5 of the plants that were tried the controller has hardly any room left" in said
 
 
 def test_a_rate_that_binds_is_said():
@@ -189,10 +188,10 @@ def test_what_is_enough_is_said_of_the_plants_that_it_is_enough_for():
     fresh = {"draws": 200, "missed": 6, "largest": 1.6}
     result = {"samples": 720, "signal": {"worst_ratio": 0.9}, "robust": {"scenarios": 30, "fresh": fresh}}
     answer = {"signal": {"worst_ratio": 2.0}, "samples": 0}
-    first = verdict(spec, result, lambda changed: answer).sentences[0]
+    first = next(verdict(spec, result, lambda changed: answer))
     assert "but not at every one within what you said of it" in first
     fresh["largest"] = 1.05
-    assert "is enough:" in verdict(spec, result, lambda changed: answer).sentences[0]
+    assert "is enough:" in next(verdict(spec, result, lambda changed: answer))
 
 
 def test_what_is_not_used_for_a_bode_plot_is_said():
@@ -208,8 +207,7 @@ def test_a_bode_plot_that_is_refused_says_which_time_would_do():
     with pytest.raises(SpecError) as caught:
         compose(answers, "x", Path()).validate()
     (told,) = caught.value.diagnostics
-    assert "1 frequencies between these two" in told.message
-    assert "20 are needed" in told.message
+    assert "the band holds 1 harmonics" in told.message
     seconds = float(told.hint.split("take ")[1].split(" s or more")[0])
     compose({**answers, "time": f"{seconds:g} s"}, "x", Path()).validate()
     with pytest.raises(SpecError):

@@ -8,7 +8,8 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.log_noise import log_noise_lines
+from inputdesign_cli.wizard.noise import noise_lines
+from inputdesign_cli.wizard.stated_plants import PlantAnswer
 from tests.support.wishes import ENGINEER
 
 
@@ -104,6 +105,10 @@ def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
         assert f"# against this model: {one.partition(': ')[2]}\n" in draft.text
 
 
+def of_log(explored, text, drift):
+    return noise_lines(text, drift, Path(), PlantAnswer((), 1.0, sampling=5.0, explored=explored))
+
+
 @pytest.mark.parametrize("explored", ["plant: {A: [1, -0.7], B: [0, 1]}", "plant: {B: [0, 1], F: [1, -0.7]}"])
 @pytest.mark.parametrize(
     ("text", "variance"),
@@ -114,7 +119,7 @@ def test_noise_of_a_stated_size_is_correlated_as_the_log_tells(explored, text, v
     D = "" if "A:" in explored else ", D: [1, -0.7]"
     noise = f"noise: {{variance: {0.02 * (1 - 0.49):.6g}{D}}}"
     spec = parse_spec(f"sample_time: 5\n{explored}\n{noise}\n", design=False)
-    lines = log_noise_lines(spec, "log.csv", text, "no", Path())
+    lines = of_log(spec, text, "no")
     told = parse_spec("\n".join(["sample_time: 5", explored, *lines]), design=False)
     A = getattr(told.plant, "A", None) or (1.0,)
     assert np.convolve(A, told.noise.D).tolist() == [1.0, -0.7]
@@ -126,7 +131,7 @@ def test_noise_of_two_outputs_is_that_of_each():
     plant = "plant: {B: [[[0, 1]], [[0, 1]]], F: [[[1, -0.7]], [[1, -0.7]]]}"
     noise = "noise: {variance: [[0.1, 0], [0, 0.1]], D: [[1, -0.6], [1]]}"
     spec = parse_spec(f"sample_time: 5\n{plant}\n{noise}\n", design=False)
-    lines = log_noise_lines(spec, "log.csv", "standard deviation 0.2", "no", Path())
+    lines = of_log(spec, "standard deviation 0.2", "no")
     told = parse_spec("\n".join(["sample_time: 5", plant, *lines]), design=False)
     np.testing.assert_allclose(told.noise.covariance(2), np.diag([0.04 * 0.64, 0.04]), rtol=1e-12)
     assert told.noise.D == spec.noise.D
@@ -137,7 +142,7 @@ def test_noise_is_that_of_the_output_also_where_the_log_has_it_behind_a_lag():
     explored = parse_spec(
         "sample_time: 5\nplant: {A: [1, -0.7], B: [0, 1]}\nnoise: {variance: 1}\n", design=False
     )
-    lines = log_noise_lines(explored, "log.csv", "standard deviation 0.2", "yes", Path())
+    lines = of_log(explored, "standard deviation 0.2", "yes")
     told = parse_spec("\n".join(["plant: {A: [1, -0.7], B: [0, 1]}", *lines]), design=False).noise
     assert told.drift
     np.testing.assert_allclose(np.polydiv(told.C, [1.0, -0.7])[1], 0.0, atol=1e-12)

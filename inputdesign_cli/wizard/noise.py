@@ -1,0 +1,193 @@
+"""The noise of a spec: as it is stated, as data at rest show it, or as a log has it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.specification import Noise, Spec
+from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.grammar import NUMBER, UNIT, Phrase, needed, seconds, short
+from inputdesign_cli.wizard.questions import AS_LOG, bad_answer, chosen, file_of
+from inputdesign_cli.wizard.stated_plants import PlantAnswer
+
+_DRIFTING = (1.0, -0.8)  # C of noise that drifts
+_SAME_STEP = 0.01  # of rows and samples
+_WHITE = 3.0  # correlations above this number of standard deviations colour the noise
+_FEWEST = 20  # rows of data at rest
+_STRONGEST = 0.98  # correlation from one sample to the next
+_LONG = 100_000  # samples after which no pole of a log remembers anything
+_DRIFTS = "  drift: true  # an integrator in the noise"
+
+
+@dataclass(frozen=True)
+class _Level:
+    """The variance of the innovation, the pole of the noise (0: white), and how they are known."""
+
+    variance: float
+    pole: float
+    why: str
+    at_rest: bool = False
+    rounded: bool = False  # it is the least that noise can be
+
+
+def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list[str]:
+    """Return the lines of `noise` from the answers, and from the model of a log where they leave it open.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
+    moves = plant.explored is not None and bool(np.any(plant.explored.noise.drift))
+    drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moves})
+    if plant.explored is not None:
+        return _of_log(plant.explored, plant.source, text, folder, moves=moves, drifts=drifts)
+    level = _stated(text, folder, plant.sample_time)
+    lines = ["noise:", f"  variance: {short(level.variance)}  # {level.why}"]
+    if drifts:
+        return [*lines, _DRIFTS, f"  C: {list(_DRIFTING)}"]
+    return [*lines, f"  D: [1, {short(-level.pole)}]  # {level.why}"] if level.pole else lines
+
+
+def _of_log(explored: Spec, source: str, text: str, folder: Path, *, moves: bool, drifts: bool) -> list[str]:
+    """Return the lines of `noise` beside a log, which moves or not, of noise that is said to drift or not.
+
+    The size is the one that is stated; a resolution is the least that noise can be, and the log may show
+    more. Noise without drift is correlated as in the log, unless data at rest show its correlation.
+    """
+    noise, plant = explored.noise, explored.plant
+    assert plant.kind != "regression"
+    own = json.dumps(np.asarray(noise.variance).tolist())
+    if text == AS_LOG and drifts == moves:
+        return [f"noise:  # as in {source}", f"  variance: {own}", *_shape(noise)]
+    powers = np.diag(noise.covariance(plant.outputs))
+    level = _Level(float(np.max(powers)), 0.0, "the variance in the log")
+    if text != AS_LOG:
+        level = _stated(text, folder, explored.sample_time)
+    A = _per_output(plant.A if plant.kind == "polynomial" else (1.0,), plant.outputs)
+    steady = not (drifts or moves or level.at_rest)
+    gains = _gains(noise, A) if steady else np.ones(plant.outputs)
+    variance, why = short(level.variance), level.why
+    if level.rounded and np.max(powers * gains) > level.variance:
+        variance, why = own, f"of {source}: more than rounding leaves"
+    elif np.any(gains > 1.0):
+        sizes = float(variance) / gains
+        variance = short(sizes[0]) if sizes.size == 1 else json.dumps(np.diag(sizes).tolist())
+        why += f", correlated as in {source}"
+    listed = ", ".join(map(short, (powers * gains).tolist()))
+    has = f"the log has a variance of {listed}, {'and drift' if moves else 'and no drift'}"
+    lines = [f"noise:  # as you said; {has}", f"  variance: {variance}  # {why}"]
+    if steady or (drifts and moves):  # with the colour that was estimated along
+        return [*lines, *_shape(noise)]
+    lines += [_DRIFTS] if drifts else [f"  D: [1, {short(-level.pole)}]"] if level.pole else []
+    # 1/A stands before C: with the factor A in C, the noise of y is that without A.
+    C = [np.convolve(_DRIFTING if drifts else (1.0,), row).tolist() for row in A]
+    return lines if [[1.0]] * len(C) == C else [*lines, f"  C: {json.dumps(C if len(C) > 1 else C[0])}"]
+
+
+def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
+    """Return one polynomial for each output."""
+    return rows if isinstance(rows[0], Sequence) else [rows] * outputs
+
+
+def _gains(noise: Noise, A: Sequence[Sequence[float]]) -> Array:
+    """Return the variance of the noise of every output (p,) over that of its white e, none of it drifting."""
+    impulse = np.zeros(_LONG)
+    impulse[0] = 1.0
+    rows = zip(_per_output(noise.C, len(A)), _per_output(noise.D, len(A)), A, strict=True)
+    return np.array([np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows])
+
+
+def _shape(noise: Noise) -> list[str]:
+    """Return the drift, where there is one, and C and D, where they are not 1."""
+    drift = f"  drift: {json.dumps(noise.drift)}  # an integrator in the noise"
+    rows = (("C", noise.C), ("D", noise.D))
+    return [drift] * bool(np.any(noise.drift)) + [
+        f"  {name}: {json.dumps(found)}" for name, found in rows if found != (1.0,)
+    ]
+
+
+def _stated(text: str, folder: Path, step: float) -> _Level:
+    """Return what an answer says; a step is the seconds between samples.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
+    word, _, name = text.partition(" ")
+    if word.lower() == "rest":
+        return _at_rest(folder / name.strip(), step)
+    said = Phrase(text, "noise")
+    deviation, rounding = said.after("standard deviation|deviation|std"), _resolution(said)
+    said_both = {"the standard deviation": deviation, "the resolution": rounding}
+    sizes = {what: needed(one, "noise", what) for what, one in said_both.items() if one is not None}
+    if not sizes:
+        raise bad_answer("noise", "it does not say a standard deviation or a resolution")
+    said.finish()
+    why = [f"standard deviation {short(deviation)}"] if deviation is not None else []
+    if rounding is not None:
+        least = "" if why else ": the least that noise can be"
+        why.append(f"rounding to {short(rounding)} has a variance of its square over 12{least}")
+    size = (deviation or 0.0) ** 2 + (rounding or 0.0) ** 2 / 12.0
+    return _Level(size, 0.0, "; ".join(why), rounded=rounding is not None)
+
+
+def _resolution(said: Phrase) -> float | None:
+    """Return the step of a sensor, which follows from its bits and its range where these are said."""
+    begins = r"\bresolution\b\s*(?:of\s*)?"
+    bits = said.take(rf"{begins}(\d+)\s*bits?\s*(?:up to|over|to|range)\s*{NUMBER}{UNIT}")
+    if bits is not None:
+        return needed(float(bits[2]), "noise", "its range") / 2.0 ** int(bits[1])
+    counted = said.take(rf"{begins}{NUMBER}[\s-]*(bits?|digits?|levels?|counts?|steps?)\b")
+    if counted is not None:
+        why = f"{counted[1]} {counted[2]} are no size without a range"
+        raise bad_answer("noise", f'{why}: "resolution 12 bits up to 100", or the step itself')
+    return said.after("resolution", named=True)
+
+
+def _at_rest(path: Path, step: float) -> _Level:
+    """Return the level of the noise in the column y of a file.
+
+    Noise with one pole is assumed where rows are farther apart than samples, or nearer: its correlation fades
+    by the same factor in the same time.
+    """
+    from inputdesign_cli.questions.building.tables import read_samples
+
+    file_of("noise", path)
+    with in_their_words({}, "noise"):
+        y, apart = read_samples(path, {"y": "y"}, key="noise")["y"], _seconds_apart(path) or step
+    if y.size < _FEWEST:
+        raise bad_answer("noise", f"{path.name} has {y.size} rows, and {_FEWEST} are the least")
+    v = y - y.mean()
+    power = float(np.mean(v**2))
+    if power == 0.0:
+        raise bad_answer("noise", f"y of {path.name} does not change; write the resolution of the sensor")
+    rho = float(np.mean(v[1:] * v[:-1]) / power)
+    same = abs(apart - step) <= _SAME_STEP * step
+    seen = f"of {path.name}: {y.size} samples" + ("" if same else f", {short(apart)} s apart")
+    if abs(rho) <= _WHITE / np.sqrt(y.size):
+        return _Level(power, 0.0, f"{seen}, white as far as they show", at_rest=True)
+    pole = min(rho if same else max(rho, 0.0) ** (step / apart), _STRONGEST)
+    why = f"{seen}, correlation {rho:.2g} from one to the next"
+    return _Level(power * (1.0 - pole**2), pole, why, at_rest=True)
+
+
+def _seconds_apart(path: Path) -> float | None:
+    """Return the time between the rows of a file; None without a column of times."""
+    from inputdesign_cli.records import read_sheet
+    from inputdesign_cli.records.columns import column_named, columns_of, time_columns
+    from inputdesign_cli.records.signals import time_unit_in
+
+    sheet = read_sheet(path, key="noise")
+    for name in time_columns(sheet)[:1]:
+        unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
+        apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"])))
+        return seconds(f"{apart!r} {unit}", "noise") if apart > 0.0 else None
+    return None
