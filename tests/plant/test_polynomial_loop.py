@@ -9,7 +9,7 @@ import scipy.signal
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix, close_loop
-from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
 from tests.support.plants import arrays
 
@@ -131,7 +131,7 @@ def test_powers_are_those_of_simulated_impulses(experiment):
     plant = experiment.model
     inputs, outputs = plant.inputs, plant.outputs
     c = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 0.5]])[:inputs, :inputs]
-    basis = MatrixFirBasis(inputs, 0)
+    basis = FirBasis(inputs, 0)
     x = np.array([2.0, 0.3, 1.0, 0.0, -0.2, 0.5])[: basis.size]
     np.testing.assert_array_equal(basis.autocovariances(x)[0], c)
     runs = [

@@ -14,7 +14,7 @@ from inputdesign_cli.plant import (
     SampledModel,
     TransferMatrix,
 )
-from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
 from tests.support.plants import arrays, descending
 
@@ -67,7 +67,7 @@ def pair():
 
 def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
     held, polynomial = pair
-    J, basis = derivative(), MatrixFirBasis(2, 3)
+    J, basis = derivative(), FirBasis(2, 3)
     assert held.model.names[:2] == ("b0[1,1]", "b0[1,2]")
     assert polynomial.model.names[:2] == ("b1[1,1]", "b1[1,2]")
     maps = [basis.integrals(e.information_density, e.singularities) for e in pair]
@@ -80,7 +80,7 @@ def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
 
 def test_loop_is_that_of_polynomials(pair):
     held, polynomial = pair
-    basis, w = MatrixFirBasis(2, 2), np.array([0.0, 0.02, 1.0, np.pi])
+    basis, w = FirBasis(2, 2), np.array([0.0, 0.02, 1.0, np.pi])
     for kind in ("input", "output", "excitation"):
         for channel in (None, 1):
             powers = [
