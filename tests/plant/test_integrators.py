@@ -10,10 +10,10 @@ from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import (
     ContinuousModel,
     Intersample,
+    Loop,
     Parametrisation,
     PolynomialModel,
     Reparametrised,
-    SampledLoop,
     SampledModel,
     TransferMatrix,
     close_loop,
@@ -139,12 +139,12 @@ def test_integrators_that_inputs_share_are_one():
     rows = [[[0.2], [0.5]]], [[[1, 0], [1, 0]]]
     plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), np.eye(1))
     C = TransferMatrix.build([[[0.8]], [[0.0]]], [[[1]], [[1]]])
-    SampledLoop(SampledModel(plant, H), C).check_stability()
+    Loop(SampledModel(plant, H), C).check_stability()
     apart = [[[0.2], [0]], [[0], [0.5]]], [[[1, 0], [1]], [[1], [1, 0]]]
     plant = ContinuousModel.monic(descending(apart[0]), descending(apart[1]), np.eye(2))
     C = TransferMatrix.build([[[0.8], [0.0]], [[0.0], [0.0]]], [[[1], [1]], [[1], [1]]])
     with pytest.raises(SpecError):  # the other tank is left to itself
-        SampledLoop(SampledModel(plant, H), C).check_stability()
+        Loop(SampledModel(plant, H), C).check_stability()
 
 
 @pytest.mark.parametrize("hold", [True, False])
