@@ -99,7 +99,7 @@ def first_order(samples: int) -> Sinusoids:
     design = solve(load_spec(ROOT / "specs" / "first_order.yaml"))
     c = np.array(design.result["spectrum"]["coefficients"])
     w = 2 * np.pi * np.arange(samples // 2 + 1) / samples
-    lines = grid_lines(FirBasis(c.size - 1).density(c, w), samples, 1.0)
+    lines = grid_lines(FirBasis(1, c.size - 1).density(c, w), samples, 1.0)
     return Sinusoids.on_grid(lines.dense(samples)[:, 0, 0].real, samples)
 
 

@@ -18,7 +18,6 @@ from inputdesign_cli.information.joint import (
 )
 from inputdesign_cli.information.products import WeightedProducts as WeightedProducts
 from inputdesign_cli.information.quadrature import (
-    NODES_AT_ONCE as NODES_AT_ONCE,
     Quadrature as Quadrature,
     Values as Values,
     graded_quadrature as graded_quadrature,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import ComplexArray
-from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, Values, integrate
+from inputdesign_cli.information.quadrature import Quadrature, Values, integrate
 
 
 def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
@@ -24,4 +24,4 @@ def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
     # Sums of a few hundred nodes, added up, round less than one of them all.
-    return integrate(gradients, sums, singularities, at_once=NODES_AT_ONCE)
+    return integrate(gradients, sums, singularities, several=True)

@@ -26,9 +26,7 @@ _MAX_REFINEMENTS = 4
 _ROUNDING = 1e-7
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
-NODES_AT_ONCE = 256
-"""The number of nodes at a time where the values are large, as for several channels."""
-_MANY = 2048
+_AT_ONCE, _AT_ONCE_OF_SEVERAL = 2048, 256  # nodes
 
 Values = Callable[[Array], NDArray]
 """Values (n, ...) of an integrand at frequencies (n,)."""
@@ -123,7 +121,7 @@ def integrate(
     hi: float = np.pi,
     highest_lag: int = 0,
     knots: Array = _NONE,
-    at_once: int = _MANY,
+    several: bool = False,
 ) -> NDArray[np.float64]:
     """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
@@ -132,7 +130,7 @@ def integrate(
     parameters are nearly indistinguishable), which no rule can mend.
 
     Args:
-        at_once: the largest number of nodes at which values are computed at a time.
+        several: values are large, as for several channels: they are computed at few nodes at a time.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:
@@ -144,6 +142,7 @@ def integrate(
             singularities, lo=lo, hi=hi, highest_lag=highest_lag, refine=refine, knots=knots
         )
 
+    at_once = _AT_ONCE_OF_SEVERAL if several else _AT_ONCE
     # The first rule never stands alone: one call computes its values and the next rule's.
     coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once)
     earlier = np.inf
@@ -198,7 +197,6 @@ def integrate_band(
     *,
     highest_lag: int = 0,
     knots: Array = _NONE,
-    at_once: int = NODES_AT_ONCE,
 ) -> NDArray[np.float64]:
     """Integrate over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
@@ -215,7 +213,7 @@ def integrate_band(
         hi=hi,
         highest_lag=highest_lag,
         knots=knots / unit,
-        at_once=at_once,
+        several=True,
     )
 
 

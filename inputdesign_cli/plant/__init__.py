@@ -26,13 +26,10 @@ from inputdesign_cli.plant.model import (
     noise_gradients as noise_gradients,
 )
 from inputdesign_cli.plant.parametrisation import Parametrisation as Parametrisation
-from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop
 from inputdesign_cli.plant.polynomial_model import PolynomialModel as PolynomialModel
 from inputdesign_cli.plant.reparametrised import Reparametrised as Reparametrised, Words as Words
-from inputdesign_cli.plant.sampled_loop import SampledLoop as SampledLoop
 from inputdesign_cli.plant.sampled_model import SampledModel as SampledModel
 from inputdesign_cli.plant.sampling import hold_entries as hold_entries, zero_order_hold as zero_order_hold
-from inputdesign_cli.plant.state_space_loop import StateSpaceLoop as StateSpaceLoop
 from inputdesign_cli.plant.state_space_model import Matrices as Matrices, StateSpaceModel as StateSpaceModel
 from inputdesign_cli.plant.transfer import (
     ContinuousRational as ContinuousRational,

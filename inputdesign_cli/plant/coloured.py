@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,11 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.loop import BESIDE, INTEGRATES, Loop, beside_zero, close_loop
-from inputdesign_cli.plant.loop_around import LoopAround
-from inputdesign_cli.plant.model import Fraction, Listed, Parameter, Parametrised, row_parameters
+from inputdesign_cli.plant.loop import BESIDE, INTEGRATES, beside_zero
+from inputdesign_cli.plant.model import (
+    Around,
+    Fraction,
+    Listed,
+    Parameter,
+    Parametrised,
+    SampledPlant,
+    row_parameters,
+    tables_at,
+)
 from inputdesign_cli.plant.polynomial import evaluate, join_roots, roots_in_z, unit_circle
-from inputdesign_cli.plant.transfer import TransferMatrix
 
 _T = TypeVar("_T")
 _ONE = (np.ones(1),)
@@ -30,7 +37,7 @@ _DIFFERENCE = np.array([1.0, -1.0])
 
 
 @dataclass(frozen=True)
-class Coloured(Parametrised):
+class Coloured(Around, Parametrised):
     """`plant` with H0, its noise filtered by C_i / (D_i Delta_i); H0 is diagonal.
 
     Attributes:
@@ -48,29 +55,9 @@ class Coloured(Parametrised):
     drift: tuple[bool, ...] = (False,)
 
     @property
-    def continuous(self) -> bool:
-        """Whether frequencies are in rad per time unit."""
-        return self.plant.continuous
-
-    @property
-    def inputs(self) -> int:
-        """Number of inputs r."""
-        return self.plant.inputs
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.plant.outputs
-
-    @property
-    def covariance(self) -> Array:
-        """(p, p) of e."""
-        return self.plant.covariance
-
-    @property
-    def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): see `Model`."""
-        return self.plant.at_once
+    def inner(self) -> SampledPlant:
+        """The plant with its own noise."""
+        return cast(SampledPlant, self.plant)
 
     @cached_property
     def own_parameters(self) -> tuple[Parameter, ...]:
@@ -140,9 +127,10 @@ class Coloured(Parametrised):
         """Poles of G and of all gradients, as points of the frequency plane."""
         return np.concatenate([self.plant.singularities, logarithmic_distance(self.estimated_roots)])
 
-    def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
-        return self.plant.entry_singularities(output, input)
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """See `SampledPlant`."""
+        return np.concatenate([self.inner.predictor_poles, self.estimated_roots])
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
         """Return `bends` (k,) of the plant, and False for the coefficients of C and D."""
@@ -232,15 +220,10 @@ class Coloured(Parametrised):
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Coloured:
         """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
-        values, rows = np.asarray(theta, dtype=float), {"c": list(self.C), "d": list(self.D)}
-        first = len(self.plant.parameters)
-        tables = {letter: [p.copy() for p in polynomials] for letter, polynomials in rows.items()}
-        for parameter, value in zip(self.own_parameters, values[first:], strict=True):
-            own = tables[parameter.letter]
-            own[0 if len(own) == 1 else parameter.places[0][0]][parameter.power] = value
-        return replace(
-            self, plant=self.plant.at(values[:first], covariance), C=tuple(tables["c"]), D=tuple(tables["d"])
-        )
+        first, values = len(self.plant.parameters), np.asarray(theta, dtype=float)
+        plant = self.plant.at(values[:first], covariance)
+        tables = tables_at(self.own_parameters, values[first:], {"c": self.C, "d": self.D})
+        return replace(self, plant=plant, C=tables["c"], D=tables["d"])
 
     def shaped(self, e: Array) -> Array:
         """e (.., n, p) through C / (D Delta), from rest."""
@@ -251,37 +234,10 @@ class Coloured(Parametrised):
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
         return self.plant.simulate(u, self.shaped(e), step)
 
+    def forcing_at(self, w: ArrayLike) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.inner.forcing_at(w) * self.shape_at(w)[:, None, :]
 
-@dataclass(frozen=True)
-class ColouredLoop(LoopAround):
-    """The loop around the plant, driven by noise that is filtered first."""
-
-    model: Coloured
-
-    @cached_property
-    def inner(self) -> Loop:
-        """Return the loop around the plant without the coloured noise."""
-        return close_loop(self.model.plant, self.controller)
-
-    @property
-    def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the filters that make the gradient of the prediction."""
-        return np.concatenate([self.inner.predictor_poles, self.model.estimated_roots])
-
-    @property
-    def integrates(self) -> bool:
-        """Whether plant or noise do."""
-        return self.inner.integrates or self.model.integrates
-
-    def noise_at(self, w: ArrayLike) -> ComplexArray:
-        """R H (n, p, p)."""
-        return self.inner.noise_at(w) * self.model.shape_at(w)[:, None, :]
-
-    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
-        """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
-        return self.inner.signals(r, self.model.shaped(e))
-
-
-@close_loop.register
-def _(model: Coloured, controller: TransferMatrix) -> ColouredLoop:
-    return ColouredLoop(model, controller)
+    def forcing(self, e: Array) -> Array:
+        """See `SampledPlant`."""
+        return self.inner.forcing(self.shaped(e))

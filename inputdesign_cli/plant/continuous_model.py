@@ -17,7 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.intersample import Intersample
-from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised, WhiteNoise, entry_label
+from inputdesign_cli.plant.model import (
+    DELAY,
+    Fraction,
+    Parameter,
+    Parametrised,
+    WhiteNoise,
+    entry_label,
+    tables_at,
+)
 
 
 @dataclass(frozen=True)
@@ -137,17 +145,14 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousModel:
         """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
-        given = {"b": self.numerator, "a": self.denominator, DELAY: self.delay}
-        tables = {letter: [[e.copy() for e in row] for row in rows] for letter, rows in given.items()}
-        for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):
-            for i, j in parameter.places:
-                tables[parameter.letter][i][j][parameter.power] = value
-        above, below, delay = (tuple(map(tuple, tables[letter])) for letter in ("b", "a", DELAY))
+        tables = tables_at(
+            self.parameters, theta, {"b": self.numerator, "a": self.denominator, DELAY: self.delay}
+        )
         return replace(
             self,
-            numerator=above,
-            denominator=below,
-            delay=delay,
+            numerator=tables["b"],
+            denominator=tables["a"],
+            delay=tables[DELAY],
             covariance=self.covariance if covariance is None else covariance,
             entries=self.active,
         )

@@ -1,20 +1,20 @@
-"""The loop around a plant with several channels: u = r - C y, C a matrix of transfer functions in q^-1."""
+"""The loop around a sampled plant: u = r - C y, C a matrix of transfer functions in q^-1."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, singledispatch
-from typing import Self
+from functools import cached_property
+from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Model, prediction_gradients
+from inputdesign_cli.plant.model import Model, SampledPlant, forcings_at, lefts_at, prediction_gradients
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
@@ -42,62 +42,69 @@ def beside_zero(w: ArrayLike, nearest: float) -> ComplexArray | Array:
 
 
 @dataclass(frozen=True)
-class Loop(ABC):
+class Loop:
     """A model under u = r - C y, with e acting on u through the loop.
 
-    With G = R^-1 N and C = Q^-1 P, R and Q diagonal, everything solves
+    With R y = N u + R H e of the model (see `SampledPlant`) and C = Q^-1 P, Q diagonal, everything solves
 
         [R  -N] [y]   [R H e]
         [P   Q] [u] = [Q r  ]
 
-    in which R, N, R H, P and Q have no poles on or outside the unit circle: unstable and integrating poles of
-    plant and controller are zeros of R and Q, so that what they cause in the loop stays finite.
+    in which nothing has poles on or outside the unit circle: unstable and integrating poles of plant and
+    controller are zeros of R and Q, so that what they cause in the loop stays finite.
+
+    Poles and signals come from the states of G and of the rows of C: one polynomial in q^-1 would lose the
+    digits of poles that crowd at z = 1 when sampling is fast. States that feedback does not reach are poles
+    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has
+    a delay.
     """
 
-    model: Model
+    model: SampledPlant
     controller: TransferMatrix
 
-    @property
-    @abstractmethod
+    @cached_property
+    def _states(self) -> tuple[Array, Array, Array]:
+        """x(t + 1) = A x + B [y; u] + .. R H e, `instantaneous` [y; u] = C x + [R H e; r]."""
+        plant, controller = self.model.realisation, self.controller.realisation
+        from_u = np.concatenate([plant.B, np.zeros((len(controller.A), self.model.inputs))])
+        from_y = np.concatenate([np.zeros((len(plant.A), self.model.outputs)), controller.B])
+        return (
+            scipy.linalg.block_diag(plant.A, controller.A),
+            np.concatenate([from_y, from_u], axis=1),
+            scipy.linalg.block_diag(plant.C, -controller.C),
+        )
+
+    @cached_property
     def closed_poles(self) -> ComplexArray:
         """All poles of the loop in z; it is internally stable when they lie inside the unit circle."""
+        A, B, C = self._states
+        poles = np.linalg.eigvals(A + B @ np.linalg.solve(self.instantaneous, C)).astype(complex)
+        return poles[np.argsort(np.abs(poles - 1.0))][self.model.repeated_integrators :]
 
-    @property
-    @abstractmethod
-    def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the filters that make the gradient of the prediction of y, u and e."""
-
-    @property
-    @abstractmethod
+    @cached_property
     def instantaneous(self) -> Array:
-        """(p + r, p + r): the matrix on the left at infinite frequency, what acts without delay."""
+        """(p + r, p + r): [I, -G; C, I] at infinite frequency, what acts without delay."""
+        G, C = self.model.realisation.D, self.controller.realisation.D
+        return np.block([[np.eye(len(G)), -G], [C, np.eye(len(C))]])
 
-    @abstractmethod
-    def left_at(self, w: ArrayLike) -> ComplexArray:
-        """(n, p + r, p + r): the matrix on the left at normalised frequencies `w`."""
-
-    @classmethod
-    def lefts_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
-        """(S, n, p + r, p + r): `left_at` of loops around plants of one structure, beside zero."""
-        return np.stack([loop.left_at(loop.beside_zero(w)) for loop in loops])
-
-    @abstractmethod
-    def noise_at(self, w: ArrayLike) -> ComplexArray:
-        """R H (n, p, p) at normalised frequencies `w`."""
-
-    @classmethod
-    def noises_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
-        """(S, n, p, p): `noise_at` of loops around plants of one structure, beside zero."""
-        return np.stack([loop.noise_at(loop.beside_zero(w)) for loop in loops])
-
-    @abstractmethod
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
         """y (.., n, p) and u (.., n, r) for samples r (.., n, r) and e (.., n, p), from rest."""
+        (A, B, C), v = self._states, self.model.forcing(e)
+        at_once = np.linalg.inv(self.instantaneous).T
+        found = np.concatenate([v, r], axis=-1) @ at_once
+        from_states, onward, next_state = C.T @ at_once, B.T, A.T
+        gain = self.model.noise_gain
+        by_noise = v @ np.pad(gain, ((0, len(A) - len(gain)), (0, 0))).T
+        x = np.zeros((*r.shape[:-2], len(A)))
+        for t in range(r.shape[-2]):
+            found[..., t, :] += x @ from_states
+            x = x @ next_state + found[..., t, :] @ onward + by_noise[..., t, :]
+        return found[..., : self.model.outputs], found[..., self.model.outputs :]
 
     @cached_property
     def singularities(self) -> ComplexArray:
         """Poles of all that the excitation and the noise cause, as points of the frequency plane."""
-        return logarithmic_distance(np.concatenate([self.closed_poles, self.predictor_poles]))
+        return logarithmic_distance(np.concatenate([self.closed_poles, self.model.predictor_poles]))
 
     @property
     def radius(self) -> float:
@@ -105,14 +112,15 @@ class Loop(ABC):
 
         Integrators of the predictor are left out.
         """
-        filters = self.predictor_poles
+        filters = self.model.predictor_poles
         caused = np.concatenate([self.closed_poles, filters[np.abs(filters - 1.0) >= INTEGRATES]])
         return float(np.abs(caused).max(initial=0.0))
 
     @property
     def integrates(self) -> bool:
         """Whether filters of the prediction are infinite at frequency zero; what the loop causes is not."""
-        return bool(np.any(np.abs(self.predictor_poles - 1.0) < INTEGRATES))
+        near = np.abs(self.model.predictor_poles - 1.0) < INTEGRATES
+        return self.model.integrates or bool(np.any(near))
 
     @cached_property
     def nearest(self) -> float:
@@ -189,15 +197,9 @@ class Loop(ABC):
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
-        left, p = self.left_at(self.beside_zero(w)), self.model.outputs
-        if left.shape[1] == 2:
-            R, minus_N, P, Q = _blocks(left)
-            below = R * Q - minus_N * P
-            return R * Q / below, R * P / below
-        right = np.zeros((left.shape[0], left.shape[1], p), dtype=complex)
-        right[:, :p] = left[:, :p, :p]
-        solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
-        return solved[:, :p], -solved[:, p:]
+        left, p = _lefts_at([self], w)[0], self.model.outputs
+        y, minus_u = _solved(left, left[:, :, :p] * (np.arange(left.shape[1]) < p)[:, None], p)
+        return y, -minus_u
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""
@@ -210,29 +212,55 @@ class Loop(ABC):
 
 def excited(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
     """`Loop.excited` of loops around plants of one structure: (S, n, p, r) at y, (S, n, r, r) at u."""
-    left, p = type(loops[0]).lefts_at(loops, w), loops[0].model.outputs
-    r = left.shape[-1] - p
-    if p == r == 1:
-        R, minus_N, P, Q = _blocks(left)
-        below = R * Q - minus_N * P
-        return -minus_N * Q / below, R * Q / below
-    right = np.zeros((*left.shape[:-1], r), dtype=complex)
-    inputs = p + np.arange(r)
-    right[..., inputs, np.arange(r)] = left[..., inputs, inputs]
-    return _split(np.linalg.solve(left, right), p)
+    left, p = _lefts_at(loops, w), loops[0].model.outputs
+    return _solved(left, left[..., p:] * (np.arange(left.shape[-1]) >= p)[:, None], p)
 
 
 def disturbed(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
     """`Loop.disturbed` of loops around plants of one structure: (S, n, p, p) at y, (S, n, r, p) at u."""
-    kind, p = type(loops[0]), loops[0].model.outputs
-    left, noise = kind.lefts_at(loops, w), kind.noises_at(loops, w)
-    if left.shape[-1] == 2:
-        R, minus_N, P, Q = _blocks(left)
-        below = R * Q - minus_N * P
-        return Q * noise / below, -P * noise / below
+    left, p = _lefts_at(loops, w), loops[0].model.outputs
     right = np.zeros((*left.shape[:-1], p), dtype=complex)
-    right[..., :p, :] = noise
-    return _split(np.linalg.solve(left, right), p)
+    if _alike(loops):
+        models = [loop.model for loop in loops]
+        right[..., :p, :] = forcings_at(models[0], models, loops[0].beside_zero(w))
+    else:
+        right[..., :p, :] = [loop.model.forcing_at(loop.beside_zero(w)) for loop in loops]
+    return _solved(left, right, p)
+
+
+def _alike(loops: Sequence[Loop]) -> bool:
+    """Whether all are read off at the same frequencies."""
+    return len({loop.nearest for loop in loops}) == 1
+
+
+def _lefts_at(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
+    """(S, n, p + r, p + r): the matrices on the left of `Loop`, beside zero."""
+    first, models = loops[0], [loop.model for loop in loops]
+    if not _alike(loops):
+        return np.concatenate([_lefts_at([loop], w) for loop in loops])
+    at = first.beside_zero(w)
+    R, N = lefts_at(models[0], models, at)
+    p, r = N.shape[-2:]
+    one = all(loop.controller is first.controller for loop in loops)
+    controllers = [loop.controller.fraction_at(at) for loop in (loops[:1] if one else loops)]
+    # In memory the values of an entry stand side by side.
+    left = np.zeros((len(R), p + r, p + r, R.shape[1]), dtype=complex).transpose(0, 3, 1, 2)
+    left[..., :p, :p], left[..., :p, p:] = R, -N
+    left[..., p:, :p] = np.stack([P for P, _ in controllers])
+    left[..., p + np.arange(r), p + np.arange(r)] = np.stack([Q for _, Q in controllers])
+    return left
+
+
+def _solved(left: ComplexArray, right: ComplexArray, outputs: int) -> tuple[ComplexArray, ComplexArray]:
+    """y and u (.., columns) of left [y; u] = right (.., p + r, columns); of two unknowns by Cramer's rule."""
+    if left.shape[-1] == 2:
+        (a, b), (c, d) = (tuple(left[..., i, j, None] for j in (0, 1)) for i in (0, 1))
+        top, bottom = right[..., 0, :], right[..., 1, :]
+        below = a * d - b * c
+        y, u = (d * top - b * bottom) / below, (a * bottom - c * top) / below
+        return y[..., None, :], u[..., None, :]
+    solved = np.linalg.solve(left, right).astype(complex)
+    return solved[..., :outputs, :], solved[..., outputs:, :]
 
 
 def excitation_gradients(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
@@ -251,33 +279,24 @@ def _prediction_gradients(
     loops: Sequence[Loop], w: ArrayLike, y: ComplexArray, u: ComplexArray, e: NDArray
 ) -> ComplexArray:
     """Return the prediction gradients of the models, all at once if their frequencies agree."""
-    if len({loop.nearest for loop in loops}) == 1:
+    if _alike(loops):
         models = [loop.model for loop in loops]
         return prediction_gradients(models[0], models, loops[0].beside_zero(w), y, u, e)
     each = zip(loops, y, u, e, strict=True)
     return np.stack([one.model.prediction_gradient(one.beside_zero(w), *signals) for one, *signals in each])
 
 
-def _split(solved: NDArray, outputs: int) -> tuple[ComplexArray, ComplexArray]:
-    """y and u of a solution (.., p + r, columns)."""
-    return solved[..., :outputs, :].astype(complex), solved[..., outputs:, :].astype(complex)
-
-
-def _blocks(left: ComplexArray) -> tuple[ComplexArray, ...]:
-    """R, -N, P and Q (.., 1, 1) of the matrix on the left for one input and one output."""
-    return tuple(left[..., i : i + 1, j : j + 1] for i in (0, 1) for j in (0, 1))
-
-
-@singledispatch
 def close_loop(model: Model, controller: TransferMatrix) -> Loop:
-    """The loop of a model under a controller; each kind of plant that has one registers its own.
+    """The loop of a model under a controller.
 
     Raises:
         SpecError: `not-supported` for a plant that is not sampled.
     """
-    raise bad_spec(
-        "not-supported",
-        "this version has no loop around a plant in continuous time",
-        hint="write plant.sample: zoh: controllers act on samples",
-        key="experiment.controller",
-    )
+    if model.continuous:
+        raise bad_spec(
+            "not-supported",
+            "this version has no loop around a plant in continuous time",
+            hint="write plant.sample: zoh: controllers act on samples",
+            key="experiment.controller",
+        )
+    return Loop(cast(SampledPlant, model), controller)

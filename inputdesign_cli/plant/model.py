@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Protocol, Self
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.plant.transfer import StateSpace
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,42 @@ class Model(Protocol):
         """
 
 
+class SampledPlant(Model, Protocol):
+    """A model of samples, as a loop is closed around it: R y = N u + R H e, with G = R^-1 N.
+
+    R, N and R H have no poles on or outside the unit circle: unstable and integrating poles are zeros of R.
+    """
+
+    @property
+    def realisation(self) -> StateSpace:
+        """Return a state-space realisation of G."""
+
+    @property
+    def noise_gain(self) -> Array:
+        """(states, p): how R H e enters the states besides its way through the outputs."""
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction of y, u and e."""
+
+    @property
+    def repeated_integrators(self) -> int:
+        """The integrators of the realisation that take no part in G."""
+
+    @property
+    def integrates(self) -> bool:
+        """Whether some noise has infinite power at frequency zero."""
+
+    def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """R (n, p, p) and N (n, p, r)."""
+
+    def forcing_at(self, w: ArrayLike) -> ComplexArray:
+        """R H (n, p, p)."""
+
+    def forcing(self, e: Array) -> Array:
+        """R H e (.., n, p) of samples e, from rest."""
+
+
 DELAY = "delay"
 """The letter of a dead time, which has no powers."""
 
@@ -165,6 +203,26 @@ def row_parameters(letter: str, rows: Sequence[Array], outputs: int, inputs: int
     return found
 
 
+def tables_at(
+    parameters: Sequence[Parameter], theta: ArrayLike, tables: Mapping[str, Sequence[Array | Sequence[Array]]]
+) -> dict[str, tuple]:
+    """Return copies of polynomials by letter, with other values (k,) of the parameters in them.
+
+    Args:
+        tables: a polynomial for each output, or one for all, or rows of columns of them.
+    """
+    found = {
+        letter: [p.copy() if isinstance(p, np.ndarray) else tuple(one.copy() for one in p) for p in rows]
+        for letter, rows in tables.items()
+    }
+    for parameter, value in zip(parameters, np.asarray(theta, dtype=float), strict=True):
+        rows = found[parameter.letter]
+        for i, j in parameter.places:
+            row = rows[min(i, len(rows) - 1)]
+            (row if isinstance(row, np.ndarray) else row[j])[parameter.power] = value
+    return {letter: tuple(rows) for letter, rows in found.items()}
+
+
 @singledispatch
 def input_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
     """(S, n, k, p, r): `input_gradient` of models of one structure, `model` the first of them.
@@ -187,6 +245,21 @@ def prediction_gradients(
     """(S, n, k, p, m): `prediction_gradient`, in the same way, for y, u and e (S, n, p or r, m)."""
     each = zip(models, y, u, e, strict=True)
     return np.stack([one.prediction_gradient(w, *signals) for one, *signals in each])
+
+
+@singledispatch
+def lefts_at(
+    model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike
+) -> tuple[ComplexArray, ComplexArray]:
+    """R (S, n, p, p) and N (S, n, p, r): `left_at`, in the same way."""
+    R, N = zip(*(each.left_at(w) for each in models), strict=True)
+    return np.stack(R), np.stack(N)
+
+
+@singledispatch
+def forcings_at(model: SampledPlant, models: Sequence[SampledPlant], w: ArrayLike) -> ComplexArray:
+    """(S, n, p, p): `forcing_at`, in the same way."""
+    return np.stack([each.forcing_at(w) for each in models])
 
 
 class Listed(Model, Protocol):
@@ -215,6 +288,16 @@ class Parametrised:
     def theta(self) -> Array:
         """(k,): values of the parameters."""
         return np.array([parameter.value for parameter in self.parameters])
+
+    @property
+    def integrates(self) -> bool:
+        """See `SampledPlant`."""
+        return False
+
+    @property
+    def repeated_integrators(self) -> int:
+        """See `SampledPlant`."""
+        return 0
 
     @cached_property
     def dead_times(self) -> NDArray[np.bool_]:
@@ -264,3 +347,101 @@ class WhiteNoise:
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
         """dG/dtheta u (n, k, p, m), see `Model`."""
         return np.asarray(self.plant_gradient(w) @ u[:, None])
+
+
+class Around(ABC):
+    """A model that is made of another one, `inner`, and answers as that does unless it says otherwise."""
+
+    @property
+    @abstractmethod
+    def inner(self) -> SampledPlant:
+        """The other model."""
+
+    @property
+    def continuous(self) -> bool:
+        """See `SampledPlant`."""
+        return self.inner.continuous
+
+    @property
+    def inputs(self) -> int:
+        """See `SampledPlant`."""
+        return self.inner.inputs
+
+    @property
+    def outputs(self) -> int:
+        """See `SampledPlant`."""
+        return self.inner.outputs
+
+    @property
+    def covariance(self) -> Array:
+        """See `SampledPlant`."""
+        return self.inner.covariance
+
+    @property
+    def at_once(self) -> NDArray[np.bool_]:
+        """See `SampledPlant`."""
+        return self.inner.at_once
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.inner.singularities
+
+    @property
+    def radius(self) -> float:
+        """See `SampledPlant`."""
+        return self.inner.radius
+
+    @property
+    def memory(self) -> float:
+        """See `SampledPlant`."""
+        return self.inner.memory
+
+    @property
+    def realisation(self) -> StateSpace:
+        """See `SampledPlant`."""
+        return self.inner.realisation
+
+    @property
+    def noise_gain(self) -> Array:
+        """See `SampledPlant`."""
+        return self.inner.noise_gain
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.inner.predictor_poles
+
+    @property
+    def repeated_integrators(self) -> int:
+        """See `SampledPlant`."""
+        return self.inner.repeated_integrators
+
+    @property
+    def integrates(self) -> bool:
+        """See `SampledPlant`."""
+        return self.inner.integrates
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.inner.entry_singularities(output, input)
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.inner.plant_at(w)
+
+    def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """See `SampledPlant`."""
+        return self.inner.left_at(w)
+
+    def forcing_at(self, w: ArrayLike) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.inner.forcing_at(w)
+
+    def forcing(self, e: Array) -> Array:
+        """See `SampledPlant`."""
+        return self.inner.forcing(e)
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """See `SampledPlant`."""
+        return self.inner.simulate(u, e, step)

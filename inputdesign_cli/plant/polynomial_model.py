@@ -1,25 +1,197 @@
-"""Polynomial plants with several inputs and outputs: G, H, their gradients, and simulations."""
+"""Polynomial plants A y = (B/F) u + (C/D) e ([ljung-1999], Section 4.2): G, H, their gradients, simulations.
+
+B and F are matrices of polynomials, an entry for each output and input.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray, Rows
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.model import Fraction, input_gradients, noise_gradients, prediction_gradients
-from inputdesign_cli.plant.polynomial import evaluate, frequencies_last, power, unit_circle
-from inputdesign_cli.plant.polynomial_structure import PolynomialStructure
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.model import (
+    Fraction,
+    Parameter,
+    Parametrised,
+    entry_label,
+    forcings_at,
+    input_gradients,
+    lefts_at,
+    noise_gradients,
+    prediction_gradients,
+    row_parameters,
+    tables_at,
+)
+from inputdesign_cli.plant.polynomial import (
+    evaluate,
+    frequencies_last,
+    join_roots,
+    power,
+    roots_in_z,
+    unit_circle,
+)
+from inputdesign_cli.plant.polynomial_matrix import at, stack
+from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix, product_of
 
 
 @dataclass(frozen=True)
-class PolynomialModel(PolynomialStructure):
-    """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p)."""
+class PolynomialModel(Parametrised):
+    """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
+
+    A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. Parameters
+    are called by letter and power, with several channels also by output and input: `b1`, `b1[2,1]`, `a1[2]`;
+    common coefficients go without: `a1`. An entry B_ij that is absent has no parameters.
+
+    Attributes:
+        delays: (p, r), the power of the first coefficient of each B that is free, its length where the entry
+            is absent; if None, zeros of B say so.
+    """
+
+    B: Rows
+    A: tuple[Array, ...]
+    F: Rows
+    C: tuple[Array, ...]
+    D: tuple[Array, ...]
+    covariance: Array
+    delays: tuple[tuple[int, ...], ...] | None = None
 
     continuous = False
+
+    @classmethod
+    def single(
+        cls,
+        B: ArrayLike,
+        *,
+        A: ArrayLike = (1.0,),
+        C: ArrayLike = (1.0,),
+        D: ArrayLike = (1.0,),
+        F: ArrayLike = (1.0,),
+        variance: float = 1.0,
+    ) -> Self:
+        """One input and one output."""
+        a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
+        return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return len(self.B)
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs r."""
+        return len(self.B[0])
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return all free coefficients, of A, B, C, D and F in turn."""
+        found: list[Parameter] = []
+        for letter, rows in (("a", self.A), ("b", self.B), ("c", self.C), ("d", self.D), ("f", self.F)):
+            if letter not in "bf":
+                found += row_parameters(letter, rows, self.outputs, self.inputs)
+                continue
+            for i, j in self.active:
+                label = entry_label(i, j, single=self.outputs == self.inputs == 1)
+                lags = range(self.first[i][j] if letter == "b" else 1, len(rows[i][j]))
+                found += [Parameter(letter, lag, ((i, j),), label, float(rows[i][j][lag])) for lag in lags]
+        return tuple(found)
+
+    @cached_property
+    def active(self) -> tuple[tuple[int, int], ...]:
+        """The entries (output, input) of G that are not absent."""
+        places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
+        return tuple((i, j) for i, j in places if self.first[i][j] < self.B[i][j].size)
+
+    @cached_property
+    def first(self) -> tuple[tuple[int, ...], ...]:
+        """(p, r): `delays`, also where zeros of B say them."""
+        if self.delays is not None:
+            return self.delays
+        return tuple(tuple(b.size - np.trim_zeros(b, "f").size for b in row) for row in self.B)
+
+    @cached_property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        return np.array(
+            [[(i, j) in self.active and not d for j, d in enumerate(row)] for i, row in enumerate(self.first)]
+        )
+
+    @property
+    def memory(self) -> float:
+        """The longest polynomials in a row, in samples: what they filter is forgotten after that."""
+        rows = (self.A, self.C, self.D, *self.B, *self.F)
+        return float(sum(max(p.size for p in row) for row in rows))
+
+    @cached_property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
+        return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
+
+    @cached_property
+    def letters(self) -> frozenset[str]:
+        """The polynomials that have free coefficients."""
+        return frozenset(parameter.letter for parameter in self.parameters)
+
+    @property
+    def outputs_count(self) -> bool:
+        """Whether the gradient of the prediction depends on past outputs: by coefficients of A alone."""
+        return "a" in self.letters
+
+    def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
+        """A, C or D as one polynomial an output, a common one repeated."""
+        return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
+
+    def row(self, rows: Sequence[Array], output: int) -> Array:
+        """Return the polynomial of an output in A, C or D."""
+        return rows[0] if len(rows) == 1 else rows[output]
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles in z of G, H and their gradients."""
+        return np.concatenate([join_roots(roots_in_z(a) for a in self.A), self.predictor_poles])
+
+    @cached_property
+    def predictor_poles(self) -> ComplexArray:
+        """See `SampledPlant`."""
+        return join_roots(roots_in_z(p) for p in [*self.C, *self.D, *(f for row in self.F for f in row)])
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        return logarithmic_distance(self.poles)
+
+    @property
+    def radius(self) -> float:
+        """See `Model`."""
+        return float(np.abs(self.poles).max(initial=0.0))
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        polynomials = (self.row(self.A, output), self.F[output][input], self.B[output][input])
+        return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
+
+    @property
+    def stable_outputs(self) -> tuple[bool, ...]:
+        """Output by output, whether its row of G is stable."""
+        rows = [
+            [a, *(f for j, f in enumerate(fs) if (i, j) in self.active)]
+            for i, (a, fs) in enumerate(zip(self.per_output(self.A), self.F, strict=True))
+        ]
+        return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
+        """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        tables = {"a": self.A, "b": self.B, "c": self.C, "d": self.D, "f": self.F}
+        moved = {letter.upper(): table for letter, table in tables_at(self.parameters, theta, tables).items()}
+        noise = self.covariance if covariance is None else covariance
+        return replace(self, **moved, covariance=noise, delays=self.first)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
@@ -98,6 +270,60 @@ class PolynomialModel(PolynomialStructure):
                 if (i, j) in self.active:
                     y[..., i] += filtered(b, np.convolve(a, f), u[..., j])
         return y, v
+
+    @cached_property
+    def _fractions(self) -> Array:
+        """(p, 1 + r, l): R_i = A_i prod_j F_ij of each output, and the numerators N_ij of R G."""
+        rows = [
+            [product_of([a, *f]).tolist()]
+            + [product_of([b, *f[:j], *f[j + 1 :]]).tolist() for j, b in enumerate(self.B[i])]
+            for i, (a, f) in enumerate(zip(self.per_output(self.A), self.F, strict=True))
+        ]
+        return stack(rows)
+
+    @cached_property
+    def realisation(self) -> StateSpace:
+        """See `SampledPlant`."""
+        return TransferMatrix(self._fractions[:, 1:], tuple((R,) for R in self._fractions[:, 0])).realisation
+
+    @property
+    def noise_gain(self) -> Array:
+        """See `SampledPlant`: the first state of an output meets the noise, where R reads the output."""
+        return self.realisation.A @ self.realisation.C.T
+
+    def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """See `SampledPlant`."""
+        R, N = _lefts_at(self, [self], w)
+        return R[0], N[0]
+
+    def forcing_at(self, w: ArrayLike) -> ComplexArray:
+        """See `SampledPlant`: prod_j F_ij C_i / D_i."""
+        return _forcings_at(self, [self], w)[0]
+
+    def forcing(self, e: Array) -> Array:
+        """See `SampledPlant`."""
+        rows = zip(self.F, self.per_output(self.C), self.per_output(self.D), strict=True)
+        return np.stack(
+            [filtered(product_of([*f, c]), d, e[..., i]) for i, (f, c, d) in enumerate(rows)], axis=-1
+        )
+
+
+@lefts_at.register
+def _lefts_at(
+    first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike
+) -> tuple[ComplexArray, ComplexArray]:
+    values = at(np.stack([model._fractions for model in models]), unit_circle(w))
+    return values[..., 0, None] * np.eye(first.outputs), values[..., 1:]
+
+
+@forcings_at.register
+def _forcings_at(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
+    q, p = unit_circle(w), first.outputs
+    found = np.zeros((len(models), q.size, p, p), dtype=complex)
+    for i in range(p):
+        above = evaluate(np.array([product_of([*m.F[i], m.row(m.C, i)]) for m in models]), q)
+        found[:, :, i, i] = above / evaluate(np.array([m.row(m.D, i) for m in models]), q)
+    return found
 
 
 @input_gradients.register

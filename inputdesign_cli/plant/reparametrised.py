@@ -9,16 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.plant.loop import Loop, close_loop
-from inputdesign_cli.plant.loop_around import LoopAround
-from inputdesign_cli.plant.model import Fraction, Model
+from inputdesign_cli.plant.model import Around, Fraction, Model, SampledPlant
 from inputdesign_cli.plant.parametrisation import Parametrisation
-from inputdesign_cli.plant.transfer import TransferMatrix
 
 # Where in the words of a spec the value of a parameter stands.
 Place = Sequence[str | int]
@@ -40,7 +38,7 @@ class Words:
 
 
 @dataclass(frozen=True)
-class Reparametrised:
+class Reparametrised(Around):
     """The model `coefficients` at the parameters of `parametrisation`, with k of them free."""
 
     coefficients: Model
@@ -48,29 +46,9 @@ class Reparametrised:
     words: Words = Words()
 
     @property
-    def continuous(self) -> bool:
-        """Whether frequencies are in rad per time unit."""
-        return self.coefficients.continuous
-
-    @property
-    def inputs(self) -> int:
-        """Number of inputs r."""
-        return self.coefficients.inputs
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.coefficients.outputs
-
-    @property
-    def covariance(self) -> Array:
-        """(p, p) of e."""
-        return self.coefficients.covariance
-
-    @property
-    def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): see `Model`."""
-        return self.coefficients.at_once
+    def inner(self) -> SampledPlant:
+        """The model of the coefficients."""
+        return cast(SampledPlant, self.coefficients)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,25 +76,6 @@ class Reparametrised:
         """(k,): the parameters that move a dead time."""
         return np.any(self.parametrisation.moves[self.coefficients.dead_times], axis=0)
 
-    @property
-    def memory(self) -> float:
-        """See `Model`."""
-        return self.coefficients.memory
-
-    @property
-    def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
-        return self.coefficients.singularities
-
-    @property
-    def radius(self) -> float:
-        """See `Model`."""
-        return self.coefficients.radius
-
-    def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
-        return self.coefficients.entry_singularities(output, input)
-
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
         """(k,): what the coefficients of `bends` follow from; all, unless these are affine."""
         if not self.parametrisation.affine:
@@ -131,10 +90,6 @@ class Reparametrised:
             numerator_gradient=part.numerator_gradient @ J,
             denominator_gradient=part.denominator_gradient @ J,
         )
-
-    def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
-        return self.coefficients.plant_at(w)
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dphi (n, k, p, r)."""
@@ -158,28 +113,7 @@ class Reparametrised:
         coefficients = self.coefficients.at(moved.coefficients, covariance)
         return replace(self, coefficients=coefficients, parametrisation=moved)
 
-    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
-        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
-        return self.coefficients.simulate(u, e, step)
-
     def _chained(self, gradient: ComplexArray) -> ComplexArray:
         """A gradient (n, K, ..) in the coefficients as one (n, k, ..) in the parameters."""
         moved = np.moveaxis(gradient, 1, -1) @ self.parametrisation.jacobian
         return np.asarray(np.moveaxis(moved, -1, 1), dtype=complex)
-
-
-@dataclass(frozen=True)
-class ReparametrisedLoop(LoopAround):
-    """The loop around the model of the coefficients, whatever its kind."""
-
-    model: Reparametrised
-
-    @cached_property
-    def inner(self) -> Loop:
-        """Return the loop around the model with its coefficients as parameters."""
-        return close_loop(self.model.coefficients, self.controller)
-
-
-@close_loop.register
-def _(model: Reparametrised, controller: TransferMatrix) -> ReparametrisedLoop:
-    return ReparametrisedLoop(model, controller)

@@ -132,6 +132,28 @@ class SampledModel(Parametrised, WhiteNoise):
             read(C[i : i + 1], D[i : i + 1], j, entry.direct_lag, np.array([entry.direct]))
         return StateSpace(A, B, C, D)
 
+    @property
+    def noise_gain(self) -> Array:
+        """See `SampledPlant`: e enters through the outputs alone."""
+        return np.zeros((len(self.realisation.A), self.outputs))
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """See `SampledPlant`."""
+        return self.poles
+
+    def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """I and G, which has no poles outside the unit circle."""
+        return self.forcing_at(w), self.plant_at(w)
+
+    def forcing_at(self, w: ArrayLike) -> ComplexArray:
+        """See `SampledPlant`: I."""
+        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
+
+    def forcing(self, e: Array) -> Array:
+        """See `SampledPlant`."""
+        return e
+
     @cached_property
     def singularities(self) -> ComplexArray:
         """Poles of G and of all gradients, as points of the frequency plane."""

@@ -227,9 +227,18 @@ class StateSpaceModel(Parametrised):
         return float(self.direct_lag)
 
     @property
-    def repeated_integrators(self) -> int:
-        """Return 0, since the states are the ones of the spec."""
-        return 0
+    def noise_gain(self) -> Array:
+        """See `SampledPlant`: K, behind the past of the inputs."""
+        K = self.matrices.K
+        return np.pad(K, ((len(self.realisation.A) - len(K), 0), (0, 0)))
+
+    def forcing_at(self, w: ArrayLike) -> ComplexArray:
+        """See `SampledPlant`: I, since R = H^-1."""
+        return np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
+
+    def forcing(self, e: Array) -> Array:
+        """See `SampledPlant`."""
+        return e
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
         """(k,): all."""
@@ -262,7 +271,7 @@ class StateSpaceModel(Parametrised):
         z, (A, early, late), m = self._points(w), self.held, self.matrices
         return m.C @ self._resolvent(z, A) @ self._entering(z, early, late) + self._direct(z, m.D)
 
-    def predictor_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+    def left_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """H^-1 (n, p, p) and H^-1 G (n, p, r), as the predictor has them."""
         z, (A, early, late), m = self._points(w), self.held, self.matrices
         read = m.C @ self._resolvent(z, A - m.K @ m.C)
@@ -271,17 +280,17 @@ class StateSpaceModel(Parametrised):
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
-        z = self._points(w)
-        x = self._resolvent(z, self.held[0]) @ self._entering(z, *self.held[1:])
-        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (z.size, self.inputs, self.inputs))
-        return self._gradient(z, x, u, None, np.zeros_like(self.matrices.K))
+        return self._of_inputs(w, np.zeros_like(self.matrices.K))
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
+        return self._of_inputs(w, self.matrices.K)
+
+    def _of_inputs(self, w: ArrayLike, K: Array) -> ComplexArray:
         z = self._points(w)
         x = self._resolvent(z, self.held[0]) @ self._entering(z, *self.held[1:])
         u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (z.size, self.inputs, self.inputs))
-        return self._gradient(z, x, u, None, self.matrices.K)
+        return self._gradient(z, x, u, None, K)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""

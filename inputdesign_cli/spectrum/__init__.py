@@ -18,7 +18,6 @@ from inputdesign_cli.spectrum.fir import FirBasis as FirBasis
 from inputdesign_cli.spectrum.flat import FlatBasis as FlatBasis, flat_basis as flat_basis
 from inputdesign_cli.spectrum.gram import GramBasis as GramBasis
 from inputdesign_cli.spectrum.lines import LinesBasis as LinesBasis
-from inputdesign_cli.spectrum.matrix_fir import MatrixFirBasis as MatrixFirBasis
 from inputdesign_cli.spectrum.polynomial import PolynomialBasis as PolynomialBasis
 from inputdesign_cli.spectrum.svec import (
     hmat as hmat,

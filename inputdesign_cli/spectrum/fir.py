@@ -1,6 +1,6 @@
-"""FIR spectra of one input: Phi(w) = c_0 + 2 sum_{t=1..m} c_t cos(t w), c_t the autocovariances.
+"""FIR spectra: Phi(w) = sum over |t| <= m of c_t e^{-jwt}, c_t = E u(s + t) u(s)^T.
 
-[bombois-least-costly], (14); m = 0 is white noise. The fast path of `matrix_fir` for one input.
+For one input [bombois-least-costly], (14); order zero is white noise.
 """
 
 from __future__ import annotations
@@ -9,151 +9,135 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information import Quadrature, integrate
-from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
-from inputdesign_cli.spectrum.directions import directed_scale
-from inputdesign_cli.spectrum.svec import smat, svec_layout
+from inputdesign_cli.spectrum.basis import Density, Factor
+from inputdesign_cli.spectrum.directions import integrand
+from inputdesign_cli.spectrum.gram import FaceSizes, GramBasis
+from inputdesign_cli.spectrum.svec import svec_layout, svec_length
 
-_FIRST_ORDER = 11  # spectra up to this order are designed whole, in one face
-_DIRECTIONS = 8
-_MOST_KEPT = 14
-_KEPT = 1e-14  # share of the largest eigenvalue below which a generator is dropped
-_SINGULAR_PRICE = 1e-10
+_OF_ONE_INPUT = FaceSizes(whole=12, first=12, kept=14)
 
 
 @dataclass(frozen=True)
-class FirBasis(DensityFamily):
-    """The unknowns are c_0 .. c_m (m = `order`); the cone is that of nonnegative cosine polynomials.
+class FirBasis(GramBasis):
+    """The unknowns are the upper triangle of c_0 by columns, then c_1 .. c_m (r, r) row by row.
 
-    Each of those is a sum of |v_i(e^{jw})|^2, v_i polynomials of degree m ([fejer-riesz-1916]). With the
-    v_i in the span of the columns of V (m + 1, q) it is v(w)^* Q v(w), Q >= 0 of order q: this is a
-    face, and its generators are V. The full Gram matrix has order m + 1, but the optimal one is of
-    low rank, so a few generators, found by pricing, reach the optimum.
+    `inputs` r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with
+    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 ([fejer-riesz-1916]; for several inputs
+    [dritschel-rovnyak-2010]); c_t is the sum of the blocks (s + t, s) of Q.
     """
-
-    order: int
-
-    inputs = 1
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.order + 1
+        return svec_length(self.inputs) + self.order * self.inputs**2
 
     @property
-    def degree(self) -> int:
-        """Return the degree of the trigonometric polynomial."""
-        return self.order
+    def sizes(self) -> FaceSizes:
+        """See `GramBasis`; of one input few generators reach the optimum."""
+        return _OF_ONE_INPUT if self.inputs == 1 else super().sizes
 
     def spread(self, powers: Array) -> Array:
-        """(m + 1,): the flat spectrum of this power (1,)."""
+        """(size,): white excitation with these powers (r,) of the channels, uncorrelated."""
+        rows, columns, _ = svec_layout(self.inputs)
         flat = np.zeros(self.size)
-        flat[0] = powers[0]
+        flat[: rows.size] = np.where(rows == columns, powers[rows], 0.0)
         return flat
 
     def moving_average(self, x: Array) -> Array | None:
-        """The autocovariances themselves."""
-        return x
+        """Return the autocovariances of one input."""
+        return x if self.inputs == 1 else None
 
-    def functions(self, w: ArrayLike) -> Array:
-        """(n, m + 1): the basis functions 1, 2 cos w, .., 2 cos m w."""
-        table = 2.0 * np.cos(np.outer(np.asarray(w, dtype=float), np.arange(self.size)))
-        table[:, 0] = 1.0
-        return table
+    def of_order(self, order: int) -> FirBasis:
+        """Return the basis with a lower order."""
+        return FirBasis(self.inputs, order)
 
-    def density(self, x: Array, w: ArrayLike) -> Array:
-        """(n,): Phi at normalised frequencies `w`."""
-        return self.functions(w) @ x
+    def autocovariances(self, x: Array) -> NDArray[np.float64]:
+        """(m + 1, r, r): c_0 .. c_m."""
+        r = self.inputs
+        rows, columns, _ = svec_layout(r)
+        first = np.zeros((1, r, r))
+        first[0, rows, columns] = first[0, columns, rows] = x[: rows.size]
+        return np.concatenate([first, x[rows.size :].reshape(-1, r, r)])
 
-    def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """(m + 1,): Phi at one frequency as a functional; one input has one direction."""
-        return self.functions(np.array([frequency]))[0]
+    def density(self, x: Array, w: ArrayLike) -> NDArray:
+        """Phi at normalised frequencies `w`: (n,) for one input, else Hermitian (n, r, r)."""
+        c, turn = self.autocovariances(x), self._turn(np.asarray(w, dtype=float))
+        if self.inputs == 1:
+            return 2.0 * turn @ c[:, 0, 0] - c[0, 0, 0]
+        later = np.tensordot(turn[:, 1:], c[1:], axes=1)
+        return np.asarray(c[0] + later + later.conj().swapaxes(1, 2), dtype=complex)
+
+    def _turn(self, w: Array) -> NDArray:
+        """(n, m + 1): e^{-jwt}, or its real part for one input, whose densities are even."""
+        angles = np.outer(w, np.arange(self.order + 1))
+        return np.cos(angles) if self.inputs == 1 else np.exp(-1j * angles)
 
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(m + 1, ...): (1 / 2 pi) integral of density(w) times each basis function."""
+        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown."""
+        source, summed = integrand(density, factor, self.inputs)
 
         def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            weighted = self.functions(rule.nodes) * rule.weights[:, None]
-            return np.tensordot(weighted, values, axes=(0, 0))
+            found = summed(self._turn(rule.nodes), values, rule.weights).real
+            return self._functional(np.moveaxis(found, (-2, -1), (1, 2)))
 
-        return integrate(density, sums, singularities, highest_lag=self.order)
+        return integrate(source, sums, singularities, highest_lag=self.order, several=self.inputs > 1)
 
-    def coarser(self) -> list[FirBasis]:
-        """Lower orders, each about half the next, whose optimum is a good start for this one."""
-        orders = [self.order]
-        while orders[0] > 2 * _FIRST_ORDER:
-            orders.insert(0, orders[0] // 2)
-        return [FirBasis(order) for order in orders[:-1]]
+    def directed(self, frequency: float, direction: ComplexArray) -> Array:
+        """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
+        turn = self._turn(np.array([frequency]))[0]
+        return self._functional((turn[:, None, None] * np.outer(direction, direction.conj())).real)
 
-    def first_face(self, price: Functional) -> Face:
-        """All spectra of order up to 11."""
-        return self._face(np.eye(self.size)[:, : min(self.order, _FIRST_ORDER) + 1], price)
+    def _functional(self, sums: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(size, ...) from the real parts (m + 1, r, r, ...) of the integrals of D(w) e^{-jwt}.
 
-    def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """The largest s with price - s value >= 0 on every spectrum of this basis.
-
-        A linear functional of c_0 .. c_m is nonnegative on all nonnegative cosine polynomials exactly
-        when its Toeplitz matrix is positive semidefinite ([caratheodory-1911]): a generalised
-        eigenvalue, whose leading eigenvectors are the spectra |v|^2 that pay best. Where the price
-        itself nearly vanishes, rounding spoils that eigenvalue, and the pointwise ratio, which is
-        valid too, stands in.
+        tr(D c_t e^{-jwt}) and its mirror image add up to twice the real part; D_ij meets c_ji.
         """
-        metric, worth = _toeplitz(price.vector), _toeplitz(value.vector)
-        first = max(self.size - _DIRECTIONS, 0)
-        spread = np.linalg.eigvalsh(metric)
-        if spread[0] <= _SINGULAR_PRICE * spread[-1]:
-            _, vectors = scipy.linalg.eigh(worth - metric, subset_by_index=[first, self.order])
-            return Pricing(directed_scale(price, value, grid)[0], vectors)
-        ratios, vectors = scipy.linalg.eigh(worth, metric, subset_by_index=[first, self.order])
-        return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors)
+        rows, columns, _ = svec_layout(self.inputs)
+        mean = 0.5 * (sums[0] + sums[0].swapaxes(0, 1))
+        twice = np.where(rows == columns, 1.0, 2.0).reshape(-1, *[1] * (mean.ndim - 2))
+        head = mean[rows, columns] * twice
+        tail = 2.0 * sums[1:].swapaxes(1, 2)
+        return np.concatenate([head, tail.reshape(-1, *tail.shape[3:])])
 
-    def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[FirBasis, Face]:
-        """Keep the generators that the solution uses, add the `directions` (m + 1, number)."""
-        known = len(face.generators)
-        if face.order == self.size == known:
-            return self, face
-        eigenvalues, vectors = np.linalg.eigh(smat(y))
-        kept = eigenvalues > _KEPT * eigenvalues[-1]
-        kept[:-_MOST_KEPT] = False
-        used = face.generators @ vectors[:, kept]
-        used = np.pad(used, ((0, self.size - known), (0, 0)))
-        spanning = scipy.linalg.qr(np.concatenate([used, directions], axis=1), mode="economic")[0]
-        return self, self._face(spanning, price)
+    def gram(self, vector: Array) -> NDArray[np.float64]:
+        """Block Toeplitz: a functional is nonnegative on the cone exactly when this matrix is."""
+        g = 0.5 * self.autocovariances(vector)
+        g[0] += np.diag(np.diag(g[0]))
+        every = np.concatenate([g, g[:0:-1].swapaxes(1, 2)])  # by lag, negative ones from the end
+        s = np.arange(self.order + 1)
+        return every[s[:, None] - s].transpose(0, 2, 1, 3).reshape(self.gram_order, self.gram_order)
 
-    def _face(self, spanning: Array, price: Functional) -> Face:
-        """Columns: the autocovariances of each pair of generators, in the order of svec.
+    def products(self, generators: NDArray) -> Array:
+        """(size, q (q + 1) / 2): x of (v_a v_b^* + v_b v_a^*) / 2 for each pair of generators (n, q).
 
-        Generators are made orthonormal in the metric of the price, so that the cost is tr Q: where
-        the price varies by orders of magnitude over frequency, the dual residual of the solver then
-        counts in units of the price at each frequency, and the certificate loses nothing.
+        A generator v holds the taps v(0) .. v(m), (r,) each, of a filter, and c_t of a pair is the sum over s
+        of v_a(s + t) v_b(s)^T made symmetric in a and b: a correlation along the lags, done by FFT.
         """
-        metric = spanning.T @ _toeplitz(price.vector) @ spanning
-        values, vectors = np.linalg.eigh(metric)
-        generators = spanning @ (vectors / np.sqrt(np.maximum(values, _SINGULAR_PRICE * values[-1])))
-        transform = np.fft.rfft(generators, 2 * self.size, axis=0)
-        rows, columns, scale = svec_layout(generators.shape[1])
-        cross = np.fft.irfft(transform[:, rows] * transform[:, columns].conj(), 2 * self.size, axis=0)
-        lags = np.arange(self.size)
-        return Face(
-            columns=0.5 * (cross[lags] + cross[-lags]) * scale,
-            kind="psd",
-            order=generators.shape[1],
-            generators=generators,
-        )
+        r, number = self.inputs, generators.shape[1]
+        length = 2 * (self.order + 1)
+        taps = np.zeros((self.order + 1, r, number))
+        taps.reshape(-1, number)[: len(generators)] = generators
+        spectra = np.fft.rfft(taps, length, axis=0)
+        a, b, scale = svec_layout(number)
+        rows, columns, _ = svec_layout(r)
+        out = np.zeros((self.size, a.size))
+        later = out[rows.size :].reshape(self.order, r, r, a.size)
+        for i in range(r):
+            for j in range(r):
+                pair = spectra[:, i][:, a] * spectra[:, j][:, b].conj()
+                turned = pair.conj() if i == j else spectra[:, i][:, b] * spectra[:, j][:, a].conj()
+                c = 0.5 * np.fft.irfft(pair + turned, length, axis=0)[: self.order + 1] * scale
+                out[np.flatnonzero((rows == i) & (columns == j))] = c[:1]
+                later[:, i, j] = c[1:]
+        return out
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
-        """The autocovariances c_0 .. c_m."""
-        return {"type": "fir", "order": self.order, "coefficients": x}
-
-
-def _toeplitz(g: Array) -> Array:
-    # g_r multiplies c_r = c_{-r} twice, hence the halves.
-    column = 0.5 * g
-    column[0] *= 2.0
-    return scipy.linalg.toeplitz(column)
+        """The autocovariances c_0 .. c_m, (r, r) each where there are several inputs."""
+        shown = x if self.inputs == 1 else self.autocovariances(x)
+        return {"type": "fir", "order": self.order, "coefficients": shown}

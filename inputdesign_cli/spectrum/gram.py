@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import scipy
@@ -18,12 +18,17 @@ from inputdesign_cli.spectrum.basis import DensityFamily, Face, Functional, Pric
 from inputdesign_cli.spectrum.directions import directed_scale, leading_pairs
 from inputdesign_cli.spectrum.svec import smat
 
-_WHOLE = 28  # Gram matrices up to this order are designed whole, in one face
-_FIRST = 16
 _DIRECTIONS = 8
-_MOST_KEPT = 24
 _KEPT = 1e-14  # share of the largest eigenvalue below which a generator is dropped
 _SINGULAR_PRICE = 1e-12
+
+
+class FaceSizes(NamedTuple):
+    """Up to order `whole` a face is the whole cone; else so many generators are the first, and are kept."""
+
+    whole: int = 28
+    first: int = 16
+    kept: int = 24
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,11 @@ class GramBasis(DensityFamily, ABC):
         """How many times n generators span the whole cone."""
         return 2 if self.hermitian else 1
 
+    @property
+    def sizes(self) -> FaceSizes:
+        """How large faces are."""
+        return FaceSizes()
+
     @abstractmethod
     def gram(self, vector: Array) -> NDArray:
         """G (n, n) with tr(G Q) = vector . x for the x of any Gram matrix Q."""
@@ -73,15 +83,15 @@ class GramBasis(DensityFamily, ABC):
     def coarser(self) -> list[Self]:
         """Lower orders, each about half the next, whose optimum is a good start for this one."""
         orders = [self.order]
-        while self._copies * self.inputs * (orders[0] + 1) > 2 * _WHOLE:
+        while self._copies * self.inputs * (orders[0] + 1) > 2 * self.sizes.whole:
             orders.insert(0, orders[0] // 2)
         return [self.of_order(order) for order in orders[:-1]]
 
     def first_face(self, price: Functional) -> Face:
         """The whole cone when it is small, else the spectra of low order."""
         n = self.gram_order
-        few = self.inputs * max(_FIRST // (self.inputs * self._copies), 1)
-        first = np.eye(n)[:, : n if n * self._copies <= _WHOLE else min(few, n)]
+        few = self.inputs * max(self.sizes.first // (self.inputs * self._copies), 1)
+        first = np.eye(n)[:, : n if n * self._copies <= self.sizes.whole else min(few, n)]
         return self._face(np.concatenate([first, 1j * first], axis=1) if self.hermitian else first, price)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
@@ -107,7 +117,7 @@ class GramBasis(DensityFamily, ABC):
             return self, face
         eigenvalues, vectors = np.linalg.eigh(smat(y))
         kept = eigenvalues > _KEPT * eigenvalues[-1]
-        kept[:-_MOST_KEPT] = False
+        kept[: -self.sizes.kept] = False
         used = np.pad(face.generators @ vectors[:, kept], ((0, n - known), (0, 0)))
         return self, self._face(np.concatenate([used, directions], axis=1), price)
 

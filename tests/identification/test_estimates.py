@@ -16,7 +16,7 @@ from tests.support.identification_systems import SYSTEMS, data, one_channel, row
 def theory(name, samples):
     """M of unit white input, from the frequency domain."""
     experiment = Experiment(SYSTEMS[name], samples)
-    maps = FirBasis(0).integrals(experiment.information_density, experiment.singularities)
+    maps = FirBasis(1, 0).integrals(experiment.information_density, experiment.singularities)
     return experiment.baseline_information + maps[0]
 
 

@@ -14,7 +14,7 @@ from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification.models.fields import check_delay_stable
-from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.spectrum import FirBasis
 from tests.support.plants import arrays, arx, box_jenkins
 from tests.support.records import shifted, simulated
 
@@ -22,7 +22,7 @@ from tests.support.records import shifted, simulated
 def theory(model, samples):
     """M of unit white inputs, from the frequency domain."""
     experiment = Experiment(model, samples)
-    basis = MatrixFirBasis(model.inputs, 0)
+    basis = FirBasis(model.inputs, 0)
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     densities = np.array([basis.density(unit, np.zeros(1))[0].real.ravel() for unit in np.eye(len(maps))])
     x = np.linalg.lstsq(densities.T, np.eye(model.inputs).ravel(), rcond=None)[0]

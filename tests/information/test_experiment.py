@@ -6,7 +6,7 @@ import pytest
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel
-from inputdesign_cli.spectrum import FirBasis, FlatBasis, MatrixFirBasis
+from inputdesign_cli.spectrum import FirBasis, FlatBasis
 from tests.support.plants import arrays, arx, box_jenkins, paper_experiment, two_by_two
 from tests.support.random_plants import random_case
 
@@ -86,13 +86,6 @@ def test_noise_alone_informs_about_arx_parameters_as_a_lyapunov_equation_says():
     assert np.all(M0[2:] == 0)
 
 
-def test_matrix_fir_of_one_channel_is_fir():
-    one = single()
-    ours = MatrixFirBasis(1, 6).integrals(one.information_density, one.singularities)
-    theirs = FirBasis(6).integrals(one.information_density, one.singularities)
-    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
-
-
 def test_parameters_that_the_band_cannot_tell_apart_are_named():
     """(s + 1) / (s + 1)^2: the common factor leaves a direction without information."""
     model = ContinuousModel.monic(
@@ -117,7 +110,7 @@ def test_information_of_an_arx_model_with_white_input():
     a, b, variance, power, N = -0.7, 2.0, 0.5, 1.3, 100
     model = PolynomialModel.single([0.0, b], A=[1.0, a], variance=variance)
     experiment = Experiment(model, N)
-    basis = FirBasis(0)
+    basis = FirBasis(1, 0)
     M = (
         experiment.baseline_information
         + power * basis.integrals(experiment.information_density, experiment.singularities)[0]
@@ -128,7 +121,7 @@ def test_information_of_an_arx_model_with_white_input():
 
 def test_loop_norms_of_the_flexible_transmission(flexible):
     """||S||^2 and ||G S||^2 (H2), recomputed independently in docs/errata.md."""
-    basis = FirBasis(0)
+    basis = FirBasis(1, 0)
     for kind, expected in (("input", 1.0606348409), ("output", 1.8022202466)):
         value = basis.integrals(lambda w, k=kind: flexible.power_density(k, w), flexible.singularities)[0]
         assert value == pytest.approx(expected, abs=6e-11)
@@ -139,7 +132,7 @@ def test_whitened_coordinates(seed):
     """White excitation gives the identity, and the way back to raw parameters gives the raw matrix."""
     raw = random_case(seed).experiment()
     white = raw.whitened(2.5)
-    basis = FirBasis(0)
+    basis = FirBasis(1, 0)
 
     def information(experiment):
         gain = basis.integrals(experiment.information_density, experiment.singularities)[0]

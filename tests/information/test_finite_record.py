@@ -8,7 +8,7 @@ import scipy.signal
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.information.record_transforms import RecordTransforms
-from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix
+from inputdesign_cli.plant import Loop, PolynomialModel, TransferMatrix
 from inputdesign_cli.signal import grid_lines, multisine_record
 from tests.support.plants import arrays, arx, paper_experiment
 from tests.support.random_plants import random_case
@@ -132,7 +132,7 @@ def test_a_slow_loop_is_filtered_exactly_and_at_once():
     model = arx()
     gains = 1e-5 * np.linalg.inv(model.plant_at(np.zeros(1))[0].real)
     controller = TransferMatrix.build([[[g] for g in row] for row in gains], [[[1, -1]] * 2] * 2)
-    loop = PolynomialLoop(model, controller)
+    loop = Loop(model, controller)
     loop.check_stability()
     r = np.random.default_rng(1).standard_normal((200, 2))
     plant = FiniteRecord(Experiment(model, 200, loop=loop), 200, 1.0)

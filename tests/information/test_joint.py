@@ -69,7 +69,7 @@ def test_the_noise_tells_what_it_tells_of_each(plants):
         np.testing.assert_allclose(own, alone, rtol=1e-9, atol=1e-10 * np.abs(alone).max())
 
 
-@pytest.mark.parametrize("basis", [FirBasis(7), LinesBasis.at(np.array([0.1, 0.9, 2.2]), 1)])
+@pytest.mark.parametrize("basis", [FirBasis(1, 7), LinesBasis.at(np.array([0.1, 0.9, 2.2]), 1)])
 def test_integrals_are_those_of_each(plants, basis):
     if plants[0].inputs > 1:
         basis = LinesBasis.at(np.array([0.1, 0.9, 2.2]), 2)

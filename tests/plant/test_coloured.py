@@ -60,7 +60,7 @@ def test_experiments_are_those_of_polynomials_inside(loop):
     a, b = (Experiment(m, 50, loop=one) for m, one in zip((model, known), loops, strict=True))
     pick = np.ix_(order, order)
     np.testing.assert_allclose(a.noise_information[pick], b.noise_information, rtol=1e-9, atol=1e-9)
-    basis = FirBasis(3)
+    basis = FirBasis(1, 3)
     maps = [basis.integrals(e.information_density, e.singularities) for e in (a, b)]
     np.testing.assert_allclose(maps[0][:, order][:, :, order], maps[1], rtol=1e-9, atol=1e-9)
     record = np.random.default_rng(1).standard_normal((90, 1))
@@ -169,7 +169,7 @@ def test_a_root_on_the_circle_may_be_known():
     coloured = Coloured(plant, D=(seasonal,), held=(True,))
     model = Reparametrised(coloured, Parametrisation.identity(coloured.names, coloured.theta, ["d1", "d2"]))
     experiment = Experiment(model, 100)
-    white = FirBasis(0).integrals(experiment.information_density, experiment.singularities)[0]
+    white = FirBasis(1, 0).integrals(experiment.information_density, experiment.singularities)[0]
     impulse = np.eye(1, 400)[0]
     by_b = scipy.signal.lfilter(seasonal, [1, -0.8], np.roll(impulse, 1))
     by_f = scipy.signal.lfilter([0, -0.5], [1, -0.8], by_b)

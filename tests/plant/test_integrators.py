@@ -10,10 +10,10 @@ from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant import (
     ContinuousModel,
     Intersample,
+    Loop,
     Parametrisation,
     PolynomialModel,
     Reparametrised,
-    SampledLoop,
     SampledModel,
     TransferMatrix,
     close_loop,
@@ -100,7 +100,7 @@ def test_the_loop_around_an_integrator_is_that_of_polynomials(controller):
     w = np.array([0.0, 1e-3, 0.3, np.pi])
     for one, other in zip(held.loop.sensitivity(w), polynomial.loop.sensitivity(w), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-5)
-    basis = FirBasis(4)
+    basis = FirBasis(1, 4)
     maps = [basis.integrals(e.information_density, e.singularities) for e in (held, polynomial)]
     np.testing.assert_allclose(maps[0], H**2 * maps[1], rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(held.noise_information, H**2 * polynomial.noise_information, rtol=1e-9)
@@ -116,7 +116,7 @@ def test_the_loop_around_an_integrator_is_that_of_polynomials(controller):
 
 
 MATRICES = {
-    "excitation": lambda e: FirBasis(0).integrals(e.information_density, e.singularities)[0],
+    "excitation": lambda e: FirBasis(1, 0).integrals(e.information_density, e.singularities)[0],
     "noise": lambda e: e.noise_information,
 }
 
@@ -139,12 +139,12 @@ def test_integrators_that_inputs_share_are_one():
     rows = [[[0.2], [0.5]]], [[[1, 0], [1, 0]]]
     plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), np.eye(1))
     C = TransferMatrix.build([[[0.8]], [[0.0]]], [[[1]], [[1]]])
-    SampledLoop(SampledModel(plant, H), C).check_stability()
+    Loop(SampledModel(plant, H), C).check_stability()
     apart = [[[0.2], [0]], [[0], [0.5]]], [[[1, 0], [1]], [[1], [1, 0]]]
     plant = ContinuousModel.monic(descending(apart[0]), descending(apart[1]), np.eye(2))
     C = TransferMatrix.build([[[0.8], [0.0]], [[0.0], [0.0]]], [[[1], [1]], [[1], [1]]])
     with pytest.raises(SpecError):  # the other tank is left to itself
-        SampledLoop(SampledModel(plant, H), C).check_stability()
+        Loop(SampledModel(plant, H), C).check_stability()
 
 
 @pytest.mark.parametrize("hold", [True, False])

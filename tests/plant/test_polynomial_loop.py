@@ -8,8 +8,8 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix, close_loop
-from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.plant import Loop, PolynomialModel, TransferMatrix, close_loop
+from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
 from tests.support.plants import arrays
 
@@ -118,7 +118,7 @@ def impulse_gradients(plant, source):
 def experiment(request):
     plant = request.param()
     controller = TransferMatrix.build(NUMERATOR[plant.inputs], DENOMINATOR[plant.inputs])
-    loop = PolynomialLoop(plant, controller)
+    loop = Loop(plant, controller)
     loop.check_stability()
     return Experiment(plant, 7, loop=loop)
 
@@ -131,7 +131,7 @@ def test_powers_are_those_of_simulated_impulses(experiment):
     plant = experiment.model
     inputs, outputs = plant.inputs, plant.outputs
     c = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 0.5]])[:inputs, :inputs]
-    basis = MatrixFirBasis(inputs, 0)
+    basis = FirBasis(inputs, 0)
     x = np.array([2.0, 0.3, 1.0, 0.0, -0.2, 0.5])[: basis.size]
     np.testing.assert_array_equal(basis.autocovariances(x)[0], c)
     runs = [
@@ -175,9 +175,7 @@ def test_signals_are_those_of_the_equations_sample_by_sample(experiment):
 def test_an_unstable_plant_that_is_left_alone_is_refused():
     plant = box_jenkins()
     with pytest.raises(SpecError) as caught:
-        PolynomialLoop(
-            plant, TransferMatrix.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)
-        ).check_stability()
+        Loop(plant, TransferMatrix.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)).check_stability()
     assert caught.value.diagnostics[0].code == "unstable-loop"
 
 

@@ -6,15 +6,8 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import (
-    ContinuousModel,
-    PolynomialLoop,
-    PolynomialModel,
-    SampledLoop,
-    SampledModel,
-    TransferMatrix,
-)
-from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.plant import ContinuousModel, Loop, PolynomialModel, SampledModel, TransferMatrix
+from inputdesign_cli.spectrum import FirBasis
 from tests.support.loop_checks import check_information, check_signals
 from tests.support.plants import arrays, descending
 
@@ -59,7 +52,7 @@ def derivative():
 def pair():
     """The same loop, by states and by polynomials."""
     C = TransferMatrix.build(PI, BELOW)
-    loops = SampledLoop(held_first_order(), C), PolynomialLoop(polynomial_first_order(), C)
+    loops = Loop(held_first_order(), C), Loop(polynomial_first_order(), C)
     for loop in loops:
         loop.check_stability()
     return [Experiment(loop.model, 9, loop=loop) for loop in loops]
@@ -67,7 +60,7 @@ def pair():
 
 def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
     held, polynomial = pair
-    J, basis = derivative(), MatrixFirBasis(2, 3)
+    J, basis = derivative(), FirBasis(2, 3)
     assert held.model.names[:2] == ("b0[1,1]", "b0[1,2]")
     assert polynomial.model.names[:2] == ("b1[1,1]", "b1[1,2]")
     maps = [basis.integrals(e.information_density, e.singularities) for e in pair]
@@ -80,7 +73,7 @@ def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
 
 def test_loop_is_that_of_polynomials(pair):
     held, polynomial = pair
-    basis, w = MatrixFirBasis(2, 2), np.array([0.0, 0.02, 1.0, np.pi])
+    basis, w = FirBasis(2, 2), np.array([0.0, 0.02, 1.0, np.pi])
     for kind in ("input", "output", "excitation"):
         for channel in (None, 1):
             powers = [
@@ -181,7 +174,7 @@ def impulse_gradients(model, source):
 @pytest.fixture(scope="module")
 def experiment():
     model = held_second_order()
-    loop = SampledLoop(model, TransferMatrix.build(CONTROLLER, UNDER))
+    loop = Loop(model, TransferMatrix.build(CONTROLLER, UNDER))
     loop.check_stability()
     return Experiment(model, 7, loop=loop)
 
@@ -210,7 +203,7 @@ def test_responses_are_those_of_matrix_algebra(experiment):
 
 def one(numerator, denominator, C, below=(1.0,), *, step=T):
     plant = ContinuousModel.monic(descending([[numerator]]), descending([[denominator]]), np.eye(1))
-    return SampledLoop(SampledModel(plant, step), TransferMatrix.build([[C]], [[list(below)]]))
+    return Loop(SampledModel(plant, step), TransferMatrix.build([[C]], [[list(below)]]))
 
 
 def test_closed_poles_are_the_roots_of_the_characteristic_polynomial():

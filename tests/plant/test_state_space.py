@@ -264,7 +264,7 @@ def test_a_motor_is_its_transfer_function():
         loop = close_loop(one, controller)
         loop.check_stability()
         e = Experiment(one, 10, loop=loop)
-        found.append((FirBasis(3).integrals(e.information_density, e.singularities), e.noise_information))
+        found.append((FirBasis(1, 3).integrals(e.information_density, e.singularities), e.noise_information))
     for one, other in zip(*found, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9 * np.abs(one).max())
 

@@ -9,7 +9,7 @@ import pytest
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.spectrum import FirBasis, MatrixFirBasis, PolynomialBasis
+from inputdesign_cli.spectrum import FirBasis, PolynomialBasis
 
 ARX = """
 plant:
@@ -97,7 +97,7 @@ def test_what_white_excitation_at_the_bound_misses_every_spectrum_below_it_misse
 
 @pytest.mark.parametrize(
     "basis",
-    [FirBasis(4), MatrixFirBasis(2, 3), PolynomialBasis(2, 3), PolynomialBasis(3, 2, (0.5, 2.0), True)],
+    [FirBasis(1, 4), FirBasis(2, 3), PolynomialBasis(2, 3), PolynomialBasis(3, 2, (0.5, 2.0), True)],
     ids=["fir", "matrix fir", "real polynomial", "complex polynomial"],
 )
 def test_a_directed_functional_is_the_density_along_that_direction(basis):

@@ -9,7 +9,7 @@ import pytest
 from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Absolute, Sensitivity
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, Rational, TransferMatrix
+from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
 
@@ -102,9 +102,7 @@ def test_models_of_the_ellipsoid_keep_the_sensitivity(design):
 def test_one_channel_is_the_siso_bound():
     A, B = [1, -0.9], [0, 0.5, 0.2]
     numerator, denominator, W = [0.4, -0.3], [1, -1], Rational.build([0.5, 0.1], [1, -0.3])
-    loop = PolynomialLoop(
-        PolynomialModel.single(B, A=A), TransferMatrix.build([[numerator]], [[denominator]])
-    )
+    loop = Loop(PolynomialModel.single(B, A=A), TransferMatrix.build([[numerator]], [[denominator]]))
     q = np.exp(-1j * GRID)
     G, C = np.polyval(B[::-1], q) / np.polyval(A[::-1], q), np.polyval(numerator[::-1], q) / (1 - q)
     weight = (0.5 + 0.1 * q) / (1 - 0.3 * q)

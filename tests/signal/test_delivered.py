@@ -17,14 +17,14 @@ def delivered(seed, samples, **settings):
     """The design of a random case for so many samples, its record, and what that attains, all recomputed."""
     case = random_case(seed)
     question = Question(
-        case.experiment(samples), FirBasis(case.order), "cost", [case.requirement], cost=case.cost
+        case.experiment(samples), FirBasis(1, case.order), "cost", [case.requirement], cost=case.cost
     )
     design = solve_design(question, tolerance=1e-6)
     problem, x = design.problem, design.result.x
     designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
     target = Target(worst_ratio(problem.requirements), True, case.cost, designed)
     plant = FiniteRecord(problem.experiment, samples)
-    spectrum = DesignedSpectrum.of(FirBasis(x.size - 1), x)
+    spectrum = DesignedSpectrum.of(FirBasis(1, x.size - 1), x)
     record = best_record(SignalGenerator(spectrum, SignalSettings(**settings), samples), plant, target)
     cost = sum(weight * plant.mean_squares(kind, record.samples)[0] for kind, weight in case.cost.items())
     ratio = target.worst_ratio(plant.information(record.samples))

@@ -35,13 +35,13 @@ def density(w):
 
 
 def one_input(w):
-    return FirBasis(3).density(COLOURED, w)
+    return FirBasis(1, 3).density(COLOURED, w)
 
 
 LINES = np.array([0.2, 0.9])
 TWO = DesignedSpectrum(2, 13.58, density=density)
 SPECTRA = {
-    "moving average": DesignedSpectrum.of(FirBasis(3), COLOURED),
+    "moving average": DesignedSpectrum.of(FirBasis(1, 3), COLOURED),
     "density": DesignedSpectrum(1, COLOURED[0], density=one_input),
     "lines": DesignedSpectrum.of(LinesBasis.at(LINES, 1), np.ones(2)),
     "two inputs": TWO,

@@ -45,7 +45,7 @@ def block_spectrum(record, blocks):
 def test_levels_of_one_input_and_their_spectrum(kind, values):
     """Few levels only, and a spectrum nearer to the wanted one than that of the signs of noise."""
     samples = 512
-    lines = grid_lines(FirBasis(3).density(COLOURED, 2 * np.pi * np.arange(257) / samples), samples, 1.0)
+    lines = grid_lines(FirBasis(1, 3).density(COLOURED, 2 * np.pi * np.arange(257) / samples), samples, 1.0)
     power = lines.totals
 
     def misfit(x):
@@ -95,7 +95,7 @@ def test_maximum_length_sequences_are_white(bits):
 
 @pytest.mark.parametrize("chosen", ["odd", 8, (1, 5, 9, 20)])
 def test_selected_lines_keep_the_power_and_exclude_the_others(chosen):
-    power = grid_lines(FirBasis(3).density(COLOURED, 2 * np.pi * np.arange(33) / 64), 64, 1.0).totals
+    power = grid_lines(FirBasis(1, 3).density(COLOURED, 2 * np.pi * np.arange(33) / 64), 64, 1.0).totals
     gathered = select(power, chosen)
     assert gathered.sum() == pytest.approx(power.sum(), rel=1e-12)
     used = np.flatnonzero(gathered)

@@ -108,7 +108,7 @@ def two_inputs(w):
     return phi + 0.2 * np.eye(2)
 
 
-SPECTRA = {1: DesignedSpectrum.of(FirBasis(2), COLOURED), 2: DesignedSpectrum(2, 13.1, density=two_inputs)}
+SPECTRA = {1: DesignedSpectrum.of(FirBasis(1, 2), COLOURED), 2: DesignedSpectrum(2, 13.1, density=two_inputs)}
 SETTINGS = {
     "noise": {},
     "random": {"method": "multisine", "phases": "random"},

@@ -73,7 +73,7 @@ def test_columns_are_orthogonal_and_of_modulus_one():
 def test_the_lines_of_a_moving_average_have_exactly_its_power(samples):
     c = autocorrelation(np.array([1.0, -0.6, 0.2]))
     w = 2 * np.pi * np.arange(samples // 2 + 1) / samples
-    lines = grid_lines(FirBasis(2).density(c, w), samples, 1.0)
+    lines = grid_lines(FirBasis(1, 2).density(c, w), samples, 1.0)
     assert lines.mean_squares == pytest.approx([c[0]], rel=1e-12)
     x = multisine_record(lines, samples, np.random.default_rng(2), "orthogonal")[:, 0]
     spectrum = np.abs(np.fft.rfft(x) / samples) ** 2

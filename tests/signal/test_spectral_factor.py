@@ -16,7 +16,7 @@ def test_spectral_factor_of_a_known_factor(order):
     assert factor.residual < 1e-12
     w = np.linspace(0, np.pi, 257)
     response = np.abs(np.exp(-1j * np.outer(w, np.arange(order + 1))) @ factor.taps) ** 2
-    wanted = FirBasis(order).density(autocorrelation(taps), w)
+    wanted = FirBasis(1, order).density(autocorrelation(taps), w)
     np.testing.assert_allclose(response, wanted, rtol=1e-9, atol=1e-11 * wanted.max())
 
 

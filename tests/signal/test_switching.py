@@ -97,7 +97,7 @@ def test_a_pace_that_does_not_lead_there_ends_the_search_and_so_does_its_time():
 def test_every_sample_is_at_a_level_or_moves_at_the_rate(first_order, quantiser, periods, hold):
     """With the limits exact, whatever the converter; the height is the largest that they leave."""
     experiment = replace(first_order, samples=240)
-    spectrum = DesignedSpectrum.of(FirBasis(2), np.array([1.0, 0.7, 0.3]), inputs=1)
+    spectrum = DesignedSpectrum.of(FirBasis(1, 2), np.array([1.0, 0.7, 0.3]), inputs=1)
     settings = SignalSettings("slewed", periods=periods, hold=hold, candidates=1, most_candidates=1)
     bounds = Bounds(
         amplitude=np.array([0.72]),

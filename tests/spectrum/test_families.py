@@ -6,10 +6,10 @@ import pytest
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, graded_grid
 from inputdesign_cli.spectrum import (
+    FirBasis,
     FlatBasis,
     Functional,
     LinesBasis,
-    MatrixFirBasis,
     PolynomialBasis,
     hmat,
     hvec,
@@ -21,9 +21,9 @@ DISCRETE = Experiment(arx(), 20).whitened(1.0)
 PAPER = paper_experiment()
 SINGLE = Experiment(PolynomialModel.single([0, 1.0, 0.4], A=[1, -1.2, 0.8], variance=0.5), 20).whitened(1.0)
 FAMILIES = {
-    "fir of one input": (MatrixFirBasis(1, 6), SINGLE),
+    "fir of one input": (FirBasis(1, 6), SINGLE),
     "polynomial of one input": (PolynomialBasis(1, 5, (0.2, 2.0), True), SINGLE),
-    "fir": (MatrixFirBasis(2, 6), DISCRETE),
+    "fir": (FirBasis(2, 6), DISCRETE),
     "polynomial": (PolynomialBasis(2, 5, (0.0, 2.0)), PAPER),
     "complex polynomial": (PolynomialBasis(2, 5, (0.0, 2.0), True), PAPER),
     "polynomial on a band": (PolynomialBasis(2, 3, (0.5, 1.5), True), DISCRETE),
@@ -126,8 +126,8 @@ def test_enlarged_faces_keep_the_solution():
 
 
 def test_lower_orders_are_heads():
-    for basis in (MatrixFirBasis(2, 6), PolynomialBasis(2, 6, (0.0, 2.0), True)):
-        experiment = DISCRETE if isinstance(basis, MatrixFirBasis) else PAPER
+    for basis in (FirBasis(2, 6), PolynomialBasis(2, 6, (0.0, 2.0), True)):
+        experiment = DISCRETE if isinstance(basis, FirBasis) else PAPER
         lower = basis.of_order(2)
         for whole, part in zip(functionals(basis, experiment), functionals(lower, experiment), strict=True):
             np.testing.assert_allclose(whole.vector[: lower.size], part.vector, rtol=1e-8, atol=1e-12)

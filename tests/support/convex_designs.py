@@ -16,7 +16,7 @@ ORDER = 8
 
 
 def solve(experiment, goal="cost", requirements=(), order=ORDER, **more):
-    basis = more.pop("basis", FirBasis(order))
+    basis = more.pop("basis", FirBasis(1, order))
     if goal == "cost":
         more.setdefault("cost", {"input": 1.0})
     question = Question(experiment, basis, goal, list(requirements), **more)
@@ -51,7 +51,7 @@ def check(design, tolerance=1e-6):
     for limit in problem.limits:
         power = dataclasses.replace(problem, basis=basis, finer=None).power(limit.kind).at(x)
         assert power <= limit.bound * (1 + 1e-9) if limit.upper else power >= limit.bound * (1 - 1e-9)
-    if isinstance(basis, FirBasis):
+    if isinstance(basis, FirBasis) and basis.inputs == 1:
         phi = basis.density(x, GRID)
         assert phi.min() >= -1e-9 * phi.max()
         for density in problem.densities:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.spectrum import FirBasis
 
 
 def check_information(experiment, from_r, from_e):
@@ -11,7 +11,7 @@ def check_information(experiment, from_r, from_e):
     inverse = np.linalg.inv(covariance)
     noise = np.einsum("tkpm,mn,pq,tlqn->kl", from_e, covariance, inverse, from_e, optimize=True)
     close(experiment.noise_information, samples * noise)
-    basis = MatrixFirBasis(experiment.inputs, 1)
+    basis = FirBasis(experiment.inputs, 1)
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     x = np.random.default_rng(0).standard_normal(basis.size)
     c = basis.autocovariances(x)

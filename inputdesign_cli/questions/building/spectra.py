@@ -23,7 +23,6 @@ from inputdesign_cli.spectrum import (
     FirBasis,
     FlatBasis,
     LinesBasis,
-    MatrixFirBasis,
     PolynomialBasis,
     TabulatedSpectrum,
 )
@@ -84,7 +83,7 @@ def _refused(spec: Spec, message: str) -> SpecError:
     return spec.complain("not-supported", message, hint=hint, key="spectrum")
 
 
-def _fir(spec: Spec, inputs: int, order: int) -> FirBasis | MatrixFirBasis:
+def _fir(spec: Spec, inputs: int, order: int) -> FirBasis:
     if spec.limits.band is not None:
         raise spec.complain(
             "bad-limit",
@@ -92,7 +91,7 @@ def _fir(spec: Spec, inputs: int, order: int) -> FirBasis | MatrixFirBasis:
             hint="use type: polynomial, multisine or free, or bound the density outside by limits.spectrum",
             key="limits.band",
         )
-    return FirBasis(order) if inputs == 1 else MatrixFirBasis(inputs, order)
+    return FirBasis(inputs, order)
 
 
 def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:

@@ -30,7 +30,7 @@ def relative(model, fraction, alpha, band=(0.0, np.pi)):
 def design(experiment, order, fraction=0.01, alpha=2.45, cost=None):
     return least_cost(
         experiment,
-        FirBasis(order),
+        FirBasis(1, order),
         cost or {"input": 1.0},
         relative(experiment.model, fraction, alpha),
         tolerance=1e-7,
@@ -40,7 +40,7 @@ def design(experiment, order, fraction=0.01, alpha=2.45, cost=None):
 def solve_case(seed):
     case = random_case(seed)
     return case, least_cost(
-        case.experiment(), FirBasis(case.order), case.cost, [case.requirement], tolerance=1e-7
+        case.experiment(), FirBasis(1, case.order), case.cost, [case.requirement], tolerance=1e-7
     )
 
 
@@ -94,7 +94,7 @@ def test_grid_program_agrees_where_the_grid_holds_the_active_frequencies(first_o
 def test_grid_program_agrees_with_several_active_frequencies(flexible):
     model = flexible.model
     factories = relative(model, 0.25, 3.55, (1e-3, np.pi))
-    solution = least_cost(flexible, FirBasis(10), {"input": 1.0, "output": 1.0}, factories, tolerance=1e-7)
+    solution = least_cost(flexible, FirBasis(1, 10), {"input": 1.0, "output": 1.0}, factories, tolerance=1e-7)
     active = solution.result.active_frequencies
     assert len(active) >= 3
     start = solution.white_power * solution.problem.basis.even
@@ -107,7 +107,7 @@ def test_a_plain_grid_understates_the_cost_of_a_resonant_plant(flexible):
     """The 1000-point logarithmic grid gives 361.3817 at m = 10 (independent solution): too little."""
     model = flexible.model
     factories = relative(model, 0.25, 3.55, (1e-3, np.pi))
-    solution = least_cost(flexible, FirBasis(10), {"input": 1.0, "output": 1.0}, factories, tolerance=1e-7)
+    solution = least_cost(flexible, FirBasis(1, 10), {"input": 1.0, "output": 1.0}, factories, tolerance=1e-7)
     requirement = solution.problem.requirements[0]
     grid = np.geomspace(1e-3, np.pi, 1000)
 

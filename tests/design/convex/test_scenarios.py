@@ -24,7 +24,7 @@ DENSE = np.linspace(0.0, np.pi, 4001)
 def question(experiment, others=(), *, order=8, fraction=0.1, **kwargs):
     return Question(
         experiment,
-        FirBasis(order),
+        FirBasis(1, order),
         kwargs.pop("goal", "cost"),
         relative_of(experiment, fraction),
         cost=kwargs.pop("cost", {"input": 1.0}),
