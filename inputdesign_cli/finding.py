@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 from types import MappingProxyType
 from typing import Literal
 
@@ -90,6 +91,16 @@ class FindingKind:
             figures: its numbers and names.
         """
         return Finding(self.code, severity or self.severity, message, where, figures)
+
+
+def _kind(severity: Severity, code: str, text: str, remedy: str, cause: str = "undetermined") -> FindingKind:
+    """Return a kind whose title is the first sentence of its text."""
+    title, _, rest = text.partition(". ")
+    return FindingKind(code, severity, title[0].lower() + title[1:].rstrip("."), rest or text, remedy, cause)
+
+
+note, doubt, unsure, refuted = (partial(_kind, severity) for severity in Severity)
+"""Declare a kind by its code, text, remedy and, of `unsure`, the cause why nothing is decided."""
 
 
 def cause_of(finding: Finding) -> str:

@@ -6,96 +6,81 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.signal import Record
 
 _FALLS_SHORT = 5e-3
 _DEAR = 1.0  # beyond the cost of the design, relative to it
 
-RECORD_TOO_LONG = FindingKind(
+RECORD_TOO_LONG = note(
     "record-not-computed",
-    Severity.NOTE,
-    "no record this long is computed",
-    "The experiment has more samples than the longest record that is computed for this model.",
+    "No record this long is computed. The experiment has more samples than the longest record that is "
+    "computed for this model.",
     "Set a shorter record by `signal.samples`.",
 )
-RECORD_UNDETERMINED = FindingKind(
+RECORD_UNDETERMINED = doubt(
     "record-undetermined",
-    Severity.DOUBT,
-    "the record does not determine all parameters",
-    "To working precision the samples do not determine all parameters. Their accuracy cannot be computed.",
+    "The record does not determine all parameters. To working precision the samples do not determine all "
+    "parameters. Their accuracy cannot be computed.",
     "Take more samples (`signal.samples`), or a model of lower order.",
 )
-RECORD_MISSES = FindingKind(
+RECORD_MISSES = doubt(
     "record-misses-accuracy",
-    Severity.DOUBT,
-    "the record misses the accuracy",
-    "The largest ratio of r_u to r_adm by the samples of the record exceeds one.",
+    "The record misses the accuracy. The largest ratio of r_u to r_adm by the samples of the record exceeds "
+    "one.",
     "Take more samples, or allow more power.",
 )
-RECORD_DEAR = FindingKind(
+RECORD_DEAR = doubt(
     "record-dear",
-    Severity.DOUBT,
-    "the record costs far more than the spectrum",
-    "A record that is short beside dead times and time constants loses what it causes after its last sample.",
+    "The record costs far more than the spectrum. A record that is short beside dead times and time "
+    "constants loses what it causes after its last sample.",
     "Take more samples.",
 )
-RECORD_LONGER = FindingKind(
+RECORD_LONGER = note(
     "record-longer",
-    Severity.NOTE,
-    "limits on single samples take a longer record",
-    "The spectrum alone would take fewer samples. The length was found by trying; it is not proved.",
+    "Limits on single samples take a longer record. The spectrum alone would take fewer samples. The length "
+    "was found by trying; it is not proved.",
     "Nothing, or widen the limit on single samples that the record takes most of.",
 )
-RECORD_LESS_ACCURATE = FindingKind(
+RECORD_LESS_ACCURATE = note(
     "record-less-accurate",
-    Severity.NOTE,
-    "the record reaches less than the design",
-    "The accuracy of the design is that of its spectrum. The samples reach less by their length or by limits "
-    "on single samples.",
+    "The record reaches less than the design. The accuracy of the design is that of its spectrum. The "
+    "samples reach less by their length or by limits on single samples.",
     "Take more samples, or more candidates (`signal.candidates`).",
 )
-RECORD_MISSES_SIDE = FindingKind(
+RECORD_MISSES_SIDE = doubt(
     "record-misses-requirement",
-    Severity.DOUBT,
-    "the record misses a requirement that the design meets",
-    "The samples of the record miss a requirement beside the accuracy that is sought.",
+    "The record misses a requirement that the design meets. The samples of the record miss a requirement "
+    "beside the accuracy that is sought.",
     "Take more samples, or loosen the requirement.",
 )
-START_MATTERS = FindingKind(
+START_MATTERS = doubt(
     "start-from-rest",
-    Severity.DOUBT,
-    "the record relies on its start from rest",
-    "The errors of the record would be larger if its start were unknown. Spectra have no start.",
+    "The record relies on its start from rest. The errors of the record would be larger if its start were "
+    "unknown. Spectra have no start.",
     "Keep the plant at rest before the record, and take inputs and outputs from their levels there.",
 )
-OTHER_SIGNAL = FindingKind(
+OTHER_SIGNAL = note(
     "other-signal",
-    Severity.NOTE,
-    "the record is of another kind or spectrum than was asked for",
-    "No record of the first choice was found that meets the accuracy within the limits on single samples.",
+    "The record is of another kind or spectrum than was asked for. No record of the first choice was found "
+    "that meets the accuracy within the limits on single samples.",
     "Nothing, or state `signal.type`.",
 )
 
 
 def too_long(samples: int, longest: int) -> list[Finding]:
     """Return a finding if a record has more samples than any that is computed."""
-    if samples <= longest:
-        return []
     message = (
         f"there is no record: it would have {samples} samples, and at most {longest} are computed for this "
         "model; signal.samples sets a shorter one"
     )
-    return [RECORD_TOO_LONG.found(message, where="signal.samples", samples=samples, longest=longest)]
+    found = RECORD_TOO_LONG.found(message, where="signal.samples", samples=samples, longest=longest)
+    return [found] if samples > longest else []
 
 
 def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
-    """Return a finding if a record misses the accuracy.
-
-    Args:
-        held: whether limits, a level or the length hold its power down.
-    """
+    """Return a finding if a record misses the accuracy; limits, a level or the length may hold its power."""
     if record.met:
         return []
     if not np.isfinite(record.worst_ratio):
@@ -105,8 +90,8 @@ def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
         )
         return [RECORD_UNDETERMINED.found(message, where="signal.samples")]
     why = (
-        "the limits on the powers, the level asked for or its length leave no room: a little more power or a "
-        "few more samples would do"
+        "the limits on the powers, the level asked for or its length leave no room: a little more power or "
+        "a few more samples would do"
         if held
         else "no level of it would do, since too little of what it causes comes before its last sample: take "
         "more samples"
@@ -123,7 +108,7 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
         block: lengths are multiples of this.
         shares: of each limit on single samples that it takes.
     """
-    size = len(record.samples)
+    size, times = len(record.samples), 1.0 + record.extra_power
     if record.method == "given":
         return []
     if size > asked + block:
@@ -134,52 +119,45 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
             f"trying, to one per cent; the spectrum alone would take {asked}{share}"
         )
         return [RECORD_LONGER.found(message, where="signal", samples=size, of_spectrum=asked)]
-    if record.extra_power <= _DEAR:
-        return []
     message = (
-        f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its {size} "
-        "samples are few beside the dead times and time constants of the plant; much of what they cause "
-        "comes after the last one; take more samples"
+        f"the record costs {times:.3g} times what the designed spectrum does: its {size} samples are few "
+        "beside the dead times and time constants of the plant; much of what they cause comes after the "
+        "last one; take more samples"
     )
-    return [RECORD_DEAR.found(message, where="signal.samples", times=1.0 + record.extra_power)]
+    found = RECORD_DEAR.found(message, where="signal.samples", times=times)
+    return [found] if record.extra_power > _DEAR else []
 
 
 def less_accurate(reached: float, designed: float) -> list[Finding]:
     """Return a finding if a record reaches a larger multiple of the admissible error than its design."""
     more = reached / designed - 1.0
-    if more <= _FALLS_SHORT:
-        return []
     message = (
         f"the record reaches {reached:.4g} times the admissible error, the design {designed:.4g}: "
         f"{per_cent(more)} more, by its length or by the limits on single samples"
     )
-    return [RECORD_LESS_ACCURATE.found(message, where="signal", reached=reached, designed=designed)]
+    found = RECORD_LESS_ACCURATE.found(message, where="signal", reached=reached, designed=designed)
+    return [found] if more > _FALLS_SHORT else []
 
 
 def requirement_missed(names: Sequence[str], ratio: float) -> list[Finding]:
     """Return a finding if a record misses requirements that its design meets; `ratio` is the worst."""
-    if ratio <= 1.0 + _FALLS_SHORT:
-        return []
     message = (
         f"the record misses {' and '.join(names)}, which the design meets: its worst ratio is {ratio:.4g}"
     )
-    return [RECORD_MISSES_SIDE.found(message, where="signal", worst_ratio=ratio)]
+    found = RECORD_MISSES_SIDE.found(message, where="signal", worst_ratio=ratio)
+    return [found] if ratio > 1.0 + _FALLS_SHORT else []
 
 
 def start_matters(growth: float) -> Finding:
     """Return the finding that errors grow by this factor where the start of a record is unknown."""
-    errors = (
-        f"its errors would be {growth:.3g} times as large"
-        if np.isfinite(growth)
-        else "it would not determine all parameters"
-    )
-    return START_MATTERS.found(
+    known = np.isfinite(growth)
+    errors = f"its errors would be {growth:.3g} times as large" if known else "it would not determine all "
+    message = (
         "the record relies on its start from rest, which spectra and the bounds on them do not know: begun "
-        f"in an unknown state about unknown levels {errors}; keep the plant at rest before the record "
-        "begins, and take inputs and outputs from their levels there",
-        where="signal",
-        growth=growth if np.isfinite(growth) else None,
+        f"in an unknown state about unknown levels {errors}{'' if known else 'parameters'}; keep the plant "
+        "at rest before the record begins, and take inputs and outputs from their levels there"
     )
+    return START_MATTERS.found(message, where="signal", growth=growth if known else None)
 
 
 def other_signal(kind: str) -> Finding:
@@ -196,14 +174,10 @@ def other_spectrum(asked: str, kind: str, limits: Sequence[str], power: float | 
         power: the limit on the input power that gives its spectrum; None if that is the designed one.
         goal: of the design.
     """
-    spectrum = (
-        "that spectrum" if power is None else f"another spectrum, that of limits.input_power: {power:.4g}"
+    another = "that spectrum" if power is None else "another spectrum, that of limits.input_power: "
+    message = (
+        f"no record of {asked} with the {'cheapest' if goal == 'cost' else 'designed'} spectrum was found "
+        f"that meets the accuracy within {' and '.join(limits)}; the record is {kind} with "
+        f"{another}{'' if power is None else f'{power:.4g}'}"
     )
-    designed = "cheapest" if goal == "cost" else "designed"
-    return OTHER_SIGNAL.found(
-        f"no record of {asked} with the {designed} spectrum was found that meets the accuracy within "
-        f"{' and '.join(limits)}; the record is {kind} with {spectrum}",
-        where="signal.type",
-        kind=kind,
-        input_power=power,
-    )
+    return OTHER_SIGNAL.found(message, where="signal.type", kind=kind, input_power=power)

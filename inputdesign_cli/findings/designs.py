@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.units import Units
 
@@ -21,41 +21,41 @@ _SETTLED = 2.0
 _FREE = 1e-3
 _SUPPORT = 1e-3
 
-NOTHING_NEEDED = FindingKind(
+NOTHING_NEEDED = note(
     "no-excitation-needed",
-    Severity.NOTE,
-    "no excitation is needed",
-    "The noise in normal operation, or what is known before, meets the accuracy that is asked for.",
+    "No excitation is needed. The noise in normal operation, or what is known before, meets the accuracy "
+    "that is asked for.",
     "Estimate the model from a record of normal operation, or ask for more accuracy.",
 )
-INPUT_WITHOUT_POWER = FindingKind(
+INPUT_WITHOUT_POWER = doubt(
     "input-without-power",
-    Severity.DOUBT,
-    "the design does not excite an input",
-    "Criterion T adds up the information of all parameters. It can be largest where an input has no power.",
+    "The design does not excite an input. Criterion T adds up the information of all parameters. It can be "
+    "largest where an input has no power.",
     "Take criterion D, A or E, which ask for every parameter.",
 )
-EXPERIMENT_SHORT = FindingKind(
+EXPERIMENT_SHORT = doubt(
     "experiment-short",
-    Severity.DOUBT,
-    "the experiment ends before the slowest mode settles",
-    "The accuracy of a spectrum is that of long records. A short record may reach less or more.",
+    "The experiment ends before the slowest mode settles. The accuracy of a spectrum is that of long "
+    "records. A short record may reach less or more.",
     "Compare with what the record reaches by its own samples, and run `idesign simulate`.",
 )
-SIGN_OPEN = FindingKind(
+SIGN_OPEN = doubt(
     "error-as-large-as-plant",
-    Severity.DOUBT,
-    "the admissible error is as large as the plant",
-    "The admissible error is not below the gain of the plant at any frequency of its band.",
+    "The admissible error is as large as the plant. The admissible error is not below the gain of the plant "
+    "at any frequency of its band.",
     "Ask for less error. A `relative` error of 0.1 means 10 %.",
 )
-EXCITATION_FREE = FindingKind(
+EXCITATION_FREE = note(
     "excitation-almost-free",
-    Severity.NOTE,
-    "power at low frequencies costs next to nothing",
-    "A loop with integral action suppresses slow excitation, so that it hardly costs anything. The power of "
-    "the optimal excitation is then ill defined.",
+    "Power at low frequencies costs next to nothing. A loop with integral action suppresses slow "
+    "excitation, so that it hardly costs anything. The power of the optimal excitation is then ill defined.",
     "Give `cost.excitation_power` a small weight, or limit it.",
+)
+MET_WITHIN_TABLE = note(
+    "met-within-table",
+    "What is asked is met as far as the table describes the spectrum. A table gives a spectrum by its rows, "
+    "and straight lines between them. The error of that decides whether what is asked is met.",
+    "Give the table more rows.",
 )
 
 
@@ -70,54 +70,45 @@ def nothing_needed(experiment: Experiment, *, at_every_plant: bool) -> Finding:
     )
 
 
-def inputs_without_power(excited: Sequence[float]) -> list[Finding]:
-    """Return a finding for each input without power; `excited` has the power of each."""
-    return [
-        INPUT_WITHOUT_POWER.found(
+def inputs_without_power(excited: Sequence[float]) -> Iterator[Finding]:
+    """Yield a finding for each input without power; `excited` has the power of each."""
+    for number, power in enumerate(excited, start=1):
+        message = (
             f"input {number} gets no power, so that its own effects stay unknown: criterion T adds up "
-            "information; D, A or E asks for every parameter",
-            where=f"input {number}",
+            "information; D, A or E asks for every parameter"
         )
-        for number, power in enumerate(excited, start=1)
-        if power <= _NOTHING * sum(excited)
-    ]
+        if power <= _NOTHING * sum(excited):
+            yield INPUT_WITHOUT_POWER.found(message, where=f"input {number}")
 
 
 def short_experiment(experiment: Experiment) -> list[Finding]:
     """Return a finding if the experiment ends before its slowest mode settles; not without a length."""
-    if experiment.model.continuous or experiment.samples == 1:
-        return []
-    damping = np.abs(experiment.singularities.imag)
+    damping, samples = np.abs(experiment.singularities.imag), experiment.samples
     slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
-    if slowest * experiment.samples >= _SETTLED:
+    if experiment.model.continuous or samples == 1 or slowest * samples >= _SETTLED:
         return []
-    return [
-        EXPERIMENT_SHORT.found(
-            f"the slowest mode has a time constant of {1.0 / slowest:.2g} samples, the experiment "
-            f"{experiment.samples}: a spectrum says what long records reach; trust what the record reaches "
-            "by its own samples, and idesign simulate",
-            time_constant=1.0 / slowest,
-            samples=experiment.samples,
-        )
-    ]
+    message = (
+        f"the slowest mode has a time constant of {1.0 / slowest:.2g} samples, the experiment {samples}: a "
+        "spectrum says what long records reach; trust what the record reaches by its own samples, and "
+        "idesign simulate"
+    )
+    return [EXPERIMENT_SHORT.found(message, time_constant=1.0 / slowest, samples=samples)]
 
 
 def sign_open(requirements: Iterable[Requirement]) -> list[Finding]:
     """Return a finding for each admissible error that leaves the sign of G open."""
-    found = []
+    found = {}
     for error in model_errors(requirements):
         size, admitted = error.nominal_size(error.grid), error.admissible.at(error.grid)
         acts = size > 0.0
         least = float(np.min(admitted[acts] / size[acts], initial=np.inf))
+        message = (
+            f"the admissible error is {least:.4g} times |G| or more at every frequency of its band: a model "
+            "that meets it may have the wrong sign (relative: 0.1 means 10 %)"
+        )
         if 1.0 - _ROUNDING <= least < np.inf:
-            found.append(
-                SIGN_OPEN.found(
-                    f"the admissible error is {least:.4g} times |G| or more at every frequency of its band: "
-                    "a model that meets it may have the wrong sign (relative: 0.1 means 10 %)",
-                    ratio=least,
-                )
-            )
-    return list({one.message: one for one in found}.values())
+            found[message] = SIGN_OPEN.found(message, ratio=least)
+    return list(found.values())
 
 
 def almost_free(units: Units, lines: Array, power: Array, costs: Array, dearest: float) -> list[Finding]:
@@ -128,16 +119,21 @@ def almost_free(units: Units, lines: Array, power: Array, costs: Array, dearest:
         dearest: the largest price over frequency.
     """
     cheap = (costs < _FREE * dearest) & (power > _SUPPORT * power.sum())
-    if not np.any(cheap):
-        return []
-    at = float(lines[cheap].max()) / units.frequency
+    at = float(lines[cheap].max(initial=0.0)) / units.frequency
     near_zero = at < 1e-6 * np.pi / units.frequency
     where = "near frequency zero" if near_zero else f"below {at:.3g} {units.per_time}"
-    return [
-        EXCITATION_FREE.found(
-            f"power {where} is almost free of charge in this loop (integral action). The excitation power of "
-            "the optimum is ill defined: give cost.excitation_power a small weight, or limit it",
-            where="cost.excitation_power",
-            frequency=at,
-        )
-    ]
+    message = (
+        f"power {where} is almost free of charge in this loop (integral action). The excitation power of "
+        "the optimum is ill defined: give cost.excitation_power a small weight, or limit it"
+    )
+    found = EXCITATION_FREE.found(message, where="cost.excitation_power", frequency=at)
+    return [found] if np.any(cheap) else []
+
+
+def met_within_table(error: float) -> Finding:
+    """Return the finding that the error of a table, of the worst ratio, decides."""
+    message = (
+        f"what is asked is met to within {error:.1g}: so far the table describes the spectrum, linear "
+        "between its rows"
+    )
+    return MET_WITHIN_TABLE.found(message, where="spectrum.given", error=error)

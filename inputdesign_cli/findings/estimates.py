@@ -1,62 +1,104 @@
-"""How sure single parameters of an estimate are, how its records begin, and what it cannot be asked."""
+"""How an estimate was found, how sure its parameters are, and what it cannot be asked."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note, unsure
 from inputdesign_cli.findings.remedies import quantities
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.stability import without_integrators
-from inputdesign_cli.outcome.model_words import predictor_of
+from inputdesign_cli.outcome.model_words import blocks_of, predictor_of
+from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 
+# Of a standard deviation: nearer to where an expression ends, an estimate was stopped there.
+_ASIDE = 0.001
 # A first residual beyond this number of standard deviations is reported.
 _SEEN_AT_ONCE = 3.0
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
 
-START = FindingKind(
+NOT_SETTLED = unsure(
+    "search-not-settled",
+    "The search for the estimate did not settle. It still moved at its last step. The estimate may be far "
+    "from the minimum.",
+    "Lower the orders, which may be too high for these data, or begin nearer to the plant.",
+    "unsettled",
+)
+STOPPED = unsure(
+    "stopped-at-an-end",
+    "The search stopped where an expression ends. Beyond the estimate an expression of the spec is not "
+    "defined. The likeliest parameters may lie there, and the deviation is not to be trusted.",
+    "Write the expression so that it is defined wherever the plant may be.",
+    "unsettled",
+)
+START = note(
     "start-estimated",
-    Severity.NOTE,
-    "the start of a record was estimated along",
-    "A record does not begin at rest about zero, or may not. The level of each output and the state at the "
-    "start are estimated along, which costs some accuracy.",
+    "The start of a record was estimated along. A record does not begin at rest about zero, or may not. The "
+    "level of each output and the state at the start cost some accuracy.",
     "Where the plant was at rest before, `--operating-point` with the levels gives a more certain estimate.",
 )
-ON_CIRCLE = FindingKind(
+ON_CIRCLE = doubt(
     "noise-on-the-circle",
-    Severity.DOUBT,
-    "a polynomial of the noise has a root on the unit circle",
-    "As far as these samples show, a root of C, D or F lies on the unit circle. The covariance is not to be "
-    "trusted there, and a design would count on noise that vanishes or never fades.",
+    "A polynomial of the noise has a root on the unit circle. As far as these samples show, it is one of C, "
+    "D or F. The covariance is not to be trusted there, and a design would count on noise that vanishes or "
+    "never fades.",
     "Take more data, or a lower order.",
 )
-NEAR_ZERO = FindingKind(
+NEAR_ZERO = note(
     "parameter-near-zero",
-    Severity.NOTE,
-    "zero lies within a standard deviation of a parameter",
-    "The data do not distinguish the parameter from zero.",
+    "Zero lies within a standard deviation of a parameter. The data do not distinguish the two.",
     "Lower the order of a polynomial. Of a physical quantity take more data, or list what is known in "
     "`plant.known`.",
 )
-BAND_LIMITED = FindingKind(
+BAND_LIMITED = note(
     "input-taken-as-band-limited",
-    Severity.NOTE,
-    "the input was taken as band-limited",
-    "The plant is in continuous time and tests refute the model. The input was taken for the band-limited "
-    "interpolation of its samples.",
+    "The input was taken as band-limited. The plant is in continuous time, and tests refute the model.",
     "If the input is held between the samples, write `plant.sample: zoh`.",
 )
-UNASKED = FindingKind(
+UNASKED = unsure(
     "no-accuracy-here",
-    Severity.UNDECIDED,
-    "the question cannot be asked of the estimate",
-    "What the spec asks has no answer at the estimate, for instance because the loop is unstable there. "
-    "There is no error bound r_u, and no verdict.",
+    "The question cannot be asked of the estimate. What the spec asks has no answer there, for instance "
+    "because the loop is unstable. There is no error bound r_u, and no verdict.",
     "See the message: mend the spec, or take data that give another estimate.",
     "unasked",
 )
+LARGER_NOISE = note(
+    "noise-estimated-along",
+    "The noise has more structure than the spec says. So C and D of small orders were estimated along. All "
+    "tests, the covariance and the verdict are of this larger model.",
+    "Take over `noise` of `model.yaml` into the spec, for the next design rests on it.",
+)
+
+
+def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
+    """Return findings on a search for `model` that did not settle, or that an expression's end stopped."""
+    begun = "its only start" if estimate.starts == 1 else f"the best of {estimate.starts} starts"
+    message = (
+        f"the search did not settle after {estimate.steps} steps from {begun}: the estimate may be far from "
+        "the minimum; the orders may be too high for these data"
+    )
+    found = [NOT_SETTLED.found(message, steps=estimate.steps, starts=estimate.starts)]
+    return [*([] if estimate.converged else found), *stopped_at_ends(model, estimate)]
+
+
+def stopped_at_ends(model: Model, estimate: Estimate) -> list[Finding]:
+    """Return a finding for each parameter that the search left where an expression ends."""
+    found = []
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    for k in np.flatnonzero(~model.dead_times).tolist():
+        step = _ASIDE * deviations[k] * np.eye(1, deviations.size, k)[0]
+        flaws = (model.at(model.theta + way * step).flaw for way in (-1.0, 1.0))
+        flaw, value = next(filter(None, flaws), None), float(model.theta[k])
+        if flaw is not None:
+            message = (
+                f"the search stopped at {model.names[k]} = {value:.6g}, beyond which {flaw}: the likeliest "
+                "parameters may lie there, and its deviation is not to be trusted; write the expression so "
+                "that it is defined wherever the plant may be"
+            )
+            found.append(STOPPED.found(message, where=model.names[k], value=value))
+    return found
 
 
 def started(estimate: Estimate) -> list[Finding]:
@@ -71,42 +113,33 @@ def started(estimate: Estimate) -> list[Finding]:
     ratio = np.abs(estimate.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = float(estimate.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
-    records = "the record does" if single else "the records do"
     seen = (
         f"a first residual of {first:.3g} where the noise has {noise:.3g}"
         if np.max(ratio) > _SEEN_AT_ONCE
         else "the first residuals together are larger than noise would make them"
     )
-    return [
-        START.found(
-            f"{records} not begin at rest about zero ({seen}): {along}. Where the plant was at rest before, "
-            "--operating-point with the levels of inputs and outputs then makes the estimate more certain",
-            where=f"y{output + 1}",
-            first_residual=first,
-            noise=noise,
-        )
-    ]
+    message = (
+        f"the record{' does' if single else 's do'} not begin at rest about zero ({seen}): {along}. Where "
+        "the plant was at rest before, --operating-point with the levels of inputs and outputs then makes "
+        "the estimate more certain"
+    )
+    return [START.found(message, where=f"y{output + 1}", first_residual=first, noise=noise)]
 
 
 def on_the_circle(model: Model, estimate: Estimate) -> list[Finding]:
     """Return a finding where a polynomial of the predictor has a root on the unit circle."""
     samples = len(estimate.errors)
-    letters = [
+    letters = " and ".join(
         letter
         for letter, polynomials in predictor_of(model).items()
         if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
-    ]
-    if not letters:
-        return []
-    return [
-        ON_CIRCLE.found(
-            f"{' and '.join(letters)} has a root on the unit circle, as far as {samples} samples can tell: "
-            "the covariance is not to be trusted there, and a design on this model would count on noise that "
-            "vanishes or never fades; take more data, or a lower order",
-            where=" and ".join(letters),
-            samples=samples,
-        )
-    ]
+    )
+    message = (
+        f"{letters} has a root on the unit circle, as far as {samples} samples can tell: the covariance is "
+        "not to be trusted there, and a design on this model would count on noise that vanishes or never "
+        "fades; take more data, or a lower order"
+    )
+    return [ON_CIRCLE.found(message, where=letters, samples=samples)] if letters else []
 
 
 def near_zero(model: Model, estimate: Estimate) -> list[Finding]:
@@ -122,28 +155,46 @@ def near_zero(model: Model, estimate: Estimate) -> list[Finding]:
         if listed:
             message = f"zero lies within a standard deviation of {listed}: {advice}"
             found.append(NEAR_ZERO.found(message, where=listed))
-    for k in vague:
-        if model.dead_times[k]:
-            most = float(estimate.theta[k] + _NORMAL * deviations[k])
-            name = estimate.names[k]
-            message = f"{name} of a dead time cannot be told from zero: {most:.3g} at most (95 %)"
-            found.append(NEAR_ZERO.found(message, where=name, at_most=most))
+    for k in vague[model.dead_times[vague]]:
+        most, name = float(estimate.theta[k] + _NORMAL * deviations[k]), estimate.names[k]
+        message = f"{name} of a dead time cannot be told from zero: {most:.3g} at most (95 %)"
+        found.append(NEAR_ZERO.found(message, where=name, at_most=most))
     return found
 
 
 def band_limited(model: Model, estimate: Estimate) -> list[Finding]:
     """Return a finding where the input between samples may explain why tests refute a continuous model."""
-    if not model.continuous or not estimate.failed:
-        return []
-    return [
-        BAND_LIMITED.found(
-            "the input was taken for the band-limited interpolation of its samples; where it is held "
-            "between them, write plant.sample: zoh",
-            where="plant.sample",
-        )
-    ]
+    message = (
+        "the input was taken for the band-limited interpolation of its samples; where it is held between "
+        "them, write plant.sample: zoh"
+    )
+    refuted = model.continuous and estimate.failed
+    return [BAND_LIMITED.found(message, where="plant.sample")] if refuted else []
 
 
 def unasked(why: str) -> list[Finding]:
     """Return the finding that what is asked has no answer at the estimate, and why."""
     return [UNASKED.found(f"there is no r_u for this estimate: {why}")] if why else []
+
+
+def noise_probability(estimate: Estimate) -> float:
+    """Return the probability of residuals as coloured, if the noise model were right."""
+    return min(test.probability for test in estimate.tests if test.fault == "noise")
+
+
+def larger_noise(model: Model, probability: float | None) -> list[Finding]:
+    """Return a finding if a larger noise was estimated; `probability` is that of the residuals before."""
+    if probability is None:
+        return []
+    noise = {letter: rows for letter, rows in blocks_of(model)["noise"].items() if letter in ("C", "D")}
+    orders = [
+        f"{letter} of order {max(len(row) for row in (rows if isinstance(rows[0], list) else [rows])) - 1}"
+        for letter, rows in noise.items()
+    ]
+    message = (
+        f"the residuals are not white with the noise of the spec (probability {chance(probability)}): "
+        f"{' and '.join(orders)} {'were' if len(orders) > 1 else 'was'} estimated along, and everything "
+        "here is of this model. Write noise as in model.yaml before the next design"
+    )
+    stated = ", ".join(f"{letter}: {rows}" for letter, rows in noise.items())
+    return [LARGER_NOISE.found(message, where="noise", probability=probability, noise=stated)]

@@ -14,7 +14,7 @@ from inputdesign_cli.explore import (
     only_answers,
     order_of_excitation,
 )
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt
 from inputdesign_cli.identification.checks import signal_name
 
 DRIVE = "move the reference of the loop, or add dither to the input, and record again"
@@ -22,58 +22,48 @@ DRIVE = "move the reference of the loop, or add dither to the input, and record 
 _FOLLOWS = 0.02
 # A parameter is not determined at all where it deviates by more than this share of its value.
 _OPEN = 100.0
-# A time constant beyond this multiple of the longest record looks like a line in each.
-_LONGER = 10.0
-# The static gain is as good as none below this share of the largest one; what falls to this share of its peak
-# has a resonance.
+# The static gain is as good as none below this share of the largest one.
 _NO_GAIN, _FALLS = 0.05, 0.6
 
-UNDRIVEN = FindingKind(
+UNDRIVEN = doubt(
     "input-only-answers",
-    Severity.DOUBT,
-    "an input follows from the outputs alone",
-    "The input is an exact function of outputs and its own past: a loop without excitation. The inverse of "
-    "the controller explains such data as well as the plant.",
+    "An input follows from the outputs alone. The input is an exact function of outputs and its own past: a "
+    "loop without excitation. The inverse of the controller explains such data as well as the plant.",
     "Move the reference of the loop, or add dither to the input.",
 )
-INVERSE = FindingKind(
+INVERSE = doubt(
     "like-inverse-controller",
-    Severity.DOUBT,
-    "the model may be the inverse of a controller",
-    "The output answers in the same sample, and nobody seems to have set the input without a look at the "
-    "output. In a loop -1/C explains such data ([ljung-1999], Section 13.4).",
+    "The model may be the inverse of a controller. The output answers in the same sample, and nobody seems "
+    "to have set the input without a look at the output. In a loop -1/C explains such data ([ljung-1999], "
+    "Section 13.4).",
     "Move the reference of the loop, or add dither to the input.",
 )
-TOO_SIMPLE = FindingKind(
+TOO_SIMPLE = doubt(
     "excitation-too-simple",
-    Severity.DOUBT,
-    "the inputs determine fewer numbers than the model has",
-    "The inputs are persistently exciting of a lower order than the model needs. Other models explain the "
-    "record as well.",
+    "The inputs determine fewer numbers than the model has. The inputs are persistently exciting of a lower "
+    "order than the model needs. Other models explain the record as well.",
     "Apply inputs that move more and independently; `idesign signal` makes some.",
 )
-OPEN = FindingKind(
+OPEN = doubt(
     "parameter-undetermined",
-    Severity.DOUBT,
-    "the record leaves a parameter open",
-    "A parameter deviates by many times its value, or a time constant is much longer than the record.",
+    "The record leaves a parameter open. A parameter deviates by many times its value, or a time constant "
+    "is much longer than the record.",
     "Move that input more, or leave it out with `--columns`.",
 )
 
 
-def doubtful_inputs(found: Found, parts: Parts, step: float, unit: str, *, loop: bool) -> list[Finding]:
+def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
     """Return why the inputs of records leave the plant open.
 
     Args:
         parts: all records, u (n, r), y (n, p).
-        step, unit: the sample time.
         loop: whether inputs answer the outputs.
     """
     moving = [(u[:, found.moving], y) for u, y in parts]
     return [
         *undriven(parts),
         *([] if loop else _inverses(found, moving)),
-        *(list(_too_simple(found, moving)) or _open(found, step, unit)),
+        *(list(_too_simple(found, moving)) or _open(found)),
     ]
 
 
@@ -103,8 +93,8 @@ def _inverses(found: Found, moving: Parts) -> Iterator[Finding]:
             if integrates or like_answers(moving, i, k):
                 y, u = signal_name("y", i, found.model.outputs), signal_name("u", j, found.model.inputs)
                 yield INVERSE.found(
-                    f"{y} answers {u} in the same sample, as the inverse of a controller does (-1/C): if {u} "
-                    f"was made from {y}, as in a loop, this is no model of the plant: {DRIVE}",
+                    f"{y} answers {u} in the same sample, as the inverse of a controller does (-1/C): if "
+                    f"{u} was made from {y}, as in a loop, this is no model of the plant: {DRIVE}",
                     where=y,
                 )
 
@@ -128,33 +118,22 @@ def _too_simple(found: Found, moving: Parts) -> Iterator[Finding]:
     for j, left in zip(found.moving, left_of_inputs(moving), strict=True):
         if left < _FOLLOWS:
             yield TOO_SIMPLE.found(
-                f"u{j + 1} follows from the other inputs and their pasts but for {100.0 * left:.2g} % of its "
-                "power: models in which the inputs exchange their effects explain this record about as well; "
-                "move them one by one, or independently",
+                f"u{j + 1} follows from the other inputs and their pasts but for {100.0 * left:.2g} % of "
+                "its power: models in which the inputs exchange their effects explain this record about as "
+                "well; move them one by one, or independently",
                 where=f"u{j + 1}",
                 left=left,
             )
             return
 
 
-def _open(found: Found, step: float, unit: str) -> Iterator[Finding]:
+def _open(found: Found) -> list[Finding]:
     named = open_parameters(found, _OPEN)
-    if named:
-        yield OPEN.found(
-            f"{', '.join(named)}: the record leaves open what acts there; move that input more, or leave it "
-            "out (--columns)",
-            where=named[0].split(" = ")[0],
-        )
-    longest = max(len(y) for _, y in found.used)
-    for candidate in found.taken:
-        slow = candidate.orders.slowest(candidate.model.theta) if candidate.orders.physical else 0.0
-        if slow > _LONGER * longest * step:
-            yield OPEN.found(
-                f"the longest time constant = {slow:.3g} {unit} is left open by {longest} samples every "
-                f"{step:g} {unit}: what is as slow as many records is a line in each; see whether the input "
-                "moves enough",
-                value=slow,
-            )
+    message = (
+        f"{', '.join(named)}: the record leaves open what acts there; move that input more, or leave it out "
+        "(--columns)"
+    )
+    return [OPEN.found(message, where=named[0].split(" = ")[0])] if named else []
 
 
 def open_parameters(found: Found, share: float = 1.0) -> list[str]:

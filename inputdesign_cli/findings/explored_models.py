@@ -9,7 +9,7 @@ import scipy
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.explore import Found, Parts, by_chance, unhelpful, unstable_pole
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt
 from inputdesign_cli.findings.rivals import most_apart
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driven_by_nothing
@@ -25,66 +25,54 @@ _FREQUENCIES, _STATIC = 40, 1e-6
 _AS_LIKELY, _ELSEWHERE = 2.0 * float(np.log(20.0)), 0.1
 _TESTS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
-UNJUDGED = FindingKind(
+UNJUDGED = doubt(
     "model-not-judged",
-    Severity.DOUBT,
-    "no data are left to judge the model by",
-    "An input moves in one stretch of the record only. That stretch estimates the model, so that nothing "
-    "judges it.",
+    "No data are left to judge the model by. An input moves in one stretch of the record only. That stretch "
+    "estimates the model, so that nothing judges it.",
     "Judge it by another record (`idesign explore OTHER --validate model.yaml`), or let the inputs step "
     "several times.",
 )
-EXPLAINS_LITTLE = FindingKind(
+EXPLAINS_LITTLE = doubt(
     "simulation-explains-little",
-    Severity.DOUBT,
-    "the simulation explains next to nothing",
-    "The part of the record that judges is simulated from the inputs alone. The model explains no more of it "
-    "than chance would.",
+    "The simulation explains next to nothing. The part of the record that judges is simulated from the "
+    "inputs alone. The model explains no more of it than chance would.",
     "Move the inputs more, or record for longer.",
 )
-UNRELATED = FindingKind(
+UNRELATED = doubt(
     "inputs-unrelated",
-    Severity.DOUBT,
-    "the inputs do not help to predict an output",
-    "Two signals that wander, drift or follow one cycle agree for long, though neither moves the other. What "
-    "is new in the output answers nothing that the inputs do.",
+    "The inputs do not help to predict an output. Two signals that wander, drift or follow one cycle agree "
+    "for long, though neither moves the other. What is new in the output answers nothing that the inputs do.",
     "Move the inputs by steps of your own, at times that nothing else follows.",
 )
-UNEXPLAINED = FindingKind(
+UNEXPLAINED = doubt(
     "structure-unexplained",
-    Severity.DOUBT,
-    "no structure that was tried explains an output",
-    "The simulation explains less than half of the output, and tests of the residuals refute the model. The "
-    "plant may be nonlinear, vary with time, or have inputs that the log lacks.",
+    "No structure that was tried explains an output. The simulation explains less than half of the output, "
+    "and tests of the residuals refute the model. The plant may be nonlinear, vary with time, or have "
+    "inputs that the log lacks.",
     "Record about one operating point, or log what else acts on the output.",
 )
-LIKE_INTEGRATOR = FindingKind(
+LIKE_INTEGRATOR = doubt(
     "like-integrator",
-    Severity.DOUBT,
-    "the plant may be an integrator",
-    "G rises towards low frequencies for as long as the record shows. Static gain and time constant follow "
-    "from no such record, only the slope.",
+    "The plant may be an integrator. G rises towards low frequencies for as long as the record shows. "
+    "Static gain and time constant follow from no such record, only the slope.",
     "Record until the output settles. If it never does, use `idesign explore DATA --structure integrator`.",
 )
-UNSTEADY = FindingKind(
+UNSTEADY = doubt(
     "mode-hardly-decays",
-    Severity.DOUBT,
-    "a mode hardly decays within the record",
-    "A mode of the plant loses less than a hundredth in the whole record. It may be an integrator or drift.",
+    "A mode hardly decays within the record. A mode of the plant loses less than a hundredth in the whole "
+    "record. It may be an integrator or drift.",
     "Record in a loop or until the output settles, or remove the drift with `--detrend linear`.",
 )
-UNSTABLE = FindingKind(
+UNSTABLE = doubt(
     "plant-unstable",
-    Severity.DOUBT,
-    "the plant is unstable",
-    "The samples place a pole outside the unit circle. Stable models alone are looked for without a spec.",
+    "The plant is unstable. The samples place a pole outside the unit circle. Stable models alone are "
+    "looked for without a spec.",
     "Identify the plant with its loop: `idesign identify DATA --spec SPEC`.",
 )
-OPEN_PARAMETERS = FindingKind(
+OPEN_PARAMETERS = doubt(
     "rival-explains-log",
-    Severity.DOUBT,
-    "another set of parameters explains the log as well",
-    "The likelihood has another minimum of about the same depth, where G is another.",
+    "Another set of parameters explains the log as well. The likelihood has another minimum of about the "
+    "same depth, where G is another.",
     "Move the inputs independently of each other, and at more frequencies.",
 )
 
@@ -114,13 +102,13 @@ def doubtful_model(
     ]
 
 
-def _unjudged(found: Found) -> Iterator[Finding]:
-    if found.split == "none":
-        yield UNJUDGED.found(
-            "an input moves in one stretch of the record only, so that the model is judged by the data that "
-            "it is estimated from: judge it by another record (idesign explore OTHER --validate model.yaml), "
-            "or let the inputs step up and down several times"
-        )
+def _unjudged(found: Found) -> list[Finding]:
+    message = (
+        "an input moves in one stretch of the record only, so that the model is judged by the data that it "
+        "is estimated from: judge it by another record (idesign explore OTHER --validate model.yaml), or "
+        "let the inputs step up and down several times"
+    )
+    return [UNJUDGED.found(message)] if found.split == "none" else []
 
 
 def _explains_little(found: Found) -> Iterator[Finding]:
@@ -129,8 +117,8 @@ def _explains_little(found: Found) -> Iterator[Finding]:
         output = signal_name("y", i, found.model.outputs)
         luck = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
         # What wanders leaves any simulation; what is new in it from sample to sample does not wander.
-        wanders, helped = found.wanders[i], found.helped[i]
-        if (wanders and not helped > 0.0) or (not wanders and fit < max(LEAST_FIT, luck)):
+        little = not found.helped[i] > 0.0 if found.wanders[i] else fit < max(LEAST_FIT, luck)
+        if little:
             yield EXPLAINS_LITTLE.found(
                 f"the simulation explains {fit:.1f} % of {output} in {unseen} samples"
                 f"{'' if found.split == 'none' else ' that it has not seen'}, and of noise alone it may "
@@ -147,12 +135,12 @@ def _unrelated(found: Found) -> Iterator[Finding]:
     worse = {i for i, fit in enumerate(found.estimate.fit) if fit is not None and fit <= 0.0}
     for i in sorted(idle | {i for i in worse if not found.wanders[i]}):
         output = signal_name("y", i, found.model.outputs)
-        yield UNRELATED.found(
+        message = (
             f"nothing that the inputs do helps to predict {output} beyond its own past: two signals that "
             "wander, drift, or follow one cycle (as of days) agree for long without one moving the other; "
-            "move the inputs by steps of your own, at times that nothing else follows",
-            where=output,
+            "move the inputs by steps of your own, at times that nothing else follows"
         )
+        yield UNRELATED.found(message, where=output)
 
 
 def _unexplained(found: Found) -> Iterator[Finding]:
@@ -167,17 +155,15 @@ def _unexplained(found: Found) -> Iterator[Finding]:
     worst = min(failed.values(), key=lambda test: test.probability)
     most = "" if worst.lag is None else f", most at lag {worst.lag}"
     for i, fit in enumerate(found.validation.simulation):
+        output = signal_name("y", i, found.model.outputs)
+        message = (
+            "past inputs explain residuals, residuals explain each other (probability "
+            f"{chance(worst.probability)}{most}), and the simulation explains {fit:.1f} % of {output}: no "
+            "structure that was tried explains it. The plant may be nonlinear, vary with time, or have "
+            "inputs that the log lacks: record about one operating point, or log what acts on it"
+        )
         if fit < HALF:
-            output = signal_name("y", i, found.model.outputs)
-            yield UNEXPLAINED.found(
-                f"past inputs explain residuals, residuals explain each other (probability "
-                f"{chance(worst.probability)}{most}), and the simulation explains {fit:.1f} % of {output}: "
-                "no structure that was tried explains it. The plant may be nonlinear, vary with time, or "
-                "have inputs that the log lacks: record about one operating point, or log what acts on it",
-                where=output,
-                fit_percent=fit,
-                probability=worst.probability,
-            )
+            yield UNEXPLAINED.found(message, where=output, fit_percent=fit, probability=worst.probability)
 
 
 def _like_integrators(found: Found, step: float, unit: str) -> Iterator[Finding]:
@@ -192,43 +178,34 @@ def _like_integrators(found: Found, step: float, unit: str) -> Iterator[Finding]
     w = np.concatenate([[_STATIC * lowest], np.geomspace(lowest, max(1.0, lowest), _FREQUENCIES)])
     with np.errstate(all="ignore"):
         change, G = model.plant_gradient(w), model.plant_at(w)
-    for i in range(model.outputs):
-        for j in found.moving:
-            size, deviations = np.abs(G[:, i, j]), _deviations(found, change[:, :, i, j].T)
-            if not _rises(size, deviations):
-                continue
-            at = 1 + int(np.argmin(deviations[1:] / size[1:]))
-            slope = float(np.copysign(w[at] * size[at] / step, G[0, i, j].real))
-            where = "" if model.inputs == model.outputs == 1 else f" from u{j + 1} to y{i + 1}"
-            yield LIKE_INTEGRATOR.found(
-                f"the plant{where} may be an integrator (its static gain is {size[0]:.3g} +- "
-                f"{deviations[0]:.1g}): no time constant follows from this record, only the slope, "
-                f"{slope:.4g} per {unit} for an input of one. Record until the output settles; or, if it "
-                "never does, take --structure integrator",
-                where=where.strip(),
-                slope=slope,
-                static_gain=float(size[0]),
-            )
-
-
-def _rises(size: Array, deviations: Array) -> bool:
-    """Return whether |G| (n,), the first of them static, is clear where it rises, and its end is not."""
-    if not (np.all(np.isfinite(size)) and np.all(np.isfinite(deviations))):
-        return False
-    clear = (size > _CLEAR * deviations) & (_RISING * size < size[0])
-    return bool(size[0] < _OPEN * deviations[0] and np.any(clear))
+    for i, j in ((i, j) for i in range(model.outputs) for j in found.moving):
+        size, deviations = np.abs(G[:, i, j]), _deviations(found, change[:, :, i, j].T)
+        # |G| is clear where it rises, and its end is not.
+        clear = (size > _CLEAR * deviations) & (_RISING * size < size[0])
+        if not (np.all(np.isfinite(size + deviations)) and size[0] < _OPEN * deviations[0] and np.any(clear)):
+            continue
+        at = 1 + int(np.argmin(deviations[1:] / size[1:]))
+        slope = float(np.copysign(w[at] * size[at] / step, G[0, i, j].real))
+        where = "" if model.inputs == model.outputs == 1 else f" from u{j + 1} to y{i + 1}"
+        message = (
+            f"the plant{where} may be an integrator (its static gain is {size[0]:.3g} +- "
+            f"{deviations[0]:.1g}): no time constant follows from this record, only the slope, {slope:.4g} "
+            f"per {unit} for an input of one. Record until the output settles; or, if it never does, take "
+            "--structure integrator"
+        )
+        yield LIKE_INTEGRATOR.found(message, where=where.strip(), slope=slope, static_gain=float(size[0]))
 
 
 def _deviations(found: Found, change: ComplexArray) -> Array:
     """Return deviations (n,) of values whose real and imaginary parts have gradients `change` (k, n)."""
     if not np.all(np.isfinite(change)):
         return np.full(change.shape[1], np.nan)
-    factor = found.estimate.factor
-    parts = [scipy.linalg.solve_triangular(factor, x, lower=True) for x in (change.real, change.imag)]
-    return np.asarray(np.sqrt(np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)))
+    parts = np.hstack([change.real, change.imag])
+    scaled = scipy.linalg.solve_triangular(found.estimate.factor, parts, lower=True)
+    return np.linalg.norm(np.vstack(np.hsplit(scaled, 2)), axis=0)
 
 
-def _rivalled(found: Found) -> Iterator[Finding]:
+def _rivalled(found: Found) -> list[Finding]:
     w = np.linspace(1e-6, np.pi, 100)
     G, estimate = found.model.plant_at(w), found.estimate
     peaks = np.maximum(np.abs(G).max(axis=0), 1e-300)
@@ -240,14 +217,13 @@ def _rivalled(found: Found) -> Iterator[Finding]:
                 f"{estimate.names[i]} {estimate.theta[i]:.3g} or {rival.theta[i]:.3g}"
                 for i in most_apart(estimate, rival)
             )
-            yield OPEN_PARAMETERS.found(
+            message = (
                 f"two sets of parameters explain the record about equally well ({values}; -2 log likelihood "
-                f"differs by {rival.excess:.2g}), and their G by {100.0 * apart:.3g} % of its peak: move the "
-                "inputs independently of each other, and at more frequencies",
-                excess=rival.excess,
-                apart=apart,
+                f"differs by {rival.excess:.2g}), and their G by {100.0 * apart:.3g} % of its peak: move "
+                "the inputs independently of each other, and at more frequencies"
             )
-            return
+            return [OPEN_PARAMETERS.found(message, excess=rival.excess, apart=apart)]
+    return []
 
 
 def _unsteady() -> Finding:
@@ -259,21 +235,18 @@ def _unsteady() -> Finding:
 
 def _unstable(parts: Parts, step: float, unit: str) -> Iterator[Finding]:
     outputs = parts[0][1].shape[1]
+    clock = f"sample_time: {step:.6g}{'' if unit == 's' else f', time_unit: {unit}'}"
     for i in range(outputs):
-        pole = unstable_pole(parts, i)
+        pole, output = unstable_pole(parts, i), signal_name("y", i, outputs)
         if pole is None:
             continue
-        clock = f"sample_time: {step:.6g}{'' if unit == 's' else f', time_unit: {unit}'}"
         A = ", ".join(f"{a:.4g}" for a in pole.denominator)
         B = ", ".join(["0", "1", "1"][: pole.denominator.size])
-        output = signal_name("y", i, outputs)
-        yield UNSTABLE.found(
+        message = (
             f"the plant of {output} is unstable: it has a pole at a radius of {abs(pole.pole):.4g} +- "
             f"{pole.deviation:.1g}, and only stable ones are looked for here. Identify it with its loop: "
-            f"idesign identify DATA --spec SPEC, in SPEC {clock}, plant: {{A: [{A}], B: [{B}]}}, "
-            "noise: {C: [1, -0.1], variance: 1}, and the controller as it was, experiment: {controller: "
-            "{numerator: [..], denominator: [..]}}; raise the orders where tests fail",
-            where=output,
-            radius=abs(pole.pole),
-            deviation=pole.deviation,
+            f"idesign identify DATA --spec SPEC, in SPEC {clock}, plant: {{A: [{A}], B: [{B}]}}, noise: "
+            "{C: [1, -0.1], variance: 1}, and the controller as it was, experiment: {controller: "
+            "{numerator: [..], denominator: [..]}}; raise the orders where tests fail"
         )
+        yield UNSTABLE.found(message, where=output, radius=abs(pole.pole), deviation=pole.deviation)

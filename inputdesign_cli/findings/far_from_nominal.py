@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, Severity, doubt
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.levels import level
 from inputdesign_cli.outcome import Nominal
@@ -22,30 +21,18 @@ from inputdesign_cli.plant import Model
 _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
 # The probability that a normal variable is farther than five standard deviations from its mean.
 _FIVE_DEVIATIONS = 5.733e-7
-_AWAY = 4.0
-_LISTED = 4
+_AWAY, _LISTED = 4.0, 4
 
-ANOTHER = FindingKind(
+ANOTHER = doubt(
     "another-plant",
-    Severity.DOUBT,
-    "the estimate contradicts the plant of the spec",
-    "G of the estimate and of the spec differ by more than half of the larger one and by more than their "
-    "uncertainty. The design rested on another plant.",
+    "The estimate contradicts the plant of the spec. G of the two differs by more than half of the larger "
+    "one and by more than their uncertainty. The design rested on another plant.",
     "Check signs and units of the record. If they are right, put the estimate into the spec.",
 )
-UNCERTAIN = FindingKind(
-    "far-but-uncertain",
-    Severity.NOTE,
-    "the estimate is far from the plant of the spec, and uncertain",
-    "G of the estimate and of the spec differ by more than half of the larger one, but chance explains it.",
-    "Take a longer record.",
-)
-FAR = FindingKind(
+FAR = doubt(
     "far-from-the-spec",
-    Severity.DOUBT,
-    "the estimate lies many deviations from the plant of the spec",
-    "All parameters of G together lie farther from the spec than five standard deviations. It may be another "
-    "plant, have other units, or the numbers of the spec were poor.",
+    "The estimate lies many deviations from the plant of the spec. All parameters of G together are farther "
+    "than five. It may be another plant, have other units, or the numbers of the spec were poor.",
     "The verdict holds for the estimate. Put it into the spec before the next design.",
 )
 
@@ -125,46 +112,35 @@ def from_nominal(
 def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
     """Return a finding where the two are different plants, or parameters lie far apart."""
     found, worst = distance.nominal, distance.worst
+    another = worst is not None and worst.share > _ANOTHER
+    if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
+        return []
     listed = f"{'; ' * bool(distance.listed)}{', '.join(distance.listed)}"
-    figures: dict[str, Any] = {"deviations": found.deviations, "probability": found.probability}
-    chi_squared = f"chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom"
-    if worst is None or worst.share <= _ANOTHER:
-        if found.probability > _FIVE_DEVIATIONS:
-            return []
-        return [
-            FAR.found(
-                f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec "
-                f"(all parameters of G together, {chi_squared}{listed}): it is another plant, its units are "
-                "others, or the numbers of the spec, on which the design rested, were poor. The verdict "
-                "holds for the estimate: r_u and r_adm are those at its parameters",
-                where="plant",
-                **figures,
-            )
-        ]
-    figures["worst_difference"] = worst.share
-    sign = "of the opposite sign at low frequency, and " if found.opposite_sign else ""
-    apart = (
-        f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
-        f"{worst.frequency:.4g} {units.per_time} ({chi_squared}"
+    chi_squared = (
+        f"chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom{listed}"
     )
-    if found.probability > level("far from nominal"):
-        return [
-            UNCERTAIN.found(
-                "the estimate is far from the plant of the spec, but so uncertain that it does not "
-                f"contradict it: {apart}, probability {found.probability:.2g}). A longer record would tell",
-                where="plant",
-                **figures,
-            )
-        ]
-    return [
-        ANOTHER.found(
-            f"the estimate contradicts the plant of the spec: {apart}{listed}). "
-            "The design rested on the plant of the spec; what is admitted here is that of the estimate. "
-            "Check signs and units of the record; if they are right, put the estimate into the spec",
-            where="plant",
-            **figures,
+    kind, message = (
+        FAR,
+        (
+            f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec (all "
+            f"parameters of G together, {chi_squared}): it is another plant, its units are others, or the "
+            "numbers of the spec, on which the design rested, were poor. The verdict holds for the "
+            "estimate: r_u and r_adm are those at its parameters"
+        ),
+    )
+    if worst is not None and another:
+        sign = "of the opposite sign at low frequency, and " if found.opposite_sign else ""
+        kind, message = (
+            ANOTHER,
+            (
+                f"the estimate contradicts the plant of the spec: G{worst.entry} is {sign}up to "
+                f"{100 * worst.share:.0f} % of the larger one apart at {worst.frequency:.4g} "
+                f"{units.per_time} ({chi_squared}). The design rested on the plant of the spec; what is "
+                "admitted here is that of the estimate. Check signs and units of the record; if they are "
+                "right, put the estimate into the spec"
+            ),
         )
-    ]
+    return [kind.found(message, where="plant", deviations=found.deviations, probability=found.probability)]
 
 
 def of_first_part(distance: Distance) -> list[Finding]:
@@ -175,8 +151,8 @@ def of_first_part(distance: Distance) -> list[Finding]:
     sign = " and G has the opposite sign at low frequency: check the signs of the record"
     return [
         FAR.found(
-            f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec"
-            f"{sign if found.opposite_sign else ''}. From now on plans rest on the estimates",
+            f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the "
+            f"spec{sign if found.opposite_sign else ''}. From now on plans rest on the estimates",
             where="plant",
             severity=Severity.NOTE,
             deviations=found.deviations,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, refuted
 from inputdesign_cli.findings.places import SHOWN, Samples, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import Estimate, Frozen, frozen, shifted, spikes
 from inputdesign_cli.outcome.units import Units
@@ -13,28 +13,22 @@ from inputdesign_cli.plant import TransferMatrix
 # Share of samples above which a frozen sensor biases a model; fit (%) below which spikes do.
 _BIASING, _HALF = 0.02, 50.0
 
-SPIKES = FindingKind(
+SPIKES = refuted(
     "spikes",
-    Severity.REFUTED,
-    "a few samples decide what the data say",
-    "A few samples of an output hold most of the sum of squares of its residuals. They are spikes of the "
-    "measurement, or events that the model does not know.",
+    "A few samples decide what the data say. They hold most of the sum of squares of the residuals of an "
+    "output. They are spikes of the measurement, or events that the model does not know.",
     "Leave out the rows that are faults of measurement with `--without`, which cuts the record there.",
 )
-FROZEN = FindingKind(
+FROZEN = refuted(
     "sensor-stands-still",
-    Severity.REFUTED,
-    "an output stands still while the input moves",
-    "An output keeps its value for longer than its rounding explains, while an input moves it. The sensor is "
-    "frozen or saturated, or the logger repeats its last value.",
+    "An output stands still while the input moves. It keeps its value for longer than its rounding "
+    "explains. The sensor is frozen or saturated, or the logger repeats its last value.",
     "Leave these rows out with `--without`, which cuts the record there.",
 )
-MISALIGNED = FindingKind(
+MISALIGNED = refuted(
     "columns-misaligned",
-    Severity.REFUTED,
-    "a column was logged at another time",
-    "The controller of the spec computes u from r and y. One column, moved by some samples, follows this law "
-    "much better than the columns as they stand.",
+    "A column was logged at another time. The controller of the spec computes u from r and y. One column, "
+    "moved by some samples, follows this law much better than the columns as they stand.",
     "Move the column, or mend the controller of the spec.",
 )
 
@@ -44,63 +38,50 @@ def faults(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
     return [*_spikes(units, estimate, data), *_frozen(units, estimate, data)]
 
 
-def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[float]) -> list[Finding]:
-    """Return a finding for each output whose faults give its model other dynamics than the plant has.
+def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[float]) -> Iterator[Finding]:
+    """Yield a finding for each output whose faults give its model other dynamics than the plant has.
 
     Args:
         fitted: (p,), per cent of each output that the simulation explains.
     """
-    found = []
     for output, runs in _still(estimate, data).items():
-        share = sum(one.length for one in runs) / len(data.y)
-        if share >= _BIASING:
-            name = _named(units, output)
-            found.append(
-                FROZEN.found(
-                    f"{name} stands still at {100.0 * share:.2g} % of the samples while "
-                    "the input moves: a model of what a sensor does not follow has another gain, and other "
-                    "dynamics, than the plant; leave these rows out (--without), which cuts the record there",
-                    where=name,
-                    share=share,
-                )
-            )
-    return found + [
-        SPIKES.found(
-            f"a few samples hold {100.0 * one.share:.3g} % of the squares of the residuals of "
-            f"{_named(units, one.output)}, and the simulation explains {fitted[one.output]:.1f} % of it: "
-            "spikes, or events that the model does not know, decide what it is; leave rows out that are "
-            "faults of measurement (--without)",
-            where=_named(units, one.output),
-            share=one.share,
+        share, name = sum(one.length for one in runs) / len(data.y), _named(units, output)
+        message = (
+            f"{name} stands still at {100.0 * share:.2g} % of the samples while the input moves: a model of "
+            "what a sensor does not follow has another gain, and other dynamics, than the plant; leave "
+            "these rows out (--without), which cuts the record there"
         )
-        for one in spikes(estimate.errors)
-        if fitted[one.output] < _HALF
-    ]
+        if share >= _BIASING:
+            yield FROZEN.found(message, where=name, share=share)
+    for one in spikes(estimate.errors):
+        name, fit = _named(units, one.output), fitted[one.output]
+        message = (
+            f"a few samples hold {100.0 * one.share:.3g} % of the squares of the residuals of {name}, and "
+            f"the simulation explains {fit:.1f} % of it: spikes, or events that the model does not know, "
+            "decide what it is; leave rows out that are faults of measurement (--without)"
+        )
+        if fit < _HALF:
+            yield SPIKES.found(message, where=name, share=one.share)
 
 
 def loop_faults(controller: TransferMatrix | None, data: Samples) -> list[Finding]:
     """Return a finding for each signal that obeys the controller of the loop at another time."""
     if controller is None or data.r is None:
         return []
-    found = []
+    found = {}
     for one in shifted(controller, data.u, data.y, data.r, data.lengths):
         several = data.u.shape[1] > 1 and one.letter != "y"
         name = f"{one.letter}{one.channel + 1}" if several else one.letter
         count = abs(one.lag)
         when = f"{count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}"
-        found.append(
-            MISALIGNED.found(
-                f"{name} was logged {when}: the controller of the spec, u = r - C y, leaves "
-                f"{100 * one.left:.3g} % of u as the columns stand, and {100 * one.then:.2g} % with {name} "
-                "moved; a model of the loop would take the shift for a delay: move the column, or mend the "
-                "controller of the spec",
-                where=name,
-                lag=one.lag,
-                left=one.left,
-                then=one.then,
-            )
+        message = (
+            f"{name} was logged {when}: the controller of the spec, u = r - C y, leaves "
+            f"{100 * one.left:.3g} % of u as the columns stand, and {100 * one.then:.2g} % with {name} "
+            "moved; a model of the loop would take the shift for a delay: move the column, or mend the "
+            "controller of the spec"
         )
-    return list({one.message: one for one in found}.values())
+        found[message] = MISALIGNED.found(message, where=name, lag=one.lag, left=one.left, then=one.then)
+    return list(found.values())
 
 
 def _named(units: Units, output: int) -> str:
@@ -108,58 +89,46 @@ def _named(units: Units, output: int) -> str:
 
 
 def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
-    """Return the stretches in which outputs stand still while an input moves."""
+    """Return the stretches in which outputs stand still while an input moves, by output."""
     if data.recorded is None:
         return {}
     known, simulated = data.recorded, estimate.simulated
-    found = frozen(
+    found: dict[int, list[Frozen]] = {}
+    for one in frozen(
         known.held, known.resolution, data.u, estimate.errors, data.y - simulated, simulated, data.lengths
-    )
-    return {
-        output: [one for one in found if one.output == output]
-        for output in sorted({one.output for one in found})
-    }
+    ):
+        found.setdefault(one.output, []).append(one)
+    return dict(sorted(found.items()))
 
 
-def _frozen(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
-    found = []
+def _frozen(units: Units, estimate: Estimate, data: Samples) -> Iterator[Finding]:
     for output, stretches in _still(estimate, data).items():
         runs = [(one.first, one.first + one.length - 1) for one in stretches]
-        rows, still = rows_of(data, runs), sum(one.length for one in stretches)
+        rows, still, name = rows_of(data, runs), sum(one.length for one in stretches), _named(units, output)
         listed = ", ".join(
             f"rows {first} to {last}{of_file(data, at)}"
             for (at, _), (_, first, last) in zip(runs[:SHOWN], rows, strict=False)
         )
-        found.append(
-            FROZEN.found(
-                f"{_named(units, output)} stands still while the input moves, for {still} of {len(data.y)} "
-                f"samples ({listed}{', ..' * (len(runs) > SHOWN)}), and rounding does not explain it: the "
-                "sensor is frozen or saturated, or the logger repeats its last value; leave these rows out, "
-                f"which cuts the record there: {without_option(rows)}",
-                where=_named(units, output),
-                samples=still,
-                rows=[[first, last] for _, first, last in rows],
-            )
+        message = (
+            f"{name} stands still while the input moves, for {still} of {len(data.y)} samples "
+            f"({listed}{', ..' * (len(runs) > SHOWN)}), and rounding does not explain it: the sensor is "
+            "frozen or saturated, or the logger repeats its last value; leave these rows out, which cuts "
+            f"the record there: {without_option(rows)}"
         )
-    return found
+        at = [[first, last] for _, first, last in rows]
+        yield FROZEN.found(message, where=name, samples=still, rows=at)
 
 
-def _spikes(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
-    found = []
+def _spikes(units: Units, estimate: Estimate, data: Samples) -> Iterator[Finding]:
     for one in spikes(estimate.errors):
         many, output = len(one.samples), _named(units, one.output)
         rows = rows_of(data, [(at, at) for at in one.samples])
-        found.append(
-            SPIKES.found(
-                f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
-                f"{100 * one.share:.3g} % of the squares of its residuals (at "
-                f"{places(units, data, one.samples)}): spikes, or events that the model does not know, "
-                "decide what these data say; leave rows out that are faults of measurement, which cuts the "
-                f"record there: {without_option(rows)}",
-                where=output,
-                share=one.share,
-                times=[float(data.time[at]) for at in one.samples],
-                rows=[row for _, row, _ in rows],
-            )
+        message = (
+            f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
+            f"{100 * one.share:.3g} % of the squares of its residuals (at "
+            f"{places(units, data, one.samples)}): spikes, or events that the model does not know, decide "
+            "what these data say; leave rows out that are faults of measurement, which cuts the record "
+            f"there: {without_option(rows)}"
         )
-    return found
+        times, at = [float(data.time[at]) for at in one.samples], [row for _, row, _ in rows]
+        yield SPIKES.found(message, where=output, share=one.share, times=times, rows=at)

@@ -7,18 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, refuted
 from inputdesign_cli.findings.places import Samples, file_of, of_file, without_option
 from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.shares import chance
 
-LEVEL_SHIFT = FindingKind(
+LEVEL_SHIFT = refuted(
     "level-shift",
-    Severity.REFUTED,
-    "an output shifts without an input",
-    "An output rises or falls at one time and stays there, though no input causes it. The model takes the "
-    "shift for an effect of the inputs.",
+    "An output shifts without an input. An output rises or falls at one time and stays there, though no "
+    "input causes it. The model takes the shift for an effect of the inputs.",
     "Leave the shift out with `--without`, which gives each part its own level, or log what changed as one "
     "more input.",
 )
@@ -30,15 +28,13 @@ def shifted_levels(estimate: Estimate, data: Samples, time_unit: str) -> list[Fi
         return []
     every = np.arange(len(data.y))
     what, runs = _described(estimate.shifted, data, data.recorded.rows, every, time_unit)
-    return [
-        LEVEL_SHIFT.found(
-            f"{what}: did a load change, or the gain? The model takes it for what the inputs do. Leave it "
-            f"out, which gives each part a level of its own: {without_option(runs)}; or log what changed as "
-            "one more input",
-            probability=chance_of_shifts(estimate.shifted)[0],
-            rows=[[first, last] for _, first, last in runs],
-        )
-    ]
+    message = (
+        f"{what}: did a load change, or the gain? The model takes it for what the inputs do. Leave it out, "
+        f"which gives each part a level of its own: {without_option(runs)}; or log what changed as one more "
+        "input"
+    )
+    rows = [[first, last] for _, first, last in runs]
+    return [LEVEL_SHIFT.found(message, probability=chance_of_shifts(estimate.shifted)[0], rows=rows)]
 
 
 def left_out(
@@ -73,8 +69,8 @@ def _described(
         at, first, last = samples[[shift.sample, shift.begins, shift.ends - 1]].tolist()
         output = signal_name("y", shift.output, record.y.shape[1])
         events.append(
-            f"{output} {'rises' if shift.rises else 'falls'} about row {rows[at]}"
-            f"{of_file(record, at)} ({record.time[at]:.6g} {time_unit})"
+            f"{output} {'rises' if shift.rises else 'falls'} about row {rows[at]}{of_file(record, at)} "
+            f"({record.time[at]:.6g} {time_unit})"
         )
         runs.append((file_of(record.files, at), int(rows[first]), int(rows[last])))
     return (

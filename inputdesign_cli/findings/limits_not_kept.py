@@ -9,17 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt
 from inputdesign_cli.outcome import Powers, Signal
 
 _ROUNDING = 1e-9
 
-LIMIT_NOT_KEPT = FindingKind(
+LIMIT_NOT_KEPT = doubt(
     "limit-not-kept",
-    Severity.DOUBT,
-    "the given excitation breaks a limit",
-    "An excitation that is given is analysed as it stands. Its powers, its samples and its length are "
-    "compared with `limits`. Each limit that it exceeds is named.",
+    "The given excitation breaks a limit. An excitation that is given is analysed as it stands. Its powers, "
+    "its samples and its length are compared with `limits`. Each limit that it exceeds is named.",
     "Scale or shorten the excitation, or widen the limit.",
 )
 
@@ -37,8 +35,8 @@ class StatedLimits:
 
 def limits_not_kept(
     limits: StatedLimits, samples: int, power: Powers, signal: Signal | None
-) -> list[Finding]:
-    """Return a finding for each limit that the excitation does not keep.
+) -> Iterator[Finding]:
+    """Yield a finding for each limit that the excitation does not keep.
 
     Args:
         limits: the limits in the spec.
@@ -46,56 +44,31 @@ def limits_not_kept(
         power: of the excitation, by channel.
         signal: the statements about its record; None without one.
     """
-    single = [] if signal is None else _single_samples(limits, signal)
-    return [*_powers(limits, power), *single, *_length(limits, samples)]
-
-
-def _powers(limits: StatedLimits, power: Powers) -> Iterator[Finding]:
     channels = {"input": power.input, "output": power.output, "excitation": power.excitation}
     for limit in limits.powers:
-        found = channels[limit.kind] or ()
+        found, key, most = channels[limit.kind] or (), limit.key, limit.bound
         value, of = sum(found), str(limit.kind)
         if limit.channel is not None:
             value, of = found[limit.channel], f"{limit.kind} {limit.channel + 1}"
-        beyond = value / limit.bound if limit.upper else limit.bound / max(value, 1e-300)
+        beyond = value / most if limit.upper else most / max(value, 1e-300)
+        side = "above" if limit.upper else "below"
+        message = f"{key} is not kept: the power of {of} is {value:.6g}, {side} {most:.6g}"
         if beyond > 1.0 + _ROUNDING:
-            side = "above" if limit.upper else "below"
-            yield LIMIT_NOT_KEPT.found(
-                f"{limit.key} is not kept: the power of {of} is {value:.6g}, {side} {limit.bound:.6g}",
-                where=limit.key,
-                value=value,
-                limit=limit.bound,
-            )
-
-
-def _single_samples(limits: StatedLimits, signal: Signal) -> Iterator[Finding]:
-    stated = (
-        ("limits.amplitude.input", limits.input, signal.input_peak),
-        ("limits.amplitude.output", limits.output, signal.output_peak),
-        ("limits.rate", limits.rate, signal.input_move),
-    )
-    for key, bound, found in stated:
-        if bound is None or found is None:
+            yield LIMIT_NOT_KEPT.found(message, where=key, value=value, limit=most)
+    for key, bound, peaks in (
+        ("limits.amplitude.input", limits.input, signal and signal.input_peak),
+        ("limits.amplitude.output", limits.output, signal and signal.output_peak),
+        ("limits.rate", limits.rate, signal and signal.input_move),
+    ):
+        if bound is None or peaks is None:
             continue
-        pairs = zip(found, np.broadcast_to(bound, len(found)).tolist(), strict=True)
+        pairs = zip(peaks, np.broadcast_to(bound, len(peaks)).tolist(), strict=True)
         for channel, (value, most) in enumerate(pairs, start=1):
+            of = f" of channel {channel}" if len(peaks) > 1 else ""
+            message = f"{key} is not kept: the record reaches {value:.6g}{of}, above {most:.6g}"
             if value > most * (1.0 + _ROUNDING):
-                of = f" of channel {channel}" if len(found) > 1 else ""
-                yield LIMIT_NOT_KEPT.found(
-                    f"{key} is not kept: the record reaches {value:.6g}{of}, above {most:.6g}",
-                    where=key,
-                    value=value,
-                    limit=most,
-                    channel=channel,
-                )
-
-
-def _length(limits: StatedLimits, samples: int) -> Iterator[Finding]:
-    most = limits.samples
-    if most is not None and samples > most:
-        yield LIMIT_NOT_KEPT.found(
-            f"limits.samples is not kept: the experiment has {samples} samples, more than {most}",
-            where="limits.samples",
-            value=samples,
-            limit=most,
-        )
+                yield LIMIT_NOT_KEPT.found(message, where=key, value=value, limit=most, channel=channel)
+    key, longest = "limits.samples", limits.samples
+    if longest is not None and samples > longest:
+        message = f"{key} is not kept: the experiment has {samples} samples, more than {longest}"
+        yield LIMIT_NOT_KEPT.found(message, where=key, value=samples, limit=longest)

@@ -7,14 +7,14 @@ with these data.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, Severity, doubt, note
 from inputdesign_cli.findings.refuted_structure import REMEDY
 from inputdesign_cli.identification import RISING, Directed, Estimate, Moves, that_matter
 from inputdesign_cli.outcome import Neglected as Entry
@@ -25,20 +25,17 @@ from inputdesign_cli.plant import Model
 # Two-sided 95 % of the normal distribution.
 _ALLOWED = 1.959963984540054
 
-MATTERS = FindingKind(
+MATTERS = doubt(
     "neglected-parameter",
-    Severity.DOUBT,
-    "a neglected parameter would move G too far",
-    "No test refutes the model. But one more parameter is likely, and it would move G by more than the "
-    "admissible error allows beside the error of the estimate.",
+    "A neglected parameter would move G too far. No test refutes the model. But one more parameter is "
+    "likely, and it would move G by more than the admissible error allows beside the error of the estimate.",
     "Estimate the parameter along, or excite the frequencies where G would move.",
 )
-RESTS_ON_STRUCTURE = FindingKind(
+RESTS_ON_STRUCTURE = note(
     "verdict-rests-on-structure",
-    Severity.NOTE,
-    "the verdict rests on the structure",
-    "The data do not rule out one more parameter, or a gain that changes evenly, which would move G by more "
-    "than is admitted. With 95 % confidence it moves G by no more than the message says.",
+    "The verdict rests on the structure. The data do not rule out one more parameter, or a gain that "
+    "changes evenly, which would move G by more than is admitted. With 95 % confidence it moves G by no "
+    "more than the message says.",
     "Excite the frequencies where G would move, if the structure is not known from physics.",
 )
 
@@ -100,24 +97,19 @@ def mattering(found: Sequence[Neglected]) -> list[Neglected]:
     return [found[i] for i in that_matter([one.directed for one in found], [one.moves for one in found])]
 
 
-def objections(units: Units, found: Sequence[Neglected], *, met: bool) -> list[Finding]:
-    """Return a finding for each parameter that matters, which contradicts a verdict of `met`."""
+def objections(units: Units, found: Sequence[Neglected], *, met: bool) -> Iterator[Finding]:
+    """Yield a finding for each parameter that matters, which contradicts a verdict of `met`."""
     severity = Severity.REFUTED if met else Severity.DOUBT  # more parameters miss it all the more
-    return [
-        MATTERS.found(
-            f"{one.directed.alternatives[0].phrase} would move G by "
-            f"{one.moves.largest:.3g} times the admissible error about {units.named(one.frequency)}"
-            f"{'' if one.moves.largest > 1.0 else ', beyond it with the error of the estimate,'} "
-            f"(probability {chance(one.directed.test.probability)} without it): "
-            f"{REMEDY[one.directed.test.fault]}",
-            where=one.directed.test.name,
-            severity=severity,
-            moves=one.moves.largest,
-            may_move=one.may_move,
-            probability=one.directed.test.probability,
+    for one in mattering(found):
+        test, moves = one.directed.test, one.moves.largest
+        along = "" if moves > 1.0 else ", beyond it with the error of the estimate,"
+        message = (
+            f"{one.directed.alternatives[0].phrase} would move G by {moves:.3g} times the admissible error "
+            f"about {units.named(one.frequency)}{along} (probability {chance(test.probability)} without "
+            f"it): {REMEDY[test.fault]}"
         )
-        for one in mattering(found)
-    ]
+        figures = {"moves": moves, "may_move": one.may_move, "probability": test.probability}
+        yield MATTERS.found(message, where=test.name, severity=severity, **figures)
 
 
 def unseen(units: Units, found: Sequence[Neglected]) -> list[Finding]:
@@ -128,12 +120,9 @@ def unseen(units: Units, found: Sequence[Neglected]) -> list[Finding]:
     worst = next((one for one in largest if one.may_move > 1.0), None)
     if worst is None:
         return []
-    return [
-        RESTS_ON_STRUCTURE.found(
-            f"the verdict rests on the structure of the model: {worst.directed.alternatives[0].phrase} that "
-            f"these data do not rule out would move G by up to {worst.may_move:.3g} times the admissible "
-            f"error, at {units.named(worst.frequency)} (95 %)",
-            where=worst.directed.test.name,
-            may_move=worst.may_move,
-        )
-    ]
+    message = (
+        f"the verdict rests on the structure of the model: {worst.directed.alternatives[0].phrase} that "
+        f"these data do not rule out would move G by up to {worst.may_move:.3g} times the admissible error, "
+        f"at {units.named(worst.frequency)} (95 %)"
+    )
+    return [RESTS_ON_STRUCTURE.found(message, where=worst.directed.test.name, may_move=worst.may_move)]

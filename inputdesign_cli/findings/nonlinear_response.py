@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, Severity, doubt, unsure
 from inputdesign_cli.identification.cubes import Cubes
 from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.outcome.units import Units
@@ -22,21 +22,19 @@ _WAYS = 2
 MATTERS = 0.5
 """From this share of what is admitted on, a quarter in mean square, a change leaves a verdict open."""
 
-SILENT_LINES = FindingKind(
+SILENT_LINES = doubt(
     "silent-lines-answer",
-    Severity.DOUBT,
-    "outputs answer at lines that are not excited",
-    "A linear plant answers only at the lines of its input. A nonlinearity of odd degree answers at odd "
-    "harmonics, one of even degree at even ones. An F test compares the power there with the noise.",
-    "Look at the plant for saturation, dead zones and backlash. See whether the input was applied "
-    "as recorded.",
+    "Outputs answer at lines that are not excited. A linear plant answers only at the lines of its input. A "
+    "nonlinearity of odd degree answers at odd harmonics, one of even degree at even ones. An F test "
+    "compares the power there with the noise.",
+    "Look at the plant for saturation, dead zones and backlash. See whether the input was applied as "
+    "recorded.",
 )
-NONLINEAR = FindingKind(
+NONLINEAR = unsure(
     "nonlinear-response",
-    Severity.UNDECIDED,
-    "a nonlinearity changes the measured response",
-    "Odd lines that are not excited show by how much a nonlinearity of odd degree changes the response. From "
-    "half of what is admitted on, the response is not called met.",
+    "A nonlinearity changes the measured response. Odd lines that are not excited show by how much a "
+    "nonlinearity of odd degree changes the response. From half of what is admitted on, the response is not "
+    "called met.",
     "Measure at a smaller amplitude, or with other phases, and see whether the response stays. More periods "
     "do not help.",
     "nonlinearity",
@@ -66,7 +64,7 @@ class Distorted:
     @property
     def share(self) -> float:
         """Return the largest share."""
-        return float(self.shares[self.line])
+        return float(self.shares.max())
 
     @property
     def matters(self) -> bool:
@@ -110,18 +108,17 @@ def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:
 
 def silent_lines_answer(silent: Mapping[str, SilentLines]) -> list[Finding]:
     """Return a finding for each kind of lines, odd or even, with more than noise."""
-    return [
-        SILENT_LINES.found(
-            f"the outputs answer at {kind} lines that are not excited (rms "
-            f"{', '.join(f'{value:.3g}' for value in found.rms)}, probability of chance {chance:.2g}). "
-            f"Either a nonlinearity of {kind} degree acts, or an input was not applied as recorded",
-            where=kind,
-            probability=chance,
-            rms=found.rms.tolist(),
+    seen = []
+    for kind, found in silent.items():
+        chance, rms = _chance(silent, kind), ", ".join(f"{value:.3g}" for value in found.rms)
+        message = (
+            f"the outputs answer at {kind} lines that are not excited (rms {rms}, probability of chance "
+            f"{chance:.2g}). Either a nonlinearity of {kind} degree acts, or an input was not applied as "
+            "recorded"
         )
-        for kind, found in silent.items()
-        if (chance := _chance(silent, kind)) < _SPEAKS
-    ]
+        if chance < _SPEAKS:
+            seen.append(SILENT_LINES.found(message, where=kind, probability=chance, rms=found.rms.tolist()))
+    return seen
 
 
 def nonlinear_response(
@@ -134,26 +131,16 @@ def nonlinear_response(
     """
     if found is None:
         return []
-    at, severity = f"at {w[found.line]:.3g} {units.per_time}", Severity.NOTE
-    message = (
-        f"a nonlinearity changes the response by little: about {found.share:.2g} of what is admitted, {at}"
-    )
+    frequency, severity = float(w[found.line]), Severity.NOTE
+    change = f"about {found.share:.2g} of what is admitted, at {frequency:.3g} {units.per_time}"
+    message = f"a nonlinearity changes the response by little: {change}"
     if found.matters:
         severity = Severity.DOUBT if decided else Severity.UNDECIDED
         cause = f"the cube of {found.cubed}" if found.cubed else "a nonlinearity"
         message = (
-            f"{cause} changes the response by about {found.share:.2g} of what is admitted, {at}. Odd lines "
-            f"that are not excited show it (probability of chance {found.probability:.2g}). More periods do "
-            "not help: measure at a smaller amplitude, or with other phases, and see whether the response "
-            "stays"
+            f"{cause} changes the response by {change}. Odd lines that are not excited show it (probability "
+            f"of chance {found.probability:.2g}). More periods do not help: measure at a smaller amplitude, "
+            "or with other phases, and see whether the response stays"
         )
-    return [
-        NONLINEAR.found(
-            message,
-            severity=severity,
-            share=found.share,
-            frequency=float(w[found.line]),
-            cubed=found.cubed or None,
-            probability=found.probability,
-        )
-    ]
+    figures = {"share": found.share, "frequency": frequency, "cubed": found.cubed or None}
+    return [NONLINEAR.found(message, severity=severity, **figures, probability=found.probability)]

@@ -3,60 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import combinations
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import DataError, Location
+from inputdesign_cli.finding import Finding, note, refuted
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.levels import level
 from inputdesign_cli.outcome.shares import chance
 
-PRIOR_COUNTS = FindingKind(
+PRIOR_COUNTS = note(
     "prior-counts",
-    Severity.NOTE,
-    "the prior counts for the estimate",
-    "`experiment.prior` has its parameters. Estimate, covariance and accuracy are those of prior and data "
-    "together.",
+    "The prior counts for the estimate. `experiment.prior` has its parameters. Estimate, covariance and "
+    "accuracy are those of prior and data together.",
     "Remove the prior to see what the data say alone.",
 )
-PRIOR_LEFT_OUT = FindingKind(
+PRIOR_LEFT_OUT = note(
     "prior-left-out",
-    Severity.NOTE,
-    "the prior does not count",
-    "`experiment.prior` is information without the parameters that it belongs to. It cannot count for an "
-    "estimate, nor for a verdict.",
+    "The prior does not count. `experiment.prior` is information without the parameters that it belongs to. "
+    "It cannot count for an estimate, nor for a verdict.",
     "Write its parameters beside the matrix, name the `model.yaml` of the earlier data, or give their "
     "records as further files.",
 )
-PRIOR_CONTRADICTED = FindingKind(
+PRIOR_CONTRADICTED = refuted(
     "prior-contradicted",
-    Severity.REFUTED,
-    "prior and data contradict each other",
-    "The estimate from the data alone differs from that of the prior by more than their covariances explain.",
+    "Prior and data contradict each other. The estimate from the data alone differs from that of the prior "
+    "by more than their covariances explain.",
     "Remove the prior, or look for what has changed since.",
 )
-PRIOR_REPEATED = FindingKind(
+PRIOR_REPEATED = refuted(
     "prior-of-these-data",
-    Severity.REFUTED,
-    "the prior seems to be made of these data",
-    "Prior and data agree more closely than two independent records do. The same samples would count twice.",
+    "The prior seems to be made of these data. Prior and data agree more closely than two independent "
+    "records do. The same samples would count twice.",
     "Leave the prior out, or give only records that it was not made of.",
 )
-RECORDS_DIFFER = FindingKind(
+RECORDS_DIFFER = refuted(
     "records-differ",
-    Severity.REFUTED,
-    "records are not of one system",
-    "Parameters that are estimated from each record alone differ by more than chance.",
+    "Records are not of one system. Parameters that are estimated from each record alone differ by more "
+    "than chance.",
     "Assess each record alone, and look for what has changed between them.",
 )
-SAMPLES_REPEATED = FindingKind(
+SAMPLES_REPEATED = refuted(
     "samples-repeated",
-    Severity.REFUTED,
-    "samples seem to be given twice",
-    "Residuals of one part follow those of another as noise does not, or two files have rows in common. "
-    "Samples that count twice make an estimate look surer than it is.",
+    "Samples seem to be given twice. Residuals of one part follow those of another as noise does not, or "
+    "two files have rows in common. Samples that count twice make an estimate look surer than it is.",
     "Give each sample once. If the input comes again, raise the orders of the model.",
 )
+
+
+# This many rows in a row, half of them different, come again in another record by copying only.
+_IN_A_ROW = 8
+# A record of which this share stands in another is a copy; a smaller part is a finding.
+_COPY, _PART = 0.95, 0.1
+_PRIOR = "experiment.prior"
 
 
 def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
@@ -66,14 +69,14 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
     if estimate.agreement is None:
         message = (
             "experiment.prior does not count for this estimate: it is information without the parameters "
-            "that it belongs to; write parameters: {b1: 3.6, ..} beside a matrix, name the model.yaml of the "
-            "earlier data, or give their records as further files"
+            "that it belongs to; write parameters: {b1: 3.6, ..} beside a matrix, name the model.yaml of "
+            "the earlier data, or give their records as further files"
         )
-        return [PRIOR_LEFT_OUT.found(message, where="experiment.prior")]
+        return [PRIOR_LEFT_OUT.found(message, where=_PRIOR)]
     counted = (
         "experiment.prior counts: estimate, covariance and accuracy are those of prior and data together"
     )
-    return [PRIOR_COUNTS.found(counted, where="experiment.prior"), *contradictions(estimate)]
+    return [PRIOR_COUNTS.found(counted, where=_PRIOR), *contradictions(estimate)]
 
 
 def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
@@ -82,29 +85,20 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     Args:
         looks: how often it is asked as data come in; they share the level (Bonferroni).
     """
-    if estimate.agreement is None or estimate.likeness is None:
-        return []
-    if estimate.agreement * looks < level("prior"):
-        return [
-            PRIOR_CONTRADICTED.found(
-                "experiment.prior and these data contradict each other (probability "
-                f"{chance(estimate.agreement)} for one system): remove the prior, or look for what has "
-                "changed since",
-                where="experiment.prior",
-                probability=estimate.agreement,
-            )
-        ]
-    if estimate.likeness * looks < level("prior"):
-        return [
-            PRIOR_REPEATED.found(
-                "experiment.prior and these data agree more closely than others do (probability "
-                f"{chance(estimate.likeness)}): the prior seems to be made of this record, or of a part or "
-                "copy of it, which would count twice; leave it out, or give only records that it was not "
-                "made of",
-                where="experiment.prior",
-                probability=estimate.likeness,
-            )
-        ]
+    agreement, likeness = estimate.agreement, estimate.likeness
+    if agreement is not None and agreement * looks < level("prior"):
+        message = (
+            f"experiment.prior and these data contradict each other (probability {chance(agreement)} for "
+            "one system): remove the prior, or look for what has changed since"
+        )
+        return [PRIOR_CONTRADICTED.found(message, where=_PRIOR, probability=agreement)]
+    if likeness is not None and likeness * looks < level("prior"):
+        message = (
+            "experiment.prior and these data agree more closely than others do (probability "
+            f"{chance(likeness)}): the prior seems to be made of this record, or of a part or copy of it, "
+            "which would count twice; leave it out, or give only records that it was not made of"
+        )
+        return [PRIOR_REPEATED.found(message, where=_PRIOR, probability=likeness)]
     return []
 
 
@@ -114,26 +108,16 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
     Args:
         looks: see `contradictions`.
     """
-    found = [
-        (probability, name)
-        for probability, name in zip(estimate.alike, files, strict=False)
-        if probability * len(estimate.alike) * looks < level("one system")
-    ]
-    if not found:
+    probability, name = min(zip(estimate.alike, files, strict=False), default=(1.0, ""))
+    if not estimate.alike or probability * len(estimate.alike) * looks >= level("one system"):
         return []
-    probability, name = min(found)
     others = [other for other in files if other != name]
     against = others[0] if len(others) == 1 else "the other records"
-    return [
-        RECORDS_DIFFER.found(
-            f"{name} and {against} are not of one system (probability {chance(probability)} that their "
-            "parameters differ as much by chance): assess each alone, and look for what has changed between "
-            "them",
-            where=name,
-            probability=probability,
-            against=against,
-        )
-    ]
+    message = (
+        f"{name} and {against} are not of one system (probability {chance(probability)} that their "
+        "parameters differ as much by chance): assess each alone, and look for what has changed between them"
+    )
+    return [RECORDS_DIFFER.found(message, where=name, probability=probability, against=against)]
 
 
 def repetitions(
@@ -148,21 +132,59 @@ def repetitions(
     repeated = estimate.repeated
     if repeated is None:
         return list(copies)
-    files = files or [("the record", repeated.second + repeated.length)]
+    size = repeated.length
+    files = files or [("the record", repeated.second + size)]
     ends = np.cumsum([samples for _, samples in files])
     # By their middle: the ends are not sharp.
-    first, second = (
-        files[int(np.searchsorted(ends, at + repeated.length // 2, side="right"))][0]
-        for at in (repeated.first, repeated.second)
-    )
+    middles = np.array([repeated.first, repeated.second]) + size // 2
+    first, second = (files[at][0] for at in np.searchsorted(ends, middles, side="right"))
     where = "others there" if first == second else f"those of {first}"
-    return [
-        SAMPLES_REPEATED.found(
-            f"the residuals of about {repeated.length} samples of {second} follow {where} as noise does not: "
-            "either samples are given twice, which makes the estimate look surer than it is (give each "
-            "once), or the model lacks something that comes again with the same input (raise its orders)",
-            where=second,
-            samples=repeated.length,
-            of=first,
+    message = (
+        f"the residuals of about {size} samples of {second} follow {where} as noise does not: either "
+        "samples are given twice, which makes the estimate look surer than it is (give each once), or the "
+        "model lacks something that comes again with the same input (raise its orders)"
+    )
+    return [SAMPLES_REPEATED.found(message, where=second, samples=size, of=first)]
+
+
+def shared(one: Array, other: Array) -> NDArray[np.bool_]:
+    """Return which rows (n,) of `one` (n, c) stand in `other` (m, c), in the same order."""
+    rows = np.unique(np.concatenate([one, other]), axis=0, return_inverse=True)[1].ravel()
+    found = np.zeros(len(one), dtype=bool)
+    if min(len(one), len(other)) < _IN_A_ROW:
+        return found
+    ours, theirs = (
+        np.lib.stride_tricks.sliding_window_view(part, _IN_A_ROW) for part in np.split(rows, [len(one)])
+    )
+    several = np.sum(np.diff(np.sort(ours, axis=1), axis=1) > 0, axis=1) >= _IN_A_ROW // 2
+    stretches = np.unique(np.concatenate([ours, theirs]), axis=0, return_inverse=True)[1].ravel()
+    again = several & np.isin(stretches[: len(ours)], stretches[len(ours) :])
+    for start in range(_IN_A_ROW):
+        found[start : start + len(again)] |= again
+    return found
+
+
+def samples_repeated(paths: Sequence[Path], records: Sequence[Array]) -> list[Finding]:
+    """Say which files, each (n, c) as it stands there, have a part in common.
+
+    Raises:
+        DataError: `data-repeated`, one holds what another does.
+    """
+    found = []
+    for (other, others), (path, rows) in combinations(zip(paths, records, strict=True), 2):
+        ours, theirs = shared(rows, others), shared(others, rows)
+        share, count = max(ours.mean(), theirs.mean()), int(ours.sum())
+        if share >= _COPY:
+            message = (
+                f"{path.name} and {other.name} hold the same samples: counted twice, they would make the "
+                "estimate look more accurate than it is"
+            )
+            where = Location(str(path), 1, 1, "")
+            raise DataError.because("data-repeated", message, "give each record once", "", where)
+        message = (
+            f"{count} of {len(ours)} samples of {path.name} stand in {other.name} as well. Counted twice, "
+            "they make the estimate look more accurate than it is."
         )
-    ]
+        of = {"samples": count, "of": len(ours), "other": other.name}
+        found += [SAMPLES_REPEATED.found(message, where=path.name, **of)] if share >= _PART else []
+    return found

@@ -1,4 +1,4 @@
-"""Values of a record stand far from all others: spikes are replaced, other ones are named and kept."""
+"""Values of a record stand far from all others, at the end of a range, or on coarse steps."""
 
 from __future__ import annotations
 
@@ -9,25 +9,31 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity, listed
-from inputdesign_cli.findings.sensor_limits import sensor_limits
-from inputdesign_cli.outcome.shares import per_cent
+from inputdesign_cli.finding import Finding, listed, note
 
-OUTLYING_VALUES = FindingKind(
+OUTLYING_VALUES = note(
     "outlying-values",
-    Severity.NOTE,
-    "values stand far from all others",
-    "Values are more than eight robust standard deviations from the median or from their neighbours. The "
-    "inputs do not explain them. They are kept.",
+    "Values stand far from all others. They are more than eight robust standard deviations from the median, "
+    "and the inputs do not explain them. They are kept.",
     "Look at the record. Leave faults of measurement out with `--without`.",
 )
-SPIKES_REPLACED = FindingKind(
+SPIKES_REPLACED = note(
     "spikes-replaced",
-    Severity.NOTE,
-    "single spikes were replaced by interpolation",
-    "One sample is more than twelve robust standard deviations from a running median, and its neighbours are "
-    "not. The inputs do not explain it. The mean of its neighbours counts instead.",
+    "Single spikes were replaced by interpolation. One sample is more than twelve robust standard "
+    "deviations from a running median, and its neighbours are not. The inputs do not explain it.",
     "Nothing, if it is a fault of measurement. To cut the record there instead, use `--without`.",
+)
+SENSOR_SATURATED = note(
+    "sensor-saturated",
+    "An output stays at its largest or smallest value. A sensor at the end of its range shows one value "
+    "while the plant moves on. Two per cent of the samples or more, in runs of three or more, are there.",
+    "Leave these rows out with `--without`, or measure with another range.",
+)
+SENSOR_ROUNDED = note(
+    "sensor-rounded",
+    "An output moves in visible steps. All values lie on a grid, whose step is more than a tenth of the "
+    "standard deviation. Rounding acts as noise.",
+    "Log with more digits, or excite with larger moves.",
 )
 
 # Farther off than this many robust standard deviations.
@@ -42,11 +48,12 @@ _EXTREME = 1e18
 # Beside a value this many times farther off than any other, all others are lost in rounding when squared.
 _ABSURD = 1e10
 # How far back an input is taken to act, and the samples from which that is estimated: this is a quick look.
-_LAGS, _MOST, _RIDGE = 150, 5000, 1e-9
-_PER_LAG = 6
+_LAGS, _MOST, _RIDGE, _PER_LAG = 150, 5000, 1e-9, 6
 _PASSES, _USUAL = 3, 4.0
-# Of an autoregression, with this many samples to a parameter at least: enough for a few resonances.
-_ORDER = 8
+# Levels, and the share of samples at the end of a range; the share of a step by which rounded values are off
+# their grid, and the step in standard deviations.
+_FEW_LEVELS, _CLIPPED, _RUN = 10, 0.02, 3
+_OFF_GRID, _COARSE = 1e-3, 0.1
 
 
 def without_spikes(
@@ -62,7 +69,7 @@ def without_spikes(
     r, found, plain = u.shape[1], [], y.copy()
     for name, x in zip(names[:r], u.T, strict=True):
         there = np.flatnonzero(~np.isnan(x) & counts)
-        found += outlying_inputs(name, x[there], rows[there])
+        found += outlying(name, x[there], None, rows[there])
     for name, x in zip(names[r:], plain.T, strict=True):
         there = np.flatnonzero(~np.isnan(x) & counts)
         inputs, values = u[there], x[there]
@@ -70,7 +77,7 @@ def without_spikes(
         found += _replaced(name, values, at, rows[there])
         values[at] = 0.5 * (values[at - 1] + values[np.minimum(at + 1, len(values) - 1)])
         x[there] = values
-        found += [*outlying_outputs(name, values, inputs, rows[there]), *sensor_limits(name, values)]
+        found += [*outlying(name, values, inputs, rows[there]), *sensor_limits(name, values)]
     return plain, found
 
 
@@ -80,8 +87,7 @@ def single_spikes(y: Array, u: Array) -> NDArray[np.int64]:
         return np.zeros(0, dtype=np.int64)
     at = _spikes(y)
     if at.size:
-        rest = y - _caused(u, y)
-        at = np.intersect1d(at, _spikes(rest))
+        at = np.intersect1d(at, _spikes(y - _caused(u, y)))
     return at if at.size <= max(1, _SELDOM * y.size) else at[:0]
 
 
@@ -100,50 +106,52 @@ def _replaced(name: str, y: Array, at: NDArray[np.int64], lines: NDArray[np.int6
     if not at.size:
         return []
     first = int(at[0])
+    said = f"{name} has {len(at)} single spikes ({listed(lines[at])}). Interpolation replaces them."
     if len(at) == 1:
         around = 0.5 * (y[first - 1] + y[first + 1])
-        said = f"{name} has a spike in row {lines[first]}: {y[first]:.6g} between values about {around:.6g}."
-    else:
-        said = f"{name} has {len(at)} single spikes ({listed(lines[at])})."
-    more = "Interpolation replaces it." if len(at) == 1 else "Interpolation replaces them."
-    rows, values = lines[at].tolist(), y[at].tolist()
-    return [SPIKES_REPLACED.found(f"{said} {more}", where=name, rows=rows, values=values)]
+        said = f"{name} has a spike in row {lines[first]}: {y[first]:.6g} between values about {around:.6g}. "
+        said += "Interpolation replaces it."
+    return [SPIKES_REPLACED.found(said, where=name, rows=lines[at].tolist(), values=y[at].tolist())]
 
 
-def outlying_inputs(name: str, x: Array, lines: NDArray[np.int64]) -> list[Finding]:
-    """Say which values of an input x (n,), with their rows in the file, are far from the median."""
-    return _outlying(name, _far(x), x, lines)
+def outlying(name: str, x: Array, u: Array | None, lines: NDArray[np.int64]) -> list[Finding]:
+    """Say which values of a signal x (n,), with their rows in the file, are far from the median.
 
-
-def outlying_outputs(name: str, y: Array, u: Array, lines: NDArray[np.int64]) -> list[Finding]:
-    """Say which values of an output y (n,) are far from the median, or from their neighbours.
-
-    What the inputs u (n, r), NaN where missing, explain is neither: a plant answers pulses and jumps. Nor is
-    a swing that the values before it explain.
+    Of an output, what the inputs u (n, r), NaN where missing, explain is not: a plant answers pulses.
     """
-    far, alone = _far(y), _alone(y)
-    if np.any(far) or np.any(alone):
-        rest = y - _caused(u, y)
-        far, alone = far & _far(rest), alone & _unforeseen(rest, _alone(rest))
-    found = _outlying(name, far, y, lines)
-    if found or alone.sum() <= _OFTEN * y.size:
-        return found
-    said = f"{name} has {alone.sum()} values ({per_cent(alone.mean(), 2)}) far from their neighbours"
-    return [
-        OUTLYING_VALUES.found(
-            f"{said} ({listed(lines[alone])}). Look whether they are spikes.",
-            where=name,
-            values=int(alone.sum()),
-        )
-    ]
-
-
-def _outlying(name: str, far: NDArray[np.bool_], x: Array, lines: NDArray[np.int64]) -> list[Finding]:
+    far = _far(x)
+    if u is not None and np.any(far):
+        far &= _far(x - _caused(u, x))
     count = int(far.sum())
     if not 0 < count <= _OFTEN * x.size:
         return []
     said = f"{name} has {count} outlying value{'s' * (count > 1)} ({listed(lines[far])}): look at the record."
     return [OUTLYING_VALUES.found(said, where=name, values=count, rows=lines[far][:5].tolist())]
+
+
+def sensor_limits(name: str, x: Array) -> list[Finding]:
+    """Say whether a measured signal x (n,) stays at an extreme value, or moves in visible steps."""
+    levels, found, spread = np.unique(x), [], float(np.std(x))
+    for word, at in (("largest", x == levels[-1]), ("smallest", x == levels[0])):
+        value = float(levels[-1] if word == "largest" else levels[0])
+        at[: int(np.argmin(at))] = False  # at the beginning it may be at rest, before the input moves
+        runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
+        stays = int(runs[runs >= _RUN].sum())
+        if levels.size > _FEW_LEVELS and stays > _CLIPPED * x.size:
+            said = f"{name} stays at its {word} value {value:.6g} for {stays} samples: is it saturated?"
+            found.append(SENSOR_SATURATED.found(said, where=name, value=value, samples=stays))
+    gaps = np.diff(levels)
+    step = float(gaps.min(initial=np.inf))
+    # Values that are not rounded hardly come again.
+    rounded = step < np.inf and 2 * levels.size < x.size
+    if (
+        rounded
+        and step > _COARSE * spread
+        and np.all(np.abs(gaps / step - np.round(gaps / step)) < _OFF_GRID)
+    ):
+        said = f"{name} is rounded to steps of {step:.3g}, {step / spread:.2f} of its standard deviation."
+        found.append(SENSOR_ROUNDED.found(said, where=name, step=step, share=step / spread))
+    return found
 
 
 def spread_of(x: Array) -> float:
@@ -156,67 +164,32 @@ def spread_of(x: Array) -> float:
 
 def _far(x: Array) -> NDArray[np.bool_]:
     spread = spread_of(x)
-    return np.abs(x - np.median(x)) > _OUTLYING * spread if spread > 0.0 else np.zeros(x.size, dtype=bool)
-
-
-def _alone(x: Array) -> NDArray[np.bool_]:
-    """Return whether a value is far from the median of the five about it."""
-    found = np.zeros(x.size, dtype=bool)
-    if x.size >= _SHORTEST:
-        off = np.abs(x[2:-2] - np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1))
-        found[2:-2] = (off > _OUTLYING * 1.4826 * np.median(off)) & (np.median(off) > 0.0)
-    return found
+    return np.abs(x - np.median(x)) > (_OUTLYING * spread if spread > 0.0 else np.inf)
 
 
 def _caused(u: Array, y: Array) -> Array:
     """Return the part (n,) of an output that past inputs explain, by a finite impulse response."""
     u = u[:, ~np.all(np.isnan(u), axis=0)]
-    if not u.size:
+    lags = min(_LAGS, len(y) // (_PER_LAG * max(u.shape[1], 1))) if u.size else 0
+    if lags == 0:
         return np.zeros(y.size)
     there = np.where(np.isnan(u), np.nanmedian(u, axis=0), u)
-    scaled = (there - there.mean(axis=0)) / np.maximum(np.abs(there).max(axis=0), np.finfo(float).tiny)
-    samples, r = scaled.shape
-    lags = min(_LAGS, samples // (_PER_LAG * r))
-    if lags == 0:
-        return np.zeros(samples)
-    moved, some = scaled - scaled[0], slice(lags, _MOST)
+    moved = (there - there[0]) / np.maximum(np.abs(there).max(axis=0), np.finfo(float).tiny)
     columns = np.column_stack([scipy.linalg.toeplitz(x[:_MOST], np.zeros(lags)) for x in moved.T])
     # Inputs from before the record act on its first samples.
     columns = np.column_stack([columns, np.ones(len(columns))])[lags:]
     level = float(np.median(y))
-    solution = _usual_solution(columns, y[some] - level)
-    responses = np.split(solution[:-1], r)
-    return sum(
-        (np.convolve(x, h)[:samples] for x, h in zip(moved.T, responses, strict=True)), level + solution[-1]
-    )
-
-
-def _unforeseen(x: Array, suspected: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which of the suspected values are far from the prediction by an autoregression of the others."""
-    order = min(_ORDER, x.size // (2 * _PER_LAG))
-    spread = spread_of(x)
-    if order == 0 or spread == 0.0 or not np.any(suspected):
-        return suspected
-    scaled = (x - np.median(x)) / spread
-    # Faults would speak for what follows them.
-    plain = np.where(suspected, scipy.ndimage.median_filter(scaled, 5), scaled)
-    columns, wanted = np.lib.stride_tricks.sliding_window_view(plain, order)[:-1], scaled[order:]
-    off = np.abs(wanted - columns @ _usual_solution(columns[:_MOST], wanted[:_MOST]))
-    found = suspected.copy()
-    found[order:] &= off > _OUTLYING * 1.4826 * np.median(off)
-    return found
-
-
-def _usual_solution(columns: Array, wanted: Array) -> Array:
-    """Least squares, in which faults do not decide what is explained."""
-    kept = np.ones(len(wanted), dtype=bool)
-    for _ in range(_PASSES):
-        theirs = columns[kept]
-        gram = theirs.T @ theirs + _RIDGE * len(columns) * np.eye(theirs.shape[1])
-        solution = np.asarray(np.linalg.solve(gram, theirs.T @ wanted[kept]), dtype=float)
+    wanted, kept = y[lags:_MOST] - level, np.ones(len(columns), dtype=bool)
+    for _ in range(_PASSES):  # faults do not decide what is explained
+        own = columns[kept]
+        gram = own.T @ own + _RIDGE * len(columns) * np.eye(own.shape[1])
+        solution = np.asarray(np.linalg.solve(gram, own.T @ wanted[kept]), dtype=float)
         off = np.abs(wanted - columns @ solution)
         kept = off <= _USUAL * np.median(off)
-    return solution
+    responses = np.split(solution[:-1], moved.shape[1])
+    return sum(
+        (np.convolve(x, h)[: len(y)] for x, h in zip(moved.T, responses, strict=True)), level + solution[-1]
+    )
 
 
 def beyond_precision(name: str, x: Array) -> tuple[int, str, str] | None:
@@ -224,21 +197,19 @@ def beyond_precision(name: str, x: Array) -> tuple[int, str, str] | None:
 
     x is NaN where samples are missing. Return None if all squares stay in range, also relative to each other.
     """
-    row, lost = int(np.nanargmax(np.abs(x))), absurd(x)
+    row, lost = int(np.nanargmax(np.abs(x))), _absurd(x)
     size = abs(float(x[row]))
     if lost is not None:
         message = f"{x[lost]:.6g} in column {name} is so large that all other values are lost in rounding"
         return lost, message, "write the value that was meant"
     if size and not 1.0 / _EXTREME < size < _EXTREME:
         message = f"the column {name} has values up to {size:.3g}: their squares leave the range of numbers"
-        hint = (
-            f"write it in another unit: below {_EXTREME:.0e}, and the largest value above {1 / _EXTREME:.0e}"
-        )
-        return row, message, hint
+        hint = f"write it in another unit: below {_EXTREME:.0e}, and the largest value above "
+        return row, message, hint + f"{1 / _EXTREME:.0e}"
     return None
 
 
-def absurd(x: Array) -> int | None:
+def _absurd(x: Array) -> int | None:
     """Return the first value of x (n,), NaN where missing, beside which all others are rounding."""
     there = np.flatnonzero(~np.isnan(x))
     scaled = x[there] / max(float(np.abs(x[there]).max()), np.finfo(float).tiny)
@@ -251,6 +222,5 @@ def absurd(x: Array) -> int | None:
     least = sizes[jumps[-1] + 1]
     far = there[off >= least]
     # Beside a level, or as often as the other level of a signal, it is no fault.
-    if far.size > _OFTEN * there.size or least <= _ABSURD * max(abs(middle), spread_of(scaled)):
-        return None
-    return int(far[0])
+    seldom = far.size <= _OFTEN * there.size and least > _ABSURD * max(abs(middle), spread_of(scaled))
+    return int(far[0]) if seldom else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,52 +17,47 @@ SHOWN = 5
 _LISTED = 12
 
 
-class Recorded(Protocol):
-    """Outputs as the files contain them; see `Recorded` of the data."""
+@dataclass(frozen=True)
+class Recorded:
+    """Holds the signals as the files have them.
 
-    @property
-    def rows(self) -> NDArray[np.int64]:
-        """(samples,): where each sample stands."""
+    Attributes:
+        values: (samples, r + p), of inputs and outputs.
+        rows: (samples,), where each sample stands; the nearest one, where times were evened out.
+        held: (samples, p), whether an output was recorded as it was a sample before.
+        resolution: (p,), the step in which each output is recorded.
+    """
 
-    @property
-    def held(self) -> NDArray[np.bool_]:
-        """(samples, p): whether a value is that of the sample before."""
+    values: Array
+    rows: NDArray[np.int64]
+    held: NDArray[np.bool_]
+    resolution: Array
 
-    @property
-    def resolution(self) -> Array:
-        """(p,): the step in which each output is recorded."""
+    def at(self, samples: NDArray[np.int64]) -> Recorded:
+        """Return some of the samples."""
+        return replace(self, values=self.values[samples], rows=self.rows[samples], held=self.held[samples])
 
 
-class Samples(Protocol):
-    """Records one after the other, u (samples, r) and y (samples, p)."""
+@dataclass(frozen=True)
+class Samples:
+    """Holds recorded experiments, their segments one after the other.
 
-    @property
-    def u(self) -> Array:
-        """(samples, r)."""
+    Attributes:
+        u, y: (N, r), (N, p), inputs and outputs, without gaps.
+        r: (N, r), the reference of a loop; None if some file does not have it.
+        time: (N,), in `time_unit`; counted from zero in a file that has none.
+        lengths: the samples of each segment.
+        files: the name of each file and its samples.
+        recorded: the signals as the files have them; None: not known.
+    """
 
-    @property
-    def y(self) -> Array:
-        """(samples, p)."""
-
-    @property
-    def r(self) -> Array | None:
-        """Return the reference of a loop (samples, r), or None if it is not known."""
-
-    @property
-    def time(self) -> Array:
-        """(samples,)."""
-
-    @property
-    def lengths(self) -> tuple[int, ...]:
-        """Return the samples of each stretch without gaps."""
-
-    @property
-    def files(self) -> tuple[tuple[str, int], ...]:
-        """Return the name of each file and its samples."""
-
-    @property
-    def recorded(self) -> Recorded | None:
-        """What is known of the files."""
+    u: Array
+    y: Array
+    r: Array | None
+    time: Array
+    lengths: tuple[int, ...]
+    files: tuple[tuple[str, int], ...]
+    recorded: Recorded | None = None
 
 
 def file_of(files: Sequence[tuple[str, int]], at: int) -> str:

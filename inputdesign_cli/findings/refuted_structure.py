@@ -2,58 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, refuted
 from inputdesign_cli.findings.remedies import remedies_of
-from inputdesign_cli.identification import Alternative, Estimate, ScoreTest
+from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
 _TESTED = "Residuals are compared with past inputs, past residuals and time by score tests. "
 
-PLANT = FindingKind(
+PLANT = refuted(
     "plant-structure",
-    Severity.REFUTED,
-    "past inputs explain residuals",
-    f"{_TESTED}Past inputs explain what the model does not: the plant has more structure than the model.",
+    "Past inputs explain residuals. Residuals are compared with past inputs, past residuals and time by "
+    "score tests. Past inputs explain what the model does not: the plant has more structure than the model.",
     "Raise the orders of the plant or change its delay; the message names the keys. A long FIR model shows "
     "what is missing.",
 )
-NOISE = FindingKind(
+NOISE = refuted(
     "noise-structure",
-    Severity.REFUTED,
-    "the residuals are not white",
-    f"{_TESTED}Past residuals explain the next ones: the noise has more structure than its model. The "
+    "The residuals are not white. Residuals are compared with past inputs, past residuals and time by score "
+    "tests. Past residuals explain the next ones: the noise has more structure than its model. The "
     "covariance is then not to be trusted.",
     "Raise the orders of C and D under `noise`.",
 )
-DRIFT = FindingKind(
+DRIFT = refuted(
     "drift",
-    Severity.REFUTED,
-    "the residuals drift",
-    f"{_TESTED}The residuals follow a slow trend.",
+    "The residuals drift. Residuals are compared with past inputs, past residuals and time by score tests. "
+    "The residuals follow a slow trend.",
     "Let the noise drift (`noise: {drift: true}`), remove the trend, or use a part of the record without it.",
 )
-MISSING = FindingKind(
+MISSING = refuted(
     "parameter-missing",
-    Severity.REFUTED,
-    "the model lacks a parameter",
-    "One more parameter of plant or noise explains the data much better than chance would.",
+    "The model lacks a parameter. One more parameter of plant or noise explains the data much better than "
+    "chance would.",
     "Estimate it along.",
 )
-CHANGED = FindingKind(
+CHANGED = refuted(
     "plant-changed",
-    Severity.REFUTED,
-    "the plant did not stay the same",
-    "Parameters that change with time explain the data much better than constant ones.",
+    "The plant did not stay the same. Parameters that change with time explain the data much better than "
+    "constant ones.",
     "Assess the parts of the record one by one (`--range`), and look for what changed between them.",
 )
-NONLINEAR = FindingKind(
+NONLINEAR = refuted(
     "plant-nonlinear",
-    Severity.REFUTED,
-    "the plant is not linear",
-    "A nonlinear effect of the inputs explains the data much better than the linear model alone.",
+    "The plant is not linear. A nonlinear effect of the inputs explains the data much better than the "
+    "linear model alone.",
     "Use the range of the input that the model is for, or give as u what the actuator really does.",
 )
 
@@ -105,28 +97,22 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
     Of an output that shifts see `level_shifts.py`.
     """
     directed = {one.test: one.alternatives for one in estimate.directed}
-    failing = estimate.failed_besides
-    strongest: dict[str, ScoreTest] = {}
-    for test in failing:
-        if test not in directed:
-            first = strongest.setdefault(test.fault, test)
-            strongest[test.fault] = min(first, test, key=lambda one: one.probability)
+    failing = sorted(estimate.failed_besides, key=lambda test: test.probability)
     remedies, found = remedies_of(model), []
     for fault, (kind, sentence) in OF_MANY.items():
-        if fault in strongest:
-            test = strongest[fault]
-            said = sentence.format(
-                p=chance(test.probability), lag=test.lag, remedy=remedies[fault], where=_where(model, test)
-            )
-            found.append(kind.found(said, where=test.name, probability=test.probability, lag=test.lag))
-    for test in sorted(directed, key=lambda test: test.probability):
-        if test in failing:
+        test = next((test for test in failing if test.fault == fault and test not in directed), None)
+        if test is not None:
+            figures = {"probability": test.probability, "lag": test.lag}
+            p, remedy, where = chance(test.probability), remedies[fault], _where(model, test)
+            said = sentence.format(p=p, lag=test.lag, remedy=remedy, where=where)
+            found.append(kind.found(said, where=test.name, **figures))
+    for test in failing:
+        if test in directed:
             kind, sentence = _OF_ONE[test.fault]
-            said = sentence.format(
-                p=chance(test.probability), phrase=directed[test][0].phrase, remedy=REMEDY[test.fault]
-            )
-            others = _or_else(directed[test][1:])
-            found.append(kind.found(said + others, where=test.name, probability=test.probability))
+            first, *others = (one.phrase for one in directed[test])
+            said = sentence.format(p=chance(test.probability), phrase=first, remedy=REMEDY[test.fault])
+            said += f"; nearly the same on these data: {', '.join(others)}" if others else ""
+            found.append(kind.found(said, where=test.name, probability=test.probability))
     return found
 
 
@@ -139,9 +125,3 @@ def _where(model: Model, test: ScoreTest) -> str:
         return f", those of {output} by u{source} most"
     own = test.fault == "drift" or test.output == test.source
     return f", those of {output} most" if own else f", those of {output} after those of y{source} most"
-
-
-def _or_else(others: Sequence[Alternative]) -> str:
-    """Return a phrase for parameters whose effect is nearly the same on these data; empty without any."""
-    listed = ", ".join(other.phrase for other in others)
-    return f"; nearly the same on these data: {listed}" if others else ""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, Severity, doubt, note, unsure
 from inputdesign_cli.identification import Estimate, Rival
 from inputdesign_cli.outcome.design import Rival as Entry
 from inputdesign_cli.outcome.units import Units
@@ -18,36 +18,28 @@ from inputdesign_cli.plant import Model
 # Parameters that are named: the few that differ most.
 _MOST_NAMES = 4
 
-OTHER_MINIMUM = FindingKind(
+OTHER_MINIMUM = unsure(
     "other-minimum",
-    Severity.UNDECIDED,
-    "other parameters explain the data nearly as well",
-    "The likelihood has another minimum of nearly the same depth. Its G differs from that of the estimate by "
-    "more than the error bound or the admissible error.",
+    "Other parameters explain the data nearly as well. The likelihood has another minimum of nearly the "
+    "same depth. Its G differs by more than the error bound or the admissible error.",
     "Excite more frequencies, or hold what is known with `plant.known`.",
 )
-RULED_OUT = FindingKind(
+RULED_OUT = note(
     "minimum-ruled-out",
-    Severity.NOTE,
-    "a minimum does not count",
-    "Other parameters would explain the data nearly as well. They lie far outside of what `uncertainty` says "
-    "of the plant.",
+    "A minimum does not count. Other parameters would explain the data nearly as well. They lie far outside "
+    "of what `uncertainty` says of the plant.",
     "See whether `uncertainty` is right.",
 )
-FORESEEN = FindingKind(
+FORESEEN = doubt(
     "other-minimum-foreseen",
-    Severity.DOUBT,
-    "a record of the design would leave other minima",
-    "A simulated record of the design has another minimum of nearly the same likelihood with another G. "
-    "Estimates may end there, and `assess` would call the record undecided.",
+    "A record of the design would leave other minima. A simulated record has another minimum of nearly the "
+    "same likelihood with another G. Estimates may end there, and `assess` would call the record undecided.",
     "Excite more frequencies, or hold the dead time that is known with `plant.known`.",
 )
-NOT_FORESEEN = FindingKind(
+NOT_FORESEEN = note(
     "other-minima-not-looked-at",
-    Severity.NOTE,
-    "other minima were not looked at",
-    "A plant with dead times may have other minima, whole periods away. Whether a record of this design has "
-    "them was not tried, for the reason that the message gives.",
+    "Other minima were not looked at. A plant with dead times may have some, whole periods away. Whether a "
+    "record of this design has them was not tried, for the reason that the message gives.",
     "Give it more time, or try `idesign simulate`.",
 )
 
@@ -64,32 +56,42 @@ class Apart:
 
 def rival_entries(estimate: Estimate, found: Sequence[Rival]) -> tuple[Entry, ...]:
     """Return `identification.rivals` and `identification.ruled_out` of `result.json`."""
-    return tuple(_entry(estimate, one) for one in found)
+    return tuple(
+        Entry(dict(zip(estimate.names, one.theta.tolist(), strict=True)), one.excess) for one in found
+    )
 
 
 def foreseen_entries(units: Units, estimate: Estimate, found: Sequence[Apart]) -> tuple[Entry, ...]:
     """Return `foreseen.rivals` of `result.json`."""
+    entries = rival_entries(estimate, [one.rival for one in found])
     return tuple(
-        replace(
-            _entry(estimate, one.rival),
-            ratio=one.ratio,
-            measure=one.measure,
-            frequency=one.w / units.frequency,
-        )
-        for one in found
+        replace(entry, ratio=one.ratio, measure=one.measure, frequency=one.w / units.frequency)
+        for entry, one in zip(entries, found, strict=True)
     )
 
 
-def beyond_errors(
-    model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array
+def beyond(
+    model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array | None = None
 ) -> list[Apart]:
-    """Return the rivals whose G is outside of the error bound r_u of the estimate."""
-    return _beyond(model, estimate, errors, lambda error, w: error.error_bound(information, w), "r_u")
+    """Return the rivals whose G is further from that of the estimate than is admitted.
 
-
-def beyond_admissible(model: Model, estimate: Estimate, errors: Sequence[OnModelError]) -> list[Apart]:
-    """Return the rivals whose G is further from that of the estimate than is admitted."""
-    return _beyond(model, estimate, errors, lambda error, w: error.admissible.at(w), "the admissible error")
+    Args:
+        information: (k, k); with it, further than the error bound r_u.
+    """
+    found, measure = [], "the admissible error" if information is None else "r_u"
+    for rival in estimate.rivals:
+        ratio, frequency, other = 0.0, 0.0, model.at(rival.theta)
+        for error in errors:
+            w = error.grid
+            apart = np.linalg.norm(error.concerned(other.plant_at(w) - model.plant_at(w)), axis=1)
+            size = error.admissible.at(w) if information is None else error.error_bound(information, w)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratios = np.where(apart > 0.0, apart / size, 0.0)
+            at = int(np.argmax(ratios))
+            ratio, frequency = max((ratio, frequency), (float(ratios[at]), float(w[at])))
+        if ratio > 1.0:
+            found.append(Apart(rival, ratio, frequency, measure))
+    return found
 
 
 def most_apart(estimate: Estimate, rival: Rival) -> list[int]:
@@ -114,24 +116,20 @@ def other_minima(
         unstated: what has r_u of G where nothing is asked.
         information: (k, k) in their coordinates.
     """
-    decides = beyond_admissible(model, estimate, errors)
-    doubtful = beyond_errors(model, estimate, errors or unstated, information)
-    if not errors:
-        decides, doubtful = doubtful, []
+    doubtful = beyond(model, estimate, errors or unstated, information)
+    decides = beyond(model, estimate, errors) if errors else doubtful
     undecided = {id(one.rival) for one in decides}
-    doubtful = [one for one in doubtful if id(one.rival) not in undecided]
     return [
         OTHER_MINIMUM.found(
             f"other parameters explain the data nearly as well ({_parameters(estimate, one.rival)}; -2 log "
             f"likelihood is {one.rival.excess:.3g} higher), and their G differs by {_far(units, one)}: "
             "excite more frequencies, or hold what is known (plant.known)",
-            severity=severity,
+            severity=Severity.UNDECIDED if id(one.rival) in undecided else Severity.DOUBT,
             ratio=one.ratio,
             measure=one.measure,
             excess=one.rival.excess,
         )
-        for severity, found in ((Severity.UNDECIDED, decides), (Severity.DOUBT, doubtful))
-        for one in found
+        for one in [*decides, *(one for one in doubtful if id(one.rival) not in undecided)]
     ]
 
 
@@ -140,17 +138,11 @@ def ruled_out(estimate: Estimate, found: Sequence[Rival]) -> list[Finding]:
     if not found:
         return []
     first = min(found, key=lambda one: one.excess)
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return [
-        RULED_OUT.found(
-            f"{_parameters(estimate, first)}{more} would explain the data nearly as well (-2 log likelihood "
-            f"is {abs(first.excess):.3g} {_higher(first)}), but is far outside of what uncertainty says of "
-            "the plant, and does not count",
-            where="uncertainty",
-            excess=first.excess,
-            minima=len(found),
-        )
-    ]
+    message = (
+        f"{_parameters(estimate, first)}{_more(found)} would explain the data nearly as well "
+        f"({_higher(first)}), but is far outside of what uncertainty says of the plant, and does not count"
+    )
+    return [RULED_OUT.found(message, where="uncertainty", excess=first.excess, minima=len(found))]
 
 
 def foreseen_rivals(units: Units, estimate: Estimate, found: Sequence[Apart], remedy: str) -> list[Finding]:
@@ -158,19 +150,13 @@ def foreseen_rivals(units: Units, estimate: Estimate, found: Sequence[Apart], re
     if not found:
         return []
     nearest = min(found, key=lambda one: one.rival.excess)
-    excess = nearest.rival.excess
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return [
-        FORESEEN.found(
-            f"other parameters would explain such a record nearly as well: in a simulated one also "
-            f"{_parameters(estimate, nearest.rival)}{more}, of which -2 log likelihood is {abs(excess):.3g} "
-            f"{_higher(nearest.rival)} and G differs by {_far(units, nearest)}. Estimates may "
-            f"end there, whatever r_u says, and assess would call such a record undecided: {remedy}",
-            excess=excess,
-            ratio=nearest.ratio,
-            minima=len(found),
-        )
-    ]
+    message = (
+        "other parameters would explain such a record nearly as well: in a simulated one also "
+        f"{_parameters(estimate, nearest.rival)}{_more(found)}, of which {_higher(nearest.rival)} and G "
+        f"differs by {_far(units, nearest)}. Estimates may end there, whatever r_u says, and assess would "
+        f"call such a record undecided: {remedy}"
+    )
+    return [FORESEEN.found(message, excess=nearest.rival.excess, ratio=nearest.ratio, minima=len(found))]
 
 
 def not_foreseen(reason: str) -> Finding:
@@ -181,43 +167,15 @@ def not_foreseen(reason: str) -> Finding:
 
 
 def _higher(one: Rival) -> str:
-    return "higher" if one.excess >= 0.0 else "lower"
+    return f"-2 log likelihood is {abs(one.excess):.3g} {'higher' if one.excess >= 0.0 else 'lower'}"
+
+
+def _more(found: Sequence[object]) -> str:
+    return f" (and {len(found) - 1} more)" if len(found) > 1 else ""
 
 
 def _far(units: Units, one: Apart) -> str:
     return f"{one.ratio:.3g} times {one.measure} about {units.named(one.w)}"
-
-
-def _entry(estimate: Estimate, one: Rival) -> Entry:
-    return Entry(dict(zip(estimate.names, one.theta.tolist(), strict=True)), one.excess)
-
-
-def _beyond(
-    model: Model,
-    estimate: Estimate,
-    errors: Sequence[OnModelError],
-    size: Callable[[OnModelError, Array], Array],
-    measure: str,
-) -> list[Apart]:
-    found = []
-    for rival in estimate.rivals:
-        other = model.at(rival.theta)
-        ratio, w = max((_furthest(model, other, error, size) for error in errors), default=(0.0, 0.0))
-        if ratio > 1.0:
-            found.append(Apart(rival, ratio, w, measure))
-    return found
-
-
-def _furthest(
-    model: Model, other: Model, error: OnModelError, size: Callable[[OnModelError, Array], Array]
-) -> tuple[float, float]:
-    """Return the largest difference of G over its `size`, and its frequency."""
-    w = error.grid
-    apart = np.linalg.norm(error.concerned(other.plant_at(w) - model.plant_at(w)), axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(apart > 0.0, apart / size(error, w), 0.0)
-    at = int(np.argmax(ratio))
-    return float(ratio[at]), float(w[at])
 
 
 def _parameters(estimate: Estimate, rival: Rival) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.outcome.design import Coverage
 from inputdesign_cli.outcome.simulation import Searched, TriedInput
 from inputdesign_cli.outcome.units import Units
@@ -12,62 +12,59 @@ from inputdesign_cli.outcome.units import Units
 # A fraction on the true system this far below that on the design model is worth a note.
 _GAP = 0.03
 
-CONFIDENCE_MISSED = FindingKind(
+CONFIDENCE_MISSED = doubt(
     "confidence-missed",
-    Severity.DOUBT,
-    "fewer experiments than asked keep the admissible error",
-    "The share of simulated experiments within r_adm is below the exact confidence by more than chance.",
+    "Fewer experiments than asked keep the admissible error. The share of simulated experiments within "
+    "r_adm is below the exact confidence by more than chance.",
     "Ask for more `runs` in `confidence`, or for more samples.",
 )
-OTHER_LENGTH = FindingKind(
+OTHER_LENGTH = note(
     "other-length",
-    Severity.NOTE,
-    "the simulated records have another length than the design",
-    "The design counts the samples of a spectrum. Records are whole periods, or longer by limits.",
+    "The simulated records have another length than the design. The design counts the samples of a "
+    "spectrum. Records are whole periods, or longer by limits.",
     "Nothing. The predictions that the runs are compared with are for the simulated length.",
 )
-INITIAL_ESTIMATE = FindingKind(
+INITIAL_ESTIMATE = doubt(
     "initial-estimate-off",
-    Severity.DOUBT,
-    "the true system is not the design model",
-    "Fewer runs stay within r_adm on the true system than where the true system is the design model.",
+    "The true system is not the design model. Fewer runs stay within r_adm on the true system than where "
+    "the true system is the design model.",
     "Design again at a better estimate, or for several plants (`uncertainty`).",
 )
-ONE_MINIMUM = FindingKind(
+ONE_MINIMUM = note(
     "runs-see-one-minimum",
-    Severity.NOTE,
-    "the runs look at one minimum only",
-    "Runs of `simulate` begin their estimates at the nominal parameters. Records leave other minima, which "
-    "the search of `identify` may end in.",
+    "The runs look at one minimum only. Runs of `simulate` begin their estimates at the nominal parameters. "
+    "Records leave other minima, which the search of `identify` may end in.",
     "Excite more frequencies, or hold what is known (`plant.known`).",
+)
+UNSTABLE = doubt(
+    "unstable-runs",
+    "Controllers of some simulated runs make the loop unstable. Each run designs a controller on its "
+    "estimate. Where the true loop is unstable the loss is infinite. Means and deviations are of the other "
+    "runs.",
+    "Take more samples or more power, or ask for a slower loop.",
 )
 
 
-def confidence_missed(designed: Coverage | None, recorded: Coverage | None) -> list[Finding]:
-    """Return findings where a design, or its record, keeps less than was asked, by more than chance."""
-    found: list[Finding] = []
-    if designed is None or designed.asked is None:
-        return found
+def confidence_missed(designed: Coverage | None, recorded: Coverage | None) -> Iterator[Finding]:
+    """Yield findings where a design, or its record, keeps less than was asked, by more than chance."""
+    asked = None if designed is None else designed.asked
     for of, coverage in (("of this design", designed), ("with this record", recorded)):
-        if coverage is None or coverage.kept_limits is None or coverage.kept is None:
+        if asked is None or coverage is None or coverage.kept_limits is None or coverage.kept is None:
             continue
-        if coverage.kept_limits[1] < designed.asked:
-            message = (
-                f"{100 * coverage.kept:.1f} % of {coverage.runs} simulated experiments {of} keep r_adm: by "
-                f"more than chance that is fewer than the {100 * designed.asked:g} % that are asked for; ask "
-                "for more runs (confidence: {exact: .., runs: ..}), which settle alpha more sharply"
-            )
-            found.append(CONFIDENCE_MISSED.found(message, where=of, kept=coverage.kept, asked=designed.asked))
-    return found
+        message = (
+            f"{100 * coverage.kept:.1f} % of {coverage.runs} simulated experiments {of} keep r_adm: by more "
+            f"than chance that is fewer than the {100 * asked:g} % that are asked for; ask for more runs "
+            "(confidence: {exact: .., runs: ..}), which settle alpha more sharply"
+        )
+        if coverage.kept_limits[1] < asked:
+            yield CONFIDENCE_MISSED.found(message, where=of, kept=coverage.kept, asked=asked)
 
 
 def runs_miss_confidence(designed: Coverage | None, tried: TriedInput) -> list[Finding]:
     """Return a finding if runs of the design keep less than the exact confidence that was asked for."""
-    limits = tried.within_r_adm_limits
+    limits, kept = tried.within_r_adm_limits, tried.within_r_adm
     asked = None if designed is None else designed.asked
-    if designed is None or asked is None or limits is None or tried.within_r_adm is None:
-        return []
-    if tried.on_design_model is not None or limits[1] >= asked:
+    if designed is None or asked is None or limits is None or kept is None:
         return []
     why = (
         "alpha was calibrated by simulated experiments, and chance had a part in it: ask for more of them "
@@ -76,21 +73,20 @@ def runs_miss_confidence(designed: Coverage | None, tried: TriedInput) -> list[F
         else "estimates of records this short scatter more than the asymptotic theory that sizes r_u: leave "
         "out runs: 0, ask for a little more, or take more samples"
     )
-    kept = f"{100 * tried.within_r_adm:.1f} % of the runs stay within r_adm"
-    message = f"{kept}, where exact: {asked:g} was asked for: {why}"
-    return [CONFIDENCE_MISSED.found(message, where="simulation", kept=tried.within_r_adm, asked=asked)]
+    message = f"{100 * kept:.1f} % of the runs stay within r_adm, where exact: {asked:g} was asked for: {why}"
+    found = CONFIDENCE_MISSED.found(message, where="simulation", kept=kept, asked=asked)
+    return [] if tried.on_design_model is not None or limits[1] >= asked else [found]
 
 
 def other_length(counted: int, simulated: int) -> list[Finding]:
     """Return a finding if records have another number of samples than the design counts."""
-    if counted == simulated:
-        return []
     message = (
         f"simulation: the design counts {counted} sample{'s' * (counted != 1)}, the simulated records have "
         f"{simulated}. What the runs are compared with, and ellipses.png, are for {simulated} samples; "
         f"bound.csv is for {counted}"
     )
-    return [OTHER_LENGTH.found(message, where="simulation", counted=counted, simulated=simulated)]
+    found = OTHER_LENGTH.found(message, where="simulation", counted=counted, simulated=simulated)
+    return [found] if counted != simulated else []
 
 
 def initial_estimate_off(units: Units, inputs: Mapping[str, TriedInput]) -> list[Finding]:
@@ -106,10 +102,8 @@ def initial_estimate_off(units: Units, inputs: Mapping[str, TriedInput]) -> list
             "was designed on an initial estimate that is not the truth"
         )
         if theory is not None:
-            text += (
-                f". On the true system r_u reaches {theory.worst_ratio:.2f} r_adm "
-                f"(at {theory.frequency:.3g} {units.per_time})"
-            )
+            at = f"{theory.frequency:.3g} {units.per_time}"
+            text += f". On the true system r_u reaches {theory.worst_ratio:.2f} r_adm (at {at})"
         if violations is not None:
             low, middle, high = violations.frequency_quantiles
             text += (
@@ -123,13 +117,21 @@ def one_minimum(searched: Searched | None) -> list[Finding]:
     """Return the finding that the runs see one minimum, where records leave others."""
     if searched is None:
         return []
-    runs = searched.runs
+    runs, elsewhere, rivals = searched.runs, searched.elsewhere, searched.rivals
     message = (
         "the runs of simulate begin their estimates at the nominal parameters, and see the minimum there "
-        f"alone: with the search of identify {searched.elsewhere} of {runs} records end at other parameters, "
-        f"and {searched.rivals} of {runs} would be undecided"
+        f"alone: with the search of identify {elsewhere} of {runs} records end at other parameters, and "
+        f"{rivals} of {runs} would be undecided"
     )
-    found = ONE_MINIMUM.found(
-        message, where="simulation", runs=runs, elsewhere=searched.elsewhere, rivals=searched.rivals
-    )
-    return [found]
+    return [ONE_MINIMUM.found(message, where="simulation", runs=runs, elsewhere=elsewhere, rivals=rivals)]
+
+
+def unstable_runs(unstable: Mapping[str, int], runs: int) -> Iterator[Finding]:
+    """Yield a finding for each input with unstable runs."""
+    for name, count in unstable.items():
+        message = (
+            f"with the input {name}, {count} of {runs} simulated controllers make the true loop unstable. "
+            "Their losses are infinite, and the means are taken over the other runs"
+        )
+        if count:
+            yield UNSTABLE.found(message, where=name, unstable=count, runs=runs)

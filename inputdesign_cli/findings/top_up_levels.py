@@ -5,25 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.findings.other_systems import PRIOR_LEFT_OUT
 
 # Times its own deviation: an input whose mean is farther from zero has a level.
 _AWAY = 0.5
 
-ABOUT_LEVELS = FindingKind(
+ABOUT_LEVELS = note(
     "about-an-operating-point",
-    Severity.NOTE,
-    "the record varies about the operating point",
-    "The samples of `signal.csv` include the levels that were taken away from the data.",
+    "The record varies about the operating point. The samples of `signal.csv` include the levels that were "
+    "taken away from the data.",
     "Apply `signal.csv` as it is.",
 )
-ABOUT_ZERO = FindingKind(
+ABOUT_ZERO = doubt(
     "record-about-zero",
-    Severity.DOUBT,
-    "the data lie about a level, the record about zero",
-    "The inputs of the data have a mean far from zero. The spec has no `signal.offset`, so that the record "
-    "of the top-up varies about zero.",
+    "The data lie about a level, the record about zero. The inputs of the data have a mean far from zero. "
+    "The spec has no `signal.offset`, so that the record of the top-up varies about zero.",
     "Write `signal.offset` with these levels and assess again, or add them to `signal.csv`.",
 )
 
@@ -55,22 +52,19 @@ def level_notes(
         at = " and ".join(f"u{j + 1} = {level:g}" for j, level in unknown.items())
         offsets = [unknown.get(j, 0.0 if point is None else point[j]) for j in range(len(means))]
         offset = f"{offsets[0]:g}" if len(offsets) == 1 else f"[{', '.join(f'{x:g}' for x in offsets)}]"
-        found.append(
-            ABOUT_ZERO.found(
-                f"the data lie about {at} (their mean), and signal.csv varies about zero there, since the "
-                f"spec has no signal.offset: to apply it where the data were taken, write signal.offset: "
-                f"{offset} and assess again, or add that to signal.csv",
-                where="signal.offset",
-                offset=offsets,
-            )
+        message = (
+            f"the data lie about {at} (their mean), and signal.csv varies about zero there, since the spec "
+            f"has no signal.offset: to apply it where the data were taken, write signal.offset: {offset} "
+            "and assess again, or add that to signal.csv"
         )
+        found.append(ABOUT_ZERO.found(message, where="signal.offset", offset=offsets))
     return found
 
 
 def prior_left_out() -> Finding:
     """Return the finding that a prior without parameters does not count for a top-up either."""
-    return PRIOR_LEFT_OUT.found(
+    message = (
         "experiment.prior does not count for the experiment below either, since no verdict after it could "
-        "rest on that: spec.yaml has the information of the data in its place",
-        where="experiment.prior",
+        "rest on that: spec.yaml has the information of the data in its place"
     )
+    return PRIOR_LEFT_OUT.found(message, where="experiment.prior")

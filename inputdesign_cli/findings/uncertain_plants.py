@@ -3,57 +3,50 @@
 from __future__ import annotations
 
 from inputdesign_cli.compute.time_limit import what_ended
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.outcome.robust import FloorUse
 
-FRESH_PLANTS_CUT = FindingKind(
+FRESH_PLANTS_CUT = note(
     "fresh-plants-cut-short",
-    Severity.NOTE,
-    "the trial on fresh plants was cut short",
-    "Fewer plants were tried than `uncertainty.fresh` asks for. The 95 % limits count the ones tried.",
+    "The trial on fresh plants was cut short. Fewer plants were tried than `uncertainty.fresh` asks for. "
+    "The 95 % limits count the ones tried.",
     "Allow more time.",
 )
-DRAWS_UNSTABLE = FindingKind(
+DRAWS_UNSTABLE = doubt(
     "draws-unstable",
-    Severity.DOUBT,
-    "most of the draws are no plants that could be in operation",
-    "Draws from `uncertainty` that are unstable are drawn again. Every statement is about the stable ones.",
+    "Most of the draws are no plants that could be in operation. Draws from `uncertainty` that are unstable "
+    "are drawn again. Every statement is about the stable ones.",
     "State what the plant can be in operation, or check the controller.",
 )
-LOST_PLANTS = FindingKind(
+LOST_PLANTS = doubt(
     "plants-lost",
-    Severity.DOUBT,
-    "at some plants no experiment is enough",
-    "The controller misses what is asked at these plants even if they are known exactly. Their r_adm is "
-    "that of `uncertainty.floor`.",
+    "At some plants no experiment is enough. The controller misses what is asked at these plants even if "
+    "they are known exactly. Their r_adm is that of `uncertainty.floor`.",
     "Ask for less, take another controller, or state the plant more tightly.",
 )
-RAISED_PLANTS = FindingKind(
+RAISED_PLANTS = doubt(
     "plants-at-floor",
-    Severity.DOUBT,
-    "some plants are held to less than what is asked",
-    "At these plants r_adm is somewhere below `uncertainty.floor`, which the design keeps in its place.",
+    "Some plants are held to less than what is asked. At these plants r_adm is somewhere below "
+    "`uncertainty.floor`, which the design keeps in its place.",
     "Lower `uncertainty.floor` to hold them to their own r_adm.",
 )
 
 
 def fewer_plants(tried: int, asked: int) -> list[Finding]:
     """Return a finding if fewer fresh plants were tried than were asked for."""
-    if tried >= asked:
-        return []
     message = f"{what_ended()} ended the trial on fresh plants after {tried} of {asked} (uncertainty.fresh)"
-    return [FRESH_PLANTS_CUT.found(message, where="uncertainty.fresh", tried=tried, asked=asked)]
+    found = FRESH_PLANTS_CUT.found(message, where="uncertainty.fresh", tried=tried, asked=asked)
+    return [found] if tried < asked else []
 
 
 def unstable_draws(rejected: int, drawn: int) -> list[Finding]:
     """Return a finding if most of the draws were no plants that could be in operation."""
-    if 2 * rejected <= drawn:
-        return []
     message = (
         f"{rejected} of {drawn} draws were unstable, or no plants, and were drawn again: results hold for "
         "the others alone; state what the plant can be in operation (uncertainty), or check the controller"
     )
-    return [DRAWS_UNSTABLE.found(message, where="uncertainty", rejected=rejected, drawn=drawn)]
+    found = DRAWS_UNSTABLE.found(message, where="uncertainty", rejected=rejected, drawn=drawn)
+    return [found] if 2 * rejected > drawn else []
 
 
 def floor_findings(floor: FloorUse | None, scenarios: int) -> list[Finding]:
@@ -68,9 +61,9 @@ def floor_findings(floor: FloorUse | None, scenarios: int) -> list[Finding]:
         reaches = "" if first.peak is None else f" (|S| reaches {first.peak:.4g})"
         message = (
             f"{lost} of {scenarios} plants miss what is asked even if they are known exactly, such as plant "
-            f"{first.scenario}{reaches}: {values}. Their r_adm is that of uncertainty.floor, {share} of that "
-            "of the plant of the spec. No experiment makes this controller keep what is asked there: ask for "
-            "less, take another controller, or state the plant more tightly (floor in result.json)"
+            f"{first.scenario}{reaches}: {values}. Their r_adm is that of uncertainty.floor, {share} of "
+            "that of the plant of the spec. No experiment makes this controller keep what is asked there: "
+            "ask for less, take another controller, or state the plant more tightly (floor in result.json)"
         )
         found.append(LOST_PLANTS.found(message, where="uncertainty.floor", lost=list(floor.lost)))
     if raised > lost:

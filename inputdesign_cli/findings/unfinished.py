@@ -3,54 +3,44 @@
 from __future__ import annotations
 
 from inputdesign_cli.compute.time_limit import more_time, what_ended
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.outcome import Objective
 from inputdesign_cli.outcome.shares import per_cent
 
-DESIGN_UNFINISHED = FindingKind(
+DESIGN_UNFINISHED = doubt(
     "design-unfinished",
-    Severity.DOUBT,
-    "the time limit ended the design before its proof closed",
-    "The design meets everything that is required. How much better another could be is proved only as far as "
-    "the gap says.",
+    "The time limit ended the design before its proof closed. The design meets everything that is required. "
+    "How much better another could be is proved only as far as the gap says.",
     "Allow more time.",
 )
-OTHER_SPECTRA_LEFT_OUT = FindingKind(
+OTHER_SPECTRA_LEFT_OUT = note(
     "other-spectra-left-out",
-    Severity.NOTE,
-    "there is no bound over every spectrum yet",
-    "The design is proved the best of its type of spectrum. Other types were not compared, for want of time "
-    "or because nobody asked for it.",
+    "There is no bound over every spectrum yet. The design is proved the best of its type of spectrum. "
+    "Other types were not compared, for want of time or because nobody asked for it.",
     "Allow more time, leave out `--fast`, or write `solver.any_spectrum: true`.",
 )
-NO_BOUND_EXISTS = FindingKind(
+NO_BOUND_EXISTS = note(
     "no-bound-over-spectra",
-    Severity.NOTE,
-    "there is no bound over every spectrum",
-    "Some excitation is not counted by the cost or the limits and still gives information. Other spectra "
-    "come ever nearer to it, without end.",
+    "There is no bound over every spectrum. Some excitation is not counted by the cost or the limits and "
+    "still gives information. Other spectra come ever nearer to it, without end.",
     "Give what is not counted a cost or a limit, or leave its frequency out of `limits.band`.",
 )
-ONLY_APPROACHED = FindingKind(
+ONLY_APPROACHED = doubt(
     "optimum-only-approached",
-    Severity.DOUBT,
-    "the optimum is only approached",
-    "The best spectrum has power ever nearer to a frequency, and none has it there. No record has that.",
+    "The optimum is only approached. The best spectrum has power ever nearer to a frequency, and none has "
+    "it there. No record has that.",
     "Give what is not counted a cost or a limit, or leave its frequency out of `limits.band`.",
 )
-NO_RECORD_IN_TIME = FindingKind(
+NO_RECORD_IN_TIME = doubt(
     "no-record-in-time",
-    Severity.DOUBT,
-    "there was no time for a record",
-    "The spectrum is that of the design. No record of it was found before the time was over.",
+    "There was no time for a record. The spectrum is that of the design. No record of it was found before "
+    "the time was over.",
     "Allow more time, or try fewer records (`signal.candidates`) or shorter ones (`signal.samples`).",
 )
-ON_GRID = FindingKind(
+ON_GRID = doubt(
     "accuracy-on-grid",
-    Severity.DOUBT,
-    "the accuracy holds on a grid of frequencies",
-    "`solver.method: lmi` is the program of the papers. It requires the accuracy on a grid of frequencies "
-    "only, and between them it may be missed.",
+    "The accuracy holds on a grid of frequencies. `solver.method: lmi` is the program of the papers. It "
+    "requires the accuracy on a grid of frequencies only, and between them it may be missed.",
     "Use `solver.method: exchange`, which keeps the accuracy at every frequency.",
 )
 
@@ -83,11 +73,11 @@ def _how_far(objective: Objective) -> str:
 
 def other_spectra_left_out() -> Finding:
     """Return the finding that the bound over every spectrum was not asked for."""
-    return OTHER_SPECTRA_LEFT_OUT.found(
+    message = (
         "the design is the best of its spectrum type; what other spectra reach was not computed "
-        "(solver.any_spectrum: false, or --fast)",
-        where="solver.any_spectrum",
+        "(solver.any_spectrum: false, or --fast)"
     )
+    return OTHER_SPECTRA_LEFT_OUT.found(message, where="solver.any_spectrum")
 
 
 def uncounted_excitation(message: str, *, bounded: bool) -> Finding:
@@ -103,20 +93,17 @@ def uncounted_excitation(message: str, *, bounded: bool) -> Finding:
 def no_record_in_time(candidates: int) -> Finding:
     """Return the finding that the time was over before a record was found, of a number of candidates."""
     fewer = "fewer records (signal.candidates: 1) or shorter ones" if candidates > 1 else "a shorter one"
-    return NO_RECORD_IN_TIME.found(
+    message = (
         f"there is no record: {what_ended()} came before one was found; the spectrum is that of the design. "
-        f"To have one, {more_time()}, or try {fewer} (signal.samples)",
-        where="signal",
-        candidates=candidates,
+        f"To have one, {more_time()}, or try {fewer} (signal.samples)"
     )
+    return NO_RECORD_IN_TIME.found(message, where="signal", candidates=candidates)
 
 
 def on_grid(lines: int, ratio: float) -> Finding:
     """Return the finding that the accuracy holds at a number of frequencies, with the largest ratio."""
-    return ON_GRID.found(
-        f"the accuracy holds on the grid of {lines} frequencies; over the whole band r_u / r_adm is "
-        f"at most {ratio:.6g} (solver.method: exchange keeps it at every frequency)",
-        where="solver.method",
-        grid=lines,
-        worst_ratio=ratio,
+    message = (
+        f"the accuracy holds on the grid of {lines} frequencies; over the whole band r_u / r_adm is at most "
+        f"{ratio:.6g} (solver.method: exchange keeps it at every frequency)"
     )
+    return ON_GRID.found(message, where="solver.method", grid=lines, worst_ratio=ratio)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore import early_answers
-from inputdesign_cli.finding import Finding, FindingKind, Severity
+from inputdesign_cli.finding import Finding, doubt, note, refuted
 from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driven_by_nothing, like_nothing_elsewhere
@@ -19,134 +19,112 @@ _OTHERWISE = 1e-6
 # Of the squares of prediction errors: what the future of an input explains if it moves the output.
 _MOSTLY = 0.5
 
-ANSWERING = FindingKind(
+ANSWERING = refuted(
     "input-answers-output",
-    Severity.REFUTED,
-    "an input answers the outputs",
-    "Prediction errors help to predict an input. In open loop no input answers the noise.",
-    "See whether the input was logged late or columns are swapped. If the data come from a loop, state it as "
-    "`experiment.controller`.",
+    "An input answers the outputs. Prediction errors help to predict an input. In open loop no input "
+    "answers the noise.",
+    "See whether the input was logged late or columns are swapped. If the data come from a loop, state it "
+    "as `experiment.controller`.",
 )
-LATE = FindingKind(
+LATE = refuted(
     "input-logged-late",
-    Severity.REFUTED,
-    "an output moves before the input",
-    "An output moves some samples before the input that moves it. The input was logged late, or the columns "
-    "are not of one clock.",
+    "An output moves before the input. An output moves some samples before the input that moves it. The "
+    "input was logged late, or the columns are not of one clock.",
     "See when the plant really gets its input, and write both at the same times.",
 )
-IDLE = FindingKind(
+IDLE = refuted(
     "input-without-effect",
-    Severity.REFUTED,
-    "an input explains nothing",
-    "G of an input cannot be distinguished from zero, though the plant of the spec would answer it clearly.",
+    "An input explains nothing. G of an input cannot be distinguished from zero, though the plant of the "
+    "spec would answer it clearly.",
     "See whether the columns are of one experiment. If the plant does not answer, correct the spec.",
 )
-UNEXPLAINED = FindingKind(
+UNEXPLAINED = doubt(
     "output-unexplained",
-    Severity.DOUBT,
-    "the inputs explain nothing of an output",
-    "The model, simulated from the inputs alone, is farther from the output than the mean of the output. No "
-    "effect of the inputs can be distinguished from zero.",
+    "The inputs explain nothing of an output. The model, simulated from the inputs alone, is farther from "
+    "the output than the mean of the output. No effect of the inputs can be distinguished from zero.",
     "See whether the columns are those of the plant, in their order and their units.",
 )
-NOISE_PREVAILS = FindingKind(
+NOISE_PREVAILS = note(
     "noise-prevails",
-    Severity.NOTE,
-    "noise moves an output more than the inputs",
-    "The effect of the inputs on an output is seen, but noise and drift move it more.",
+    "Noise moves an output more than the inputs. The effect of the inputs on an output is seen, but noise "
+    "and drift move it more.",
     "Apply more power, or compare models by their prediction instead of their simulation.",
 )
 
 
 def answering(units: Units, estimate: Estimate) -> list[Finding]:
     """Return a finding for each input that answers outputs, or comes after their answer; none in a loop."""
-    samples = estimate.errors.size
-    return [
-        _late(units.inputs, units.outputs, test)
-        if test.statistic > _MOSTLY * samples
-        else _answers(units, test)
-        for test in estimate.answering
-    ]
-
-
-def _answers(units: Units, test: ScoreTest) -> Finding:
-    name = signal_name("u", test.source, units.inputs)
-    return ANSWERING.found(
-        f"prediction errors help to predict {name} (probability {chance(test.probability)}), and no input in "
-        "open loop answers the noise: it was logged late, columns are swapped, or the data come from a loop; "
-        "mend the columns, or state the loop as experiment.controller",
-        where=name,
-        probability=test.probability,
-    )
+    found = []
+    for test in estimate.answering:
+        name = signal_name("u", test.source, units.inputs)
+        message = (
+            f"prediction errors help to predict {name} (probability {chance(test.probability)}), and no "
+            "input in open loop answers the noise: it was logged late, columns are swapped, or the data "
+            "come from a loop; mend the columns, or state the loop as experiment.controller"
+        )
+        answers = ANSWERING.found(message, where=name, probability=test.probability)
+        late = test.statistic > _MOSTLY * estimate.errors.size
+        found.append(_late(units.inputs, units.outputs, test) if late else answers)
+    return found
 
 
 def _late(inputs: int, outputs: int, test: ScoreTest) -> Finding:
     """Return the finding for an input that an output answers some samples before it moves."""
-    name, output = signal_name("u", test.source, inputs), signal_name("y", test.output, outputs)
-    return LATE.found(
-        f"{output} answers {name} up to {test.lag} {'sample' if test.lag == 1 else 'samples'} before that "
-        f"moves (probability {chance(test.probability)} by chance): the input was logged late, columns are "
-        "swapped, or the columns are not of one clock. See when the plant really gets its input, and write "
-        "both at the same times",
-        where=name,
-        samples=test.lag,
-        probability=test.probability,
+    name, output, lag = (
+        signal_name("u", test.source, inputs),
+        signal_name("y", test.output, outputs),
+        test.lag,
     )
+    message = (
+        f"{output} answers {name} up to {lag} {'sample' if lag == 1 else 'samples'} before that moves "
+        f"(probability {chance(test.probability)} by chance): the input was logged late, columns are "
+        "swapped, or the columns are not of one clock. See when the plant really gets its input, and write "
+        "both at the same times"
+    )
+    return LATE.found(message, where=name, samples=lag, probability=test.probability)
 
 
 def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
     """Return a finding for each input before which an output moves: u (n, r), y (n, p) without a model."""
     inputs, outputs = parts[0][0].shape[1], parts[0][1].shape[1]
-    return [
-        _late(
-            inputs,
-            outputs,
-            ScoreTest("", "feedback", 0.0, 1, one.probability, one.samples, one.output, one.input),
-        )
-        for one in early_answers(parts)
-    ]
+    return [_late(inputs, outputs, test) for test in early_answers(parts)]
 
 
-def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> list[Finding]:
-    """Return a finding for each input that explains nothing, though at the plant of the spec it would.
+def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> Iterator[Finding]:
+    """Yield a finding for each input that explains nothing, though at the plant of the spec it would.
 
     Args:
         nominal, estimated: of one structure.
     """
-    return [
-        IDLE.found(
-            f"{signal_name('u', j, units.inputs)} explains nothing of what was measured: G cannot be told "
-            f"from zero (probability {chance(zero)}), and the plant of the spec can: see whether the columns "
-            "are those of one experiment; if the plant does not answer, correct the spec",
-            where=signal_name("u", j, units.inputs),
-            probability=zero,
+    for j, zero, expected in like_nothing_elsewhere(nominal, estimated, estimate, units.step):
+        name = signal_name("u", j, units.inputs)
+        message = (
+            f"{name} explains nothing of what was measured: G cannot be told from zero (probability "
+            f"{chance(zero)}), and the plant of the spec can: see whether the columns are those of one "
+            "experiment; if the plant does not answer, correct the spec"
         )
-        for j, zero, expected in like_nothing_elsewhere(nominal, estimated, estimate, units.step)
-        if expected < _OTHERWISE
-    ]
+        if expected < _OTHERWISE:
+            yield IDLE.found(message, where=name, probability=zero)
 
 
-def hardly_explained(units: Units, model: Model, estimate: Estimate) -> list[Finding]:
-    """Return a finding for outputs that are farther from the simulation than from their mean."""
-    far = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
-    unrelated = driven_by_nothing(model, estimate, units.step) if far else []
-    found = []
+def hardly_explained(units: Units, model: Model, estimate: Estimate) -> Iterator[Finding]:
+    """Yield a finding for outputs that are farther from the simulation than from their mean."""
+    far = {i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0}
+    unrelated = set(driven_by_nothing(model, estimate, units.step)) if far else set()
     for kind, sentence, listed in (
         (
             UNEXPLAINED,
-            "the inputs explain nothing of {} in this model: see whether the columns are those of the plant, "
-            "in their order and their units, before anything is built on it",
-            [i for i in far if i in unrelated],
+            "the inputs explain nothing of {} in this model: see whether the columns are those of the "
+            "plant, in their order and their units, before anything is built on it",
+            far & unrelated,
         ),
         (
             NOISE_PREVAILS,
             "what the inputs cause in {} is seen, but noise and drift move it more: simulated from the "
             "inputs alone, the model is farther off than the mean",
-            [i for i in far if i not in unrelated],
+            far - unrelated,
         ),
     ):
+        outputs = " and ".join(signal_name("y", i, len(estimate.noise)) for i in sorted(listed))
         if listed:
-            outputs = " and ".join("y" if len(estimate.noise) == 1 else f"y{i + 1}" for i in listed)
-            found.append(kind.found(sentence.format(outputs), where=outputs))
-    return found
+            yield kind.found(sentence.format(outputs), where=outputs)

@@ -9,7 +9,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.record_columns import name_and_unit
+from inputdesign_cli.findings.prepared_records import name_and_unit
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.sheet import Column, Sheet
 from inputdesign_cli.specification.models.units import SECONDS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.copied_samples import samples_repeated
-from inputdesign_cli.findings.record_columns import columns_against_spec
-from inputdesign_cli.findings.record_times import times_assumed, times_disagree
+from inputdesign_cli.findings.other_systems import samples_repeated
+from inputdesign_cli.findings.places import Recorded, Samples
+from inputdesign_cli.findings.prepared_records import columns_against_spec, times_assumed, times_disagree
 from inputdesign_cli.identification import resolution_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.columns import (
@@ -41,61 +41,27 @@ _ROUND = 1e-3
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """Holds the signals as the files have them.
+class Record(Samples):
+    """Holds recorded experiments with what was done to them.
 
     Attributes:
-        values: (samples, r + p), of inputs and outputs.
-        rows: (samples,), where each sample stands; the nearest one, where times were evened out.
-        held: (samples, p), whether an output was recorded as it was a sample before.
-        resolution: (p,), the step in which each output is recorded.
-    """
-
-    values: Array
-    rows: NDArray[np.int64]
-    held: NDArray[np.bool_]
-    resolution: Array
-
-    def at(self, samples: NDArray[np.int64]) -> Recorded:
-        """Return some of the samples."""
-        return replace(self, values=self.values[samples], rows=self.rows[samples], held=self.held[samples])
-
-
-@dataclass(frozen=True)
-class Record:
-    """Holds recorded experiments, their segments one after the other.
-
-    Attributes:
-        u, y: (N, r), (N, p), inputs and outputs, without gaps.
-        r: (N, r), the reference of a loop; None if some file does not have it.
-        time: (N,), in `time_unit`; counted from zero in a file that has none.
-        lengths: the samples of each segment.
-        files: the name of each file and its samples.
         names: of the columns, by channel.
         step, time_unit: the sample time.
         findings: what was done to the record and what was seen in it.
         header: the names of the columns of the first file, in small letters.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
-        recorded: the signals as the files have them; None: not known.
         repeated: files that have samples in common.
         lined: whether a line was taken away from an output: its slope is then estimated with the model, since
             the inputs cause a part of it.
         remarks: what a question did to the record later.
     """
 
-    u: Array
-    y: Array
-    r: Array | None
-    time: Array
-    lengths: tuple[int, ...]
-    files: tuple[tuple[str, int], ...]
     names: dict[str, str] = field(default_factory=dict)
     step: float = 1.0
     time_unit: str = "s"
     findings: tuple[Finding, ...] = ()
     header: tuple[str, ...] = ()
     means: Array | None = None
-    recorded: Recorded | None = None
     repeated: tuple[Finding, ...] = ()
     lined: bool = False
     remarks: tuple[str, ...] = ()
@@ -244,7 +210,7 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
 
 
 def _record(
-    signals: Signals, step: float, unit: str, preparation: Preparation, r: int, found: Sequence[Finding]
+    signals: Signals, step: float, unit: str, preparation: Preparation, r: int, found: Iterable[Finding]
 ) -> Record:
     """The record in the signals of one file, of which the first `r` are inputs."""
     segments, done = segments_of(signals, step, unit, preparation)
@@ -256,13 +222,12 @@ def _record(
         np.concatenate([part.time for part in segments]),
         tuple(len(part.y) for part in segments),
         ((signals.sheet.path.name, len(inputs)),),
-        {},
-        step,
-        unit,
-        (*signals.findings, *done, *found),
-        tuple(signals.sheet.header),
-        np.nanmean(signals.u[:, :r], axis=0),
         _recorded(signals, step, segments, r),
+        step=step,
+        time_unit=unit,
+        findings=(*signals.findings, *done, *found),
+        header=tuple(signals.sheet.header),
+        means=np.nanmean(signals.u[:, :r], axis=0),
         lined=any(part.lined for part in segments),
     )
 

@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.outlying_values import without_spikes
-from inputdesign_cli.findings.record_cut import lines_passed_over, record_cut
-from inputdesign_cli.findings.record_sampling import columns_joined, inputs_move_between, jitter_evened
-from inputdesign_cli.findings.trend_removed import trend_removed
+from inputdesign_cli.findings.prepared_records import (
+    columns_joined,
+    jitter_evened,
+    lines_passed_over,
+    record_cut,
+    trend_removed,
+)
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.records.preparation import Detrend, Preparation
 from inputdesign_cli.records.signals import Signals
@@ -89,7 +93,7 @@ def joined_rows(signals: Signals, *, resample: bool) -> Signals:
     moved = int(np.any([moves for _, moves in inputs], axis=0).sum())
     found = columns_joined(counts, len(whole), moved, len(rows))
     u, y = (np.column_stack(columns) for columns in ([means for means, _ in inputs], outputs))
-    return replace(signals.at(rows), u=u, y=y, findings=(*signals.findings, *found))
+    return replace(signals.at(rows), u=u, y=y, findings=(*signals.findings, found))
 
 
 def _until_next(time: Array, x: Array, instants: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -160,7 +164,7 @@ def segments_of(
             raise sheet.error("data-not-uniform", message, hint, row)
         moved = sum(_moves_between(part, step) for part in parts)
         parts = [_resampled(part, step) for part in parts]
-        evened = [jitter_evened(step, time_unit, off), *inputs_move_between(moved)]
+        evened = [*jitter_evened(step, time_unit, off, moved)]
     taken = [_detrended(part, signals, preparation) for part in parts]
     trends = [one for _, found in taken for one in found]
     return [part for part, _ in taken], [*evened, *cuts, *seen, *dict.fromkeys(trends)]

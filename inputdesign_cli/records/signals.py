@@ -13,8 +13,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.outlying_values import beyond_precision
-from inputdesign_cli.findings.record_columns import sheets_unread
-from inputdesign_cli.findings.record_times import TIMES_READ
+from inputdesign_cli.findings.prepared_records import TIMES_READ, sheets_unread
 from inputdesign_cli.records.columns import (
     TIME_UNITS,
     called,

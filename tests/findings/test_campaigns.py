@@ -2,9 +2,13 @@
 
 import pytest
 
-from inputdesign_cli.findings.campaign_estimates import campaign_refuted, estimate_not_used
-from inputdesign_cli.findings.campaign_plans import planned_otherwise
-from inputdesign_cli.findings.campaign_records import hardly_followed, shorter
+from inputdesign_cli.findings.campaigns import (
+    campaign_refuted,
+    estimate_not_used,
+    hardly_followed,
+    planned_otherwise,
+    shorter,
+)
 
 AS_ASKED = {"why": "", "capped": False, "share": 1.0, "beyond": False, "part_cost": 2.0, "fragile": False}
 

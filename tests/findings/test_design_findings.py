@@ -9,7 +9,6 @@ from inputdesign_cli.findings import (
     designed_records as records,
     designs,
     simulated_runs as runs,
-    table_spectra,
     uncertain_plants as plants,
     unfinished,
 )
@@ -39,7 +38,7 @@ GAP = Objective("least_cost", 2.0, lower_bound=1.9, relative_gap=0.05)
 
 FOUND = {
     "no-excitation-needed": [designs.nothing_needed(Experiment(MODEL, 500), at_every_plant=True)],
-    "input-without-power": designs.inputs_without_power([1.0, 0.0]),
+    "input-without-power": list(designs.inputs_without_power([1.0, 0.0])),
     "experiment-short": designs.short_experiment(Experiment(MODEL, 100)),
     "excitation-almost-free": designs.almost_free(
         UNITS, np.array([0.01, 1.0]), np.ones(2), np.array([1e-6, 1.0]), 1.0
@@ -74,7 +73,7 @@ FOUND = {
     "other-length": runs.other_length(1, 7),
     "initial-estimate-off": runs.initial_estimate_off(UNITS, {"design": ELSEWHERE}),
     "runs-see-one-minimum": runs.one_minimum(Searched(10, 3, 7)),
-    "met-within-table": [table_spectra.met_within_table(1e-5)],
+    "met-within-table": [designs.met_within_table(1e-5)],
 }
 
 
@@ -87,13 +86,13 @@ def test_a_finding_has_its_code_and_short_sentences(code):
 
 def test_what_is_in_order_is_not_noted():
     good = replace(MADE, met=True, extra_power=0.1)
-    assert designs.inputs_without_power([1.0, 0.5]) == []
+    assert list(designs.inputs_without_power([1.0, 0.5])) == []
     assert designs.short_experiment(Experiment(MODEL, 1000)) == []
     assert plants.fewer_plants(120, 120) == plants.unstable_draws(40, 100) == []
     assert plants.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good, held=True) == []
     assert records.length_of_record(good, 40, 1, {}) == records.less_accurate(1.001, 1.0) == []
-    assert runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None) == []
+    assert list(runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None)) == []
     assert runs.other_length(7, 7) == runs.one_minimum(None) == []
 
 

@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.explore import explore_structure
-from inputdesign_cli.findings.measured_response import contradicted
+from inputdesign_cli.findings.frequency_responses import contradicted
 from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions import explore, identify

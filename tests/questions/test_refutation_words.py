@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from inputdesign_cli.findings.copied_samples import SAMPLES_REPEATED
-from inputdesign_cli.findings.other_systems import contradictions, differences, repetitions
+from inputdesign_cli.findings.other_systems import SAMPLES_REPEATED, contradictions, differences, repetitions
 from inputdesign_cli.identification.repeated import Repetition
 from inputdesign_cli.outcome.shares import chance
 

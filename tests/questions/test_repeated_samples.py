@@ -6,7 +6,7 @@ import scipy.signal
 
 from inputdesign_cli import assess, parse_spec
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.copied_samples import shared
+from inputdesign_cli.findings.other_systems import shared
 from inputdesign_cli.questions import explore
 from inputdesign_cli.records import Preparation
 

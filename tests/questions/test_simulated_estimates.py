@@ -61,7 +61,7 @@ def test_less_than_what_is_asked_is_told(kept, told):
     runs = 4000
     limits = scipy.stats.binomtest(round(kept * runs), runs).proportion_ci(0.95)
     reached = Reached(1000, kept, (0.9, 1.0), kept, runs, kept, (limits.low, limits.high))
-    found = confidence_missed(replace(reached, asked=0.95), reached)
+    found = list(confidence_missed(replace(reached, asked=0.95), reached))
     assert [one.code for one in found] == ["confidence-missed"] * 2 * told
     assert all(one.figures["asked"] == 0.95 for one in found)
 

@@ -21,7 +21,7 @@ from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import Finding, reasons
 from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal, of_first_part
 from inputdesign_cli.findings.faults import faults
-from inputdesign_cli.findings.measured_response import response_note
+from inputdesign_cli.findings.frequency_responses import response_note
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.findings.top_up_levels import level_notes, prior_left_out
 from inputdesign_cli.identification import frequency_response, response_delays

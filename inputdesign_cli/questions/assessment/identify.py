@@ -16,14 +16,22 @@ from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, Location, SpecError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.estimates import band_limited, near_zero, on_the_circle, started, unasked
+from inputdesign_cli.findings.estimates import (
+    band_limited,
+    larger_noise,
+    near_zero,
+    noise_probability,
+    on_the_circle,
+    started,
+    stopped_at_ends,
+    unasked,
+    unsettled,
+)
 from inputdesign_cli.findings.faults import faults, loop_faults
-from inputdesign_cli.findings.larger_noise import larger_noise, noise_probability
 from inputdesign_cli.findings.level_shifts import shifted_levels
 from inputdesign_cli.findings.other_systems import differences, prior_notes, repetitions
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.rivals import other_minima, ruled_out
-from inputdesign_cli.findings.search import stopped_at_ends, unsettled
 from inputdesign_cli.findings.unrelated_inputs import answering, hardly_explained, idle
 from inputdesign_cli.identification import (
     Earlier,

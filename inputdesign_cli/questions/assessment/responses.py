@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.findings.measured_response import BY_U
+from inputdesign_cli.findings.frequency_responses import BY_U
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.outcome import MeasuredLines
 from inputdesign_cli.outcome.curves import ResponseCurves, ResponsePanel

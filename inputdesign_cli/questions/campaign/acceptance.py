@@ -9,7 +9,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.campaign_records import hardly_followed, shorter, without_excitation
+from inputdesign_cli.findings.campaigns import hardly_followed, shorter, without_excitation
 from inputdesign_cli.outcome.campaign import PartRecord, PlannedPart
 from inputdesign_cli.outcome.text_formats import csv_columns
 from inputdesign_cli.questions.campaign.applied import LIKE, UNLIKE, Match, copied, matched, standing_in

@@ -14,9 +14,7 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.campaign_estimates import campaign_refuted
-from inputdesign_cli.findings.campaign_plans import planned_otherwise
-from inputdesign_cli.findings.campaign_records import withdrawn_record
+from inputdesign_cli.findings.campaigns import campaign_refuted, planned_otherwise, withdrawn_record
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves

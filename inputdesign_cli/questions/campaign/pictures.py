@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from inputdesign_cli.findings.earlier_pictures import earlier_pictures
 from inputdesign_cli.outcome.record import listed_files
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import output_errors
@@ -13,7 +12,7 @@ from inputdesign_cli.regular_file import read_regular
 
 
 def with_earlier_pictures(results: Results, directory: Path) -> Results:
-    """Return the results with the pictures of the last decision, and a finding that they are older.
+    """Return the results with the pictures of the last decision.
 
     Raises:
         OutputError: a picture cannot be read.
@@ -21,5 +20,4 @@ def with_earlier_pictures(results: Results, directory: Path) -> Results:
     names = [name for name in listed_files(directory) if name.endswith(".png")]
     with output_errors(directory):
         pictures = {name: read_regular(directory / name) for name in names}
-    outcome = results.outcome.saying(earlier_pictures(names))
-    return replace(results, outcome=outcome, files={**results.files, **pictures})
+    return replace(results, files={**results.files, **pictures})

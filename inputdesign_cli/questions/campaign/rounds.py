@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.campaign_estimates import campaign_doubted, estimate_not_used, no_estimate_yet
+from inputdesign_cli.findings.campaigns import campaign_doubted, estimate_not_used, no_estimate_yet
 from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.identification import information_of_data
 from inputdesign_cli.outcome.assessment import Verdict

@@ -17,14 +17,7 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, wha
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.rivals import (
-    Apart,
-    beyond_admissible,
-    beyond_errors,
-    foreseen_entries,
-    foreseen_rivals,
-    not_foreseen,
-)
+from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, foreseen_rivals, not_foreseen
 from inputdesign_cli.identification import Earlier, Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.searched_runs import searched_run
@@ -113,10 +106,10 @@ class Foresight:
             estimate = replace(estimate, rivals=known)
         model, errors = self.nominal.model.at(estimate.theta), model_errors(requirements)
         if errors:
-            return beyond_admissible(model, estimate, errors)
+            return beyond(model, estimate, errors)
         plant = FiniteRecord(self.nominal, len(record), self.units.step)
         unstated: Sequence[OnModelError] = self.entries
-        return beyond_errors(model, estimate, unstated, plant.information(record))
+        return beyond(model, estimate, unstated, plant.information(record))
 
     def _not_now(self, samples: int) -> str:
         """Why nothing is looked for; empty where it is."""

@@ -16,8 +16,8 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.explored_inputs import DRIVE, doubtful_inputs, undriven
 from inputdesign_cli.findings.explored_models import doubtful_model
 from inputdesign_cli.findings.faults import biasing
+from inputdesign_cli.findings.frequency_responses import contradicted, response_note
 from inputdesign_cli.findings.level_shifts import left_out, shifted_levels
-from inputdesign_cli.findings.measured_response import contradicted, response_note
 from inputdesign_cli.findings.nonlinear_response import silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
@@ -85,7 +85,7 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
     response = _without_model(units, log, found, loop=bool(loops))
     doubts = [
         *doubtful_model(found, measured.parts, log.step, log.time_unit, integrates=only == "integrator"),
-        *doubtful_inputs(found, measured.parts, log.step, log.time_unit, loop=bool(loops)),
+        *doubtful_inputs(found, measured.parts, loop=bool(loops)),
         *late_inputs(measured.parts),
         *biasing(units, found.estimate, data, found.validation.simulation),
         *(() if response is None else contradicted(response.lines)),

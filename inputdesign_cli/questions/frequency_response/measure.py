@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE, inputs_do_not_repeat, unexcited_lines
+from inputdesign_cli.findings.frequency_responses import REMEDY, UNLIKE, inputs_do_not_repeat, unexcited_lines
 from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
@@ -124,7 +124,7 @@ def _doubted(
     spikes = period_spikes(data.y, periods, repeats=repeats)
     if spikes:
         where = [places(units, data, one.samples) for one in spikes]
-        spiked = spiked_periods(units, spikes, where, len(data.y), counted.kept)
+        spiked = list(spiked_periods(units, spikes, where, len(data.y), counted.kept))
         return replace(judged, scattered=tuple(spiked))
     noise = _noise_at_rest(question.model, terms, judged)
     drift = period_drift(data.y, data.time, periods, noise, repeats=repeats)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
-from inputdesign_cli.findings.counted_periods import REMEDY, UNLIKE
+from inputdesign_cli.findings.frequency_responses import REMEDY, UNLIKE
 from inputdesign_cli.findings.nonlinear_response import Distorted, nonlinear_response, silent_lines_answer
 from inputdesign_cli.findings.scattered_periods import within_chance
 from inputdesign_cli.identification import FrequencyResponse

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.counted_periods import periods_between_gaps, samples_before_periods
+from inputdesign_cli.findings.frequency_responses import periods_between_gaps, samples_before_periods
 from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
 from inputdesign_cli.records import Record
 

@@ -309,7 +309,7 @@ def _findings(done: Designed) -> list[Finding]:
     if not done.excites:
         return [nothing_needed(done.experiment, at_every_plant=bool(done.kept))]
     excited = powers(problem, found.basis, found.x).excitation or ()
-    findings = inputs_without_power(excited) + short_experiment(done.experiment)
+    findings = [*inputs_without_power(excited), *short_experiment(done.experiment)]
     findings += sign_open(problem.requirements)
     if done.units.closed_loop and not found.basis.has_density:
         lines, matrices = found.basis.lines(found.x)

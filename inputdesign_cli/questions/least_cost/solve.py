@@ -257,8 +257,7 @@ class ConvexTask:
         signal, record = outcome.signal, made.record
         designed = None if outcome.model_error is None else outcome.model_error.confidence
         shares, recorded = (None, None) if signal is None else (signal.of_limits, signal.confidence)
-        findings = confidence_missed(designed, recorded)
-        findings += made.findings
+        findings = [*confidence_missed(designed, recorded), *made.findings]
         limited = any(limit.upper for limit in done.design.problem.limits)
         findings += record_findings(made.request, done.experiment.samples, record, shares, of_powers=limited)
         if record is not None and known is not None and signal is not None:

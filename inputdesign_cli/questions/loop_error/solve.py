@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.findings.unstable_runs import unstable_runs
+from inputdesign_cli.findings.simulated_runs import unstable_runs
 from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.outcome import Simulation
@@ -83,7 +83,7 @@ class LoopErrorTask:
         study = Simulation(
             trial.runs, trial.seed, tried, samples=samples, parameters=names, improvement=improvement
         )
-        findings = unstable_runs({name: one.unstable for name, one in studies.items()}, trial.runs)
+        findings = list(unstable_runs({name: one.unstable for name, one in studies.items()}, trial.runs))
         return with_study(results, study, begun, curves=curves, findings=findings)
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
