@@ -15,51 +15,43 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass, field
+from contextlib import closing, contextmanager, nullcontext, suppress
 from itertools import islice
 from multiprocessing.connection import Connection
 
-from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD, Answer, Finished, Job, WorkerLostError
 
 _ATTEMPTS = 2
 
 
-@dataclass(frozen=True)
 class Processes:
-    """`count` processes; a job whose process is killed is tried again, in a process of its own."""
+    """`count` processes; a job whose process is killed is tried again, in a process of its own.
 
-    count: int
-    shares_files: bool = field(default=True, init=False)
+    Once started they stay from one run to the next, with what they have imported, until they are ended.
+    """
 
-    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
-        """Yield every job with its answer, in the order in which they are finished."""
-        with closing(_Pool(self.count)) as pool:
-            yield from pool.run(function, jobs)
-
-
-class StandingProcesses(Processes):
-    """Processes that stay from one run to the next, with what they have imported, until they are ended."""
+    shares_files = True
 
     def __init__(self, count: int) -> None:
-        super().__init__(count)
-        object.__setattr__(self, "_pool", _Pool(count))
-
-    _pool: _Pool
+        self.count = count
+        self._standing: _Pool | None = None
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer, in the order in which they are finished."""
-        return self._pool.run(function, jobs)
+        with nullcontext(self._standing) if self._standing else closing(_Pool(self.count)) as pool:
+            yield from pool.run(function, jobs)
 
     def start(self) -> None:
         """Start them all; in the main thread they are deaf to its interrupts."""
+        self._standing = _Pool(self.count)
         for _ in range(self.count):
-            self._pool.submit(os.getpid)
+            self._standing.submit(os.getpid)
 
     def end(self) -> None:
-        """End them all."""
-        self._pool.close()
+        """End those that stand."""
+        if self._standing:
+            self._standing.close()
+            self._standing = None
 
 
 class _Pool:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from threading import Thread
 
 from inputdesign_cli.compute.executor import Executor, InProcess
-from inputdesign_cli.compute.processes import StandingProcesses
+from inputdesign_cli.compute.processes import Processes
 
 _MOST = 4
 
@@ -18,7 +18,7 @@ class Painters:
 
     def __init__(self, count: int) -> None:
         """Begin with none; `count` processes are made ready when asked for."""
-        self._processes = StandingProcesses(count)
+        self._processes = Processes(count)
         self._getting_ready: Thread | None = None
 
     @property

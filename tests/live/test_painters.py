@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.executor import InProcess
-from inputdesign_cli.compute.processes import StandingProcesses
+from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.live.painters import Painters
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.report.charts import run_charts
@@ -44,7 +44,7 @@ def name_of_process(_):
 
 
 def test_processes_stay_from_run_to_run_until_they_are_ended():
-    standing = StandingProcesses(2)
+    standing = Processes(2)
     standing.start()
     first, second = ({one.answer for one in standing.run(name_of_process, range(8))} for _ in range(2))
     assert len(first | second) <= 2

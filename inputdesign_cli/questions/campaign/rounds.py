@@ -16,8 +16,8 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.campaign_estimates import campaign_doubted, estimate_not_used, no_estimate_yet
 from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.identification import information_of_data
-from inputdesign_cli.outcome.assessment import Verdict
 from inputdesign_cli.outcome.campaign import State
+from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.assess import judge
