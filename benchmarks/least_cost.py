@@ -30,7 +30,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD
 
 os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 

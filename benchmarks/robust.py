@@ -16,7 +16,7 @@ import os
 import time
 from pathlib import Path
 
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
 

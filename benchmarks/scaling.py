@@ -32,7 +32,7 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD
 
 os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 

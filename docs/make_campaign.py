@@ -60,10 +60,10 @@ def campaign_in_a_loop(folder: Path) -> None:
         sys.stdout.write(f"| {' | '.join(map(str, told))} |\n")
     at_the_truth = replace(study.true, samples=len(r))
     question = study.planner.question(
-        study.true.model, FiniteRecord(at_the_truth, len(r), study.step).information(r)
+        study.true.model, FiniteRecord(at_the_truth, len(r), study.planner.step).information(r)
     )
     ratio = ratio_of(question, question.information)
-    share = energy_of(r, study.true, study.step, study.cost) / study.planner.cheapest(study.true.model)
+    share = energy_of(study.planner, r, study.true) / study.planner.cheapest(study.true.model)
     sys.stdout.write(f"true ratio {ratio:.3f}, energy over that of knowing the plant {share:.3f}\n")
     shutil.copy(run / "campaign.png", IMAGES / "campaign_flexible.png")
 

@@ -13,8 +13,7 @@ import tempfile
 from itertools import zip_longest
 from pathlib import Path
 
-from inputdesign_cli.outcome.golden import Row, compare
-from inputdesign_cli.outcome.golden_file import Golden, load_golden
+from inputdesign_cli.outcome.golden import Golden, Row, compare, load_golden
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions.verbs import run_verb
 from inputdesign_cli.specification import load_spec

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD
 
 os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 

@@ -22,7 +22,7 @@ from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.watch import report, watch
 from inputdesign_cli.cli.wizard import wizard
-from inputdesign_cli.compute.threads import use_one_thread
+from inputdesign_cli.compute.executor import use_one_thread
 from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:

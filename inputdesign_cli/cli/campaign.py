@@ -97,9 +97,8 @@ def proceed(
     with computing(directory, quiet=quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.record import SPEC
-        from inputdesign_cli.questions.campaign.directory import advanced, withdrawn
+        from inputdesign_cli.questions.campaign.directory import advanced, with_earlier_pictures, withdrawn
         from inputdesign_cli.questions.campaign.memory import held, read_memory
-        from inputdesign_cli.questions.campaign.pictures import with_earlier_pictures
         from inputdesign_cli.specification import parse_spec
 
     with held(directory):

@@ -75,8 +75,7 @@ def _compare(
     Raises:
         IdesignError: a file, or a spec that it names, is not good.
     """
-    from inputdesign_cli.outcome.golden import compare
-    from inputdesign_cli.outcome.golden_file import load_golden
+    from inputdesign_cli.outcome.golden import compare, load_golden
     from inputdesign_cli.questions.verbs import execute
 
     for golden in [load_golden(path) for path in files]:

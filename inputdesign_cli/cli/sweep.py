@@ -97,24 +97,25 @@ def sweep(
     a row with its reason.
     """
     from inputdesign_cli.sweeps import running as batch
+    from inputdesign_cli.sweeps.plan import build_plan
 
     directory = asked.output or Path("runs") / f"{name_of(spec)}-sweep"
     stdin = str(spec) == STANDARD_STREAM
     common: dict[str, Any] = {
         "spec": Path("<stdin>") if stdin else spec,
         "settings": asked.settings or [],
-        "directory": directory,
         "zipped": asked.zipped,
         "verb": asked.verb,
         "confine": asked.confine,
         "text": standard_input() if stdin else None,
     }
     if dry_run:
-        _list(batch.list_points(**common), json_output=json_output)
+        _list(batch.list_points(build_plan(**common), directory), json_output=json_output)
         return
     with _watched(directory, quiet=quiet) as line:
         done = batch.run_sweep(
             **common,
+            directory=directory,
             executor=workers.executor(quiet=quiet),
             fail_fast=fail_fast,
             rerun_failed=rerun_failed,

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
 from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
@@ -46,7 +47,7 @@ class Cluster:
             while True:
                 with _reaching(self.address):
                     free = _AHEAD * _threads(client) - len(known)
-                for job in _take(source, free):
+                for job in islice(source, max(free, 0)):
                     with _reaching(self.address):
                         known[client.submit(function, job, pure=False)] = job
                 if not known:
@@ -126,14 +127,6 @@ def _version() -> str:
 
 def _threads(client: Any) -> int:
     return max(1, sum(client.nthreads().values()))
-
-
-def _take(source: Iterator[Job], count: int) -> Iterator[Job]:
-    for _ in range(count):
-        try:
-            yield next(source)
-        except StopIteration:
-            return
 
 
 @contextmanager

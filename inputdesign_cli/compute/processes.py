@@ -20,8 +20,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from multiprocessing.connection import Connection
 
-from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD, Answer, Finished, Job, WorkerLostError
 
 _ATTEMPTS = 2
 

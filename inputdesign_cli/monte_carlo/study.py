@@ -1,16 +1,22 @@
-"""A Monte Carlo study: excitations tried on the true system and, where that differs, on the design model."""
+"""A Monte Carlo study: experiments from rest on the true system or the design model, and their estimates."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import BatchEstimate, Earlier, Estimate, Rival, fit_batch, identify
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
-from inputdesign_cli.monte_carlo.simulated_runs import TrialJob, run_job
 from inputdesign_cli.monte_carlo.trials import Trials
+from inputdesign_cli.plant import Model
 
 # Records of outputs that are simulated and identified in one pass.
 _OUTPUTS_AT_ONCE = 100
@@ -63,9 +69,130 @@ def tried_on_model(study: Study, excitation: Excitation, executor: Executor | No
 
 def _tried(study: Study, experiment: Experiment, excitation: Excitation, executor: Executor | None) -> Tried:
     model = study.nominal.model
-    job = TrialJob(experiment, model, excitation, study.step)
+    job = _Job(experiment, model, excitation, study.step)
     # The same seed for every excitation: they meet the same noise.
     size = max(1, _OUTPUTS_AT_ONCE // model.outputs)
-    parts = run_batches(run_job, job, runs=study.runs, size=size, seed=study.seed, executor=executor)
+    parts = run_batches(_run, job, runs=study.runs, size=size, seed=study.seed, executor=executor)
     same = experiment.model.names == model.names
     return Tried(excitation.name, Trials.joined(parts), excitation.information(experiment) if same else None)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What all batches of one study share.
+
+    Attributes:
+        true: the true system and the length of its experiment.
+        model: of which the structure is estimated; the search begins at its parameters.
+        step: time between samples in the unit of the experiment's frequencies.
+    """
+
+    true: Experiment
+    model: Model
+    excitation: Excitation
+    step: float
+
+
+def _run(job: _Job, runs: int, rng: np.random.Generator) -> Trials:
+    """Simulate a batch of experiments from rest on the true system and identify each of them.
+
+    The noise is drawn first, so that every excitation meets the same. Runs where the search does not
+    settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
+    with an error of its own in each run.
+    """
+    true, system = job.true, job.true.model
+    e = _noise(true, runs, rng)
+    r = job.excitation.draw(runs, true.samples, rng)
+    (u_r, u), (y_r, y) = _responses(true, r, e, job.step)
+    found = _again_where_lost(job, u, y, fit_batch(job.model, u, y, job.step, start=job.model.theta))
+    theta = found.theta
+    if true.prior is not None and system.names == job.model.names:
+        theta = _with_prior(found, true.prior, system.theta, rng)
+    caused: dict[PowerKind, Array] = {"input": u_r, "output": y_r, "excitation": r}
+    power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
+    total: dict[PowerKind, list[float]] = {"input": _mean_squares(u), "output": _mean_squares(y)}
+    return Trials(true, job.model, theta, found.converged, power, total, first=np.array(r[0]))
+
+
+def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> Array:
+    """e (runs, samples, p) of a system."""
+    system = true.model
+    white = rng.standard_normal((runs, true.samples, system.outputs))
+    return np.asarray(white @ np.linalg.cholesky(system.covariance).T)
+
+
+def _responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple[Array, Array], ...]:
+    """Inputs (runs, samples, r) and outputs (runs, samples, p) from rest: of r alone, and of r and e."""
+    if true.loop is None:
+        y_r, y_e = true.model.simulate(r, e, step)
+        return (r, r), (y_r, y_r + y_e)
+    (y_r, u_r), (y_e, u_e) = true.loop.signals(r, 0.0 * e), true.loop.signals(0.0 * r, e)
+    return (u_r, u_r + u_e), (y_r, y_r + y_e)
+
+
+def _again_where_lost(job: _Job, u: Array, y: Array, found: BatchEstimate) -> BatchEstimate:
+    """The same, each run whose search did not settle estimated anew from several starts."""
+    theta, noise, information = found.theta.copy(), found.noise.copy(), found.information.copy()
+    converged, steps = found.converged.copy(), found.steps.copy()
+    feedback = job.true.loop is not None
+    lost = np.flatnonzero(~converged).tolist()
+    for done, run in enumerate(lost):
+        tell(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))
+        try:
+            other = identify(
+                job.model, u[run], y[run], job.step, start=job.model.theta, feedback=feedback, rest=True
+            )
+        except SpecError:  # the noise of this run leaves some parameter without an estimate
+            continue
+        theta[run], noise[run], information[run] = other.theta, other.noise, other.information
+        converged[run], steps[run] = other.converged, other.steps
+    return BatchEstimate(theta, noise, information, converged, steps)
+
+
+def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
+    """Estimates (runs, k) combined with earlier ones.
+
+    Args:
+        prior: the information (k, k) of the earlier estimates, which may be singular.
+        centre: (k,), about which they scatter.
+    """
+    values, vectors = np.linalg.eigh(prior)
+    root: NDArray[np.float64] = vectors * np.sqrt(np.maximum(values, 0.0))
+    earlier = prior @ centre + rng.standard_normal(found.theta.shape) @ root.T
+    own = np.einsum("rij,rj->ri", found.information, found.theta)
+    return np.linalg.solve(found.information + prior, (own + earlier)[:, :, None])[:, :, 0]
+
+
+def _mean_squares(x: Array) -> list[float]:
+    """Channel by channel over all runs (runs, samples, channels)."""
+    return [float(value) for value in np.mean(x**2, axis=(0, 1))]
+
+
+def searched_run(
+    nominal: Experiment, record: Array, step: float, rng: np.random.Generator, earlier: Earlier | None
+) -> tuple[Estimate, bool]:
+    """The minima that the search of `identify` finds, and whether the best one is that of the nominal plant.
+
+    The estimate is the minimum that is nearest to the nominal parameters; its rivals are the others, whose
+    excess is negative where they explain the record better.
+
+    Args:
+        nominal: the experiment, in raw parameters.
+        record: (n, r), the excitation.
+        step: time between samples in the unit of the experiment's frequencies.
+        earlier: what counts along.
+
+    Raises:
+        SpecError: see `identify`.
+    """
+    true, model = replace(nominal, samples=len(record)), nominal.model
+    (_, u), (_, y) = _responses(true, record[None], _noise(true, 1, rng), step)
+    found = identify(
+        model, u[0], y[0], step, start=model.theta, feedback=true.loop is not None, rest=True, earlier=earlier
+    )
+    minima = (Rival(found.theta, 0.0), *found.rivals)
+    away = [float(np.sum((found.factor.T @ (one.theta - model.theta)) ** 2)) for one in minima]
+    number = int(np.argmin(away))
+    home = minima[number]
+    others = tuple(Rival(one.theta, one.excess - home.excess) for n, one in enumerate(minima) if n != number)
+    return replace(found, theta=home.theta, rivals=others), number == 0

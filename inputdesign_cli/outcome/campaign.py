@@ -1,7 +1,4 @@
-"""What is said of a campaign: its records, its rounds and its plans.
-
-A directory of an older version lacks some keys. These fields are None then.
-"""
+"""What is said of a campaign: its records, its rounds and its plans."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from inputdesign_cli.outcome.codec import others
 from inputdesign_cli.outcome.design import Objective, Spectrum
 
 State = Literal["running", "stopped", "missed", "undecided"]
@@ -35,7 +31,6 @@ class PartRecord:
     energy: float
     likeness: float | None = None
     scale: float | None = None
-    details: Mapping[str, object] = others()
 
 
 @dataclass(frozen=True)
@@ -62,18 +57,17 @@ class PlannedPart:
 
     file: str
     samples: int
+    planned_samples: int
     power: float
+    part_power: float
+    cost: float
+    part_cost: float
+    kind: PlanKind
+    capped: bool
+    seed: int
     offset: tuple[float, ...]
-    planned_samples: int | None = None
-    part_power: float | None = None
-    cost: float | None = None
-    part_cost: float | None = None
-    kind: PlanKind | None = None
-    capped: bool | None = None
-    seed: int | None = None
     design: PlanClaim | None = None
     why: str | None = None
-    details: Mapping[str, object] = others()
 
 
 @dataclass(frozen=True)
@@ -89,7 +83,6 @@ class Round:
     worst_ratio: float | None = None
     share: float | None = None
     plan: PlannedPart | None = None
-    details: Mapping[str, object] = others()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,15 +102,14 @@ class Campaign:
     time_unit: str
     folder: str
     state: State
-    samples: int | None = None
-    max_samples: int | None = None
+    samples: int
+    max_samples: int
     records: tuple[PartRecord, ...]
     rounds: tuple[Round, ...]
     last: Mapping[str, float] | None = None
     first_cost: float | None = None
-    digests: Mapping[str, str] | None = None
+    digests: Mapping[str, str]
     regardless: bool | None = None
-    details: Mapping[str, object] = others()
 
     @property
     def done(self) -> int:
@@ -127,7 +119,7 @@ class Campaign:
     @property
     def plan(self) -> PlannedPart | None:
         """The part that is due; None if the campaign has ended."""
-        return self.rounds[-1].plan
+        return self.rounds[-1].plan if self.rounds else None
 
     @property
     def plans(self) -> tuple[PlannedPart, ...]:

@@ -92,8 +92,11 @@ def _read(kind: Any, data: Any, where: str) -> Any:
     if origin is Literal:
         return _one_of(arguments, data, where)
     if origin is not None:  # a mapping
-        content = _mapping(data, where)
-        return {key: _read(arguments[1], item, _below(where, key)) for key, item in content.items()}
+        key, of = arguments
+        return {
+            float(name) if key is float else name: _read(of, item, _below(where, name))
+            for name, item in _mapping(data, where).items()
+        }
     return _read_object(kind, data, where) if dataclasses.is_dataclass(kind) else _scalar(kind, data, where)
 
 
@@ -145,16 +148,17 @@ def _read_tuple(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
 def _read_array(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
     of_complex = get_args(arguments[1])[:1] == (np.complex128,)
     try:
-        plain = _without_complex(data) if of_complex else data
-        return np.asarray(plain, dtype=complex if of_complex else float)
+        plain = np.asarray(_with_complex(data)) if of_complex else data
+        return np.asarray(plain, dtype=complex if np.iscomplexobj(plain) else float)
     except (TypeError, ValueError, KeyError, OverflowError) as error:
         raise OutcomeError(f"{_named(where)} is no array of numbers") from error
 
 
-def _without_complex(data: Any) -> Any:
+def _with_complex(data: Any) -> Any:
+    """Return numbers with each {re, im} as one; both may be lists."""
     if isinstance(data, Mapping):
-        return complex(data["re"], data["im"])
-    return [_without_complex(item) for item in data] if isinstance(data, _SEQUENCES) else data
+        return np.asarray(data["re"], dtype=float) + 1j * np.asarray(data["im"], dtype=float)
+    return [_with_complex(item) for item in data] if isinstance(data, _SEQUENCES) else data
 
 
 def _named(where: str) -> str:

@@ -1,4 +1,4 @@
-"""What is said of a designed or given excitation: objective, cost, powers, accuracy and information."""
+"""What is said of a designed or given excitation: objective, accuracy, information, and its record."""
 
 from __future__ import annotations
 
@@ -195,3 +195,129 @@ class Foreseen:
     """Other minima that a simulated record of the design leaves."""
 
     rivals: tuple[Rival, ...] = ()
+
+
+Channels = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Moves:
+    """The changes of a record of held values: how many, the largest, and the shortest dwell (time)."""
+
+    count: int
+    largest: Channels
+    shortest_dwell: float
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Sizes of the samples, one entry a channel, and what the samples themselves attain.
+
+    `worst_ratio` is the largest ratio of the requirements. `of_limits` are the shares of limits on single
+    samples that it takes. `begun_anywhere` is the growth of its errors where the start is unknown (None
+    without bound); it is absent (NaN here) where the start does not matter.
+    """
+
+    samples: int
+    type: str | None = None
+    sample_time: float | None = None
+    power: Channels | None = None
+    peak: Channels | None = None
+    crest_factor: Channels | None = None
+    input_power: Channels | None = None
+    output_power: Channels | None = None
+    input_peak: Channels | None = None
+    input_move: Channels | None = None
+    output_peak: Channels | None = None
+    criterion: float | None = None
+    efficiency: float | None = None
+    worst_ratio: float | None = None
+    extra_power: float | None = None
+    spectrum_error: float | None = None
+    limits: Mapping[str, tuple[float, float]] | None = None
+    of_limits: Mapping[str, float] | None = None
+    spectral_factor_residual: float | None = None
+    operating_point: Channels | None = None
+    wav_full_scale: float | None = None
+    confidence: Coverage | None = None
+    spectrum_of: Mapping[str, float] | None = None
+    start_shift: float | None = None
+    distance_to_best: float | None = None
+    moves: Moves | None = None
+    mean_squared_error: float | None = None
+    details: Mapping[str, object] = others()
+
+
+@dataclass(frozen=True)
+class LossMoments:
+    """Mean, standard deviation and (of runs) standard error."""
+
+    mean: float
+    sd: float
+    standard_error: float | None = None
+
+
+@dataclass(frozen=True)
+class TheoreticalLoss:
+    """N E||y - y0||^2 of the model structure, and the moments of its root."""
+
+    value: float
+    loss: LossMoments
+
+
+@dataclass(frozen=True)
+class ActivePower:
+    """A power limit of the design, what is attained, and its multiplier."""
+
+    power: str
+    max: float
+    attained: float
+    channel: int | None = None
+    multiplier: float | None = None
+
+
+@dataclass(frozen=True)
+class ClosedLoopError:
+    """The control law, the covariance that was used, and what theory expects; `band` in rad per time unit."""
+
+    law: str
+    covariance: str
+    expected: float
+    band: tuple[float, float]
+    noise_model_part: float
+    parametric: Mapping[str, TheoreticalLoss]
+    limits: tuple[ActivePower, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeanSquaredError:
+    """The error with its parts, squared bias and variance."""
+
+    value: float
+    bias_squared: float
+    variance: float
+    target: float | None = None
+    others: Mapping[str, object] = others()
+
+
+@dataclass(frozen=True)
+class Moments:
+    """The matrix R (n, n) of the regressors: summed over the samples."""
+
+    structure: str
+    estimated: int
+    trace: float
+    R: Array
+    entries: Mapping[str, float]
+    autocorrelations: Array | None = None
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How the value `of` changes with what the design rests on."""
+
+    of: str
+    neglected_norm: float
+    noise_deviation: float
+    target: float | None = None
+    energy: float | None = None

@@ -1,11 +1,14 @@
-"""What is said of an estimate."""
+"""What is said of data: an estimate, a verdict on it, and a model that was found in a log."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
-from inputdesign_cli.outcome.design import Rival
+from inputdesign_cli.outcome.codec import NULL
+from inputdesign_cli.outcome.design import RequirementMet, Rival
+from inputdesign_cli.outcome.response import MeasuredLines, SilentLine
 
 
 @dataclass(frozen=True)
@@ -51,3 +54,130 @@ class Identification:
     means_removed: bool | None = None
     operating_point: Mapping[str, float] | None = None
     fit_percent: float | tuple[float | None, ...] | None = None
+
+
+Verdict = Literal["met", "missed", "undecided"]
+
+
+@dataclass(frozen=True)
+class Neglected:
+    """A parameter that the model does without: how far it moves G over what is admitted.
+
+    `may_move` is an upper limit of that, with 95 %.
+    """
+
+    parameter: str
+    probability: float
+    moves: float
+    may_move: float
+    frequency: float
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """How far the estimate lies from the plant of the spec."""
+
+    deviations: float
+    statistic: float
+    degrees_of_freedom: int
+    probability: float
+    worst_difference: float | None = None
+    opposite_sign: bool | None = None
+    within_uncertainty: bool | None = None
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """The verdict with its reasons, and the accuracy that a designed top-up would reach.
+
+    `undecided` are the reasons against a verdict, `causes` their kinds. `left` is the largest ratio after the
+    top-up, `experiments` how often it has to be applied (`periods`: how many periods have to count).
+    """
+
+    verdict: Verdict
+    met: bool
+    requirements: tuple[RequirementMet, ...] = ()
+    undecided: tuple[str, ...] | None = None
+    causes: tuple[str, ...] | None = None
+    neglected: tuple[Neglected, ...] | None = None
+    variations: tuple[Neglected, ...] | None = None
+    nominal: Nominal | None = None
+    frequency_response: MeasuredLines | None = None
+    no_top_up: str | None = None
+    top_up_status: str | None = None
+    left: float | None = None
+    experiments: int | None = None
+    periods: int | None = None
+
+
+Fit = float | tuple[float | None, ...] | None
+"""Per cent of one output, or of each; None for an unstable model."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Fits of simulation and one-step prediction to data that the estimate has not seen."""
+
+    simulation_fit_percent: Fit = field(default=None, metadata=NULL)
+    prediction_fit_percent: Fit = field(default=None, metadata=NULL)
+    reasons: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A structure that was tried: its orders and delays, and how it fits.
+
+    `certain` is whether no parameter of the plant deviates by more than half its value.
+    """
+
+    family: str
+    orders: Mapping[str, int]
+    delay: tuple[int, ...]
+    parameters: int
+    criterion: float
+    converged: bool
+    certain: bool
+    estimation_fit_percent: float | None = field(default=None, metadata=NULL)
+    simulation_fit_percent: float | None = field(default=None, metadata=NULL)
+    prediction_fit_percent: float | None = field(default=None, metadata=NULL)
+
+
+@dataclass(frozen=True)
+class ExploredOutput:
+    """The structure that was chosen for an output, and all that were tried."""
+
+    output: str
+    structure: Structure
+    delay: tuple[int, ...]
+    delay_range: tuple[tuple[int, int | None], ...]
+    output_error_by_order: Mapping[str, float]
+    structures: tuple[Structure, ...]
+    not_estimated: tuple[str, ...]
+    noise_integrates: bool
+
+
+@dataclass(frozen=True)
+class FeedbackInput:
+    """An input that may answer the outputs, with the probability of that by chance."""
+
+    input: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """How the log was prepared, what was tried, and whether the model deserves trust."""
+
+    channels: Mapping[str, str]
+    sample_time: float
+    time_unit: str
+    samples: int
+    segments: tuple[int, ...]
+    steps: tuple[str, ...]
+    split: str
+    loop: tuple[FeedbackInput, ...]
+    outputs: tuple[ExploredOutput, ...]
+    trusted: bool
+    reasons: tuple[str, ...]
+    frequency_response: MeasuredLines | None = None
+    nonlinearity: Mapping[str, SilentLine] | None = None

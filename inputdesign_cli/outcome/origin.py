@@ -16,7 +16,6 @@ from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError, OutputError
 from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC, load_result, owned_files
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.regular_file import read_regular
 
 
@@ -41,7 +40,7 @@ class Origin:
             for file in self.files
         ]
 
-    def entry(self, target: Path, written: str) -> dict[str, Json]:
+    def entry(self, target: Path, written: str) -> dict[str, object]:
         """What `result.json` says of it.
 
         Args:
@@ -136,7 +135,7 @@ def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
     return OutputError.because("output-not-a-run", message, hint)
 
 
-def _changed(path: Path, known: Json) -> bool:
+def _changed(path: Path, known: object) -> bool:
     """Whether a file is there that is not the one of this SHA-256; False where none is known."""
     try:
         return known is not None and hashlib.sha256(read_regular(path)).hexdigest() != known

@@ -7,28 +7,28 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.outcome.assessment import Assessment
 from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.codec import others
 from inputdesign_cli.outcome.design import (
     Baseline,
+    ClosedLoopError,
     Foreseen,
     Information,
     LimitUse,
+    MeanSquaredError,
     ModelError,
+    Moments,
     Objective,
     Powers,
     RequirementMet,
+    Sensitivity,
+    Signal,
     Solver,
     Spectrum,
 )
-from inputdesign_cli.outcome.estimate import Identification
-from inputdesign_cli.outcome.exploration import Exploration, Validation
-from inputdesign_cli.outcome.loop_error import ClosedLoopError
-from inputdesign_cli.outcome.regression import MeanSquaredError, Moments, Sensitivity
+from inputdesign_cli.outcome.estimate import Assessment, Exploration, Identification, Validation
 from inputdesign_cli.outcome.response import MeasuredLines
 from inputdesign_cli.outcome.robust import Robust
-from inputdesign_cli.outcome.signal import Signal
 from inputdesign_cli.outcome.simulation import Simulation
 
 

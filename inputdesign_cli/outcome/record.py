@@ -8,9 +8,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.regular_file import read_regular
 
 RESULT, SPEC, SIGNAL, PAGE = "result.json", "spec.yaml", "signal.csv", "report.html"
@@ -25,7 +25,7 @@ _LONGEST_NAME = 255  # bytes, of a file system
 PAGE_MARK = b'<meta name="generator" content="idesign '
 
 
-def load_result(directory: Path) -> dict[str, Json]:
+def load_result(directory: Path) -> dict[str, Any]:
     """The content of `result.json`, of which only `format` and `files` are checked.
 
     Raises:
@@ -105,7 +105,7 @@ def _finite(text: str) -> float:
     return value
 
 
-def is_plain(name: Json) -> bool:
+def is_plain(name: object) -> bool:
     """Whether it names a file in the directory itself, and none elsewhere."""
     if not isinstance(name, str) or name in ("", os.curdir, os.pardir) or set(name) & {"/", "\0"}:
         return False

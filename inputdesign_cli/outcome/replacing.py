@@ -1,18 +1,16 @@
 """Replace one run by another: whole whenever the writer is killed, and put right by the next call.
 
-Everything happens in a folder of work. It is inside the directory of the run. It is next to it if the
-directory is yet to be made or is exchanged as a whole. It holds `new`, the files of the new run; `old`, the
-files of the run that leaves, only while files are moved one by one; and a lock, which ends with its process.
+Everything happens in a folder of work: inside the directory of the run, or next to it if the directory is yet
+to be made. It holds `new`, the files of the new run; `old`, the files of the run that leaves, while files are
+moved; and a lock, which ends with its process.
 """
 
 from __future__ import annotations
 
-import ctypes
 import os
 import shutil
-import stat
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -21,7 +19,6 @@ from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, listed_files
 
 _PATIENCE = 10.0  # seconds that another writer is waited for
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # of Linux
 
 
 @contextmanager
@@ -81,12 +78,8 @@ def heal(target: Path) -> None:
 def put_in_place(names: list[str], owned: Collection[str], work: Path, target: Path) -> None:
     """Replace the files `owned` of `target` by `names` of the new run in `work`, the result last.
 
-    In one step where the system can exchange folders, else file by file: then, if anything fails, the end of
-    the `workplace` or the next call undoes it.
+    If anything fails, the end of the `workplace` or the next call undoes it.
     """
-    work, exchanged = _exchanged(owned, work, target)
-    if exchanged:
-        return
     (work / "old").mkdir()
     _move([RESULT, *(name for name in owned if name != RESULT)], target, work / "old")
     sync(target)
@@ -127,59 +120,6 @@ def _clear(work: Path, target: Path) -> None:
         # Without it the rest is never taken for what is to be moved back.
         (new / RESULT).unlink(missing_ok=True)
     shutil.rmtree(work, ignore_errors=True)
-
-
-def _exchanged(owned: Collection[str], work: Path, target: Path) -> tuple[Path, bool]:
-    """Where the folder of work is now, and whether its `new` and `target` were exchanged in one step.
-
-    The user's files are in both while that happens. A folder among them cannot be, so that it prevents it;
-    nor is a directory exchanged that belongs to somebody else, is the current one, or is mounted.
-    """
-    beside = _places(target)[1]
-    exchange = _exchange()
-    status = target.stat()
-    if exchange is None or os.path.samefile(target, os.curdir) or status.st_uid != os.geteuid():
-        return work, False
-    try:
-        work = work.rename(beside)
-        new = work / "new"
-        for entry in target.iterdir():
-            if entry.name not in owned:
-                os.link(entry, new / entry.name, follow_symlinks=False)
-        new.chmod(stat.S_IMODE(status.st_mode))
-        sync(new)
-        exchange(new, target)
-    except OSError:
-        return work, False
-    sync(target.parent)
-    for entry in new.iterdir():
-        # What the user has saved in the meantime.
-        if entry.name not in owned and not _same(entry, target / entry.name):
-            entry.replace(target / entry.name)
-    return work, True
-
-
-def _same(one: Path, other: Path) -> bool:
-    return os.path.lexists(other) and os.path.samestat(one.lstat(), other.lstat())
-
-
-def _exchange() -> Callable[[Path, Path], None] | None:
-    """Return a function that exchanges two folders in one step, or None if the system cannot.
-
-    It raises `OSError`.
-    """
-    if not hasattr(os, "geteuid"):  # Windows
-        return None
-    try:
-        call = ctypes.CDLL(None, use_errno=True).renameat2
-    except (OSError, AttributeError):
-        return None
-
-    def exchange(one: Path, other: Path) -> None:
-        if call(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE):
-            raise OSError(ctypes.get_errno(), "the folders cannot be exchanged")
-
-    return exchange
 
 
 def _move(names: Iterable[str], source: Path, destination: Path) -> None:

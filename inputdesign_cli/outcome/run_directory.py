@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
@@ -21,11 +22,11 @@ from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin
 from inputdesign_cli.outcome.provenance import environment
 from inputdesign_cli.outcome.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files, unreadable
 from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
-from inputdesign_cli.outcome.results import Json, Results
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain
 
 
-def finished_result(results: Results) -> dict[str, Json]:
+def finished_result(results: Results) -> dict[str, Any]:
     """The content of `result.json` in JSON's own types, with `environment` and `spec_sha256` filled in.
 
     `spec_sha256` is the digest of `spec.yaml` as it is written.
@@ -34,7 +35,7 @@ def finished_result(results: Results) -> dict[str, Json]:
         ValueError, TypeError: The result holds a NaN, an infinity or a type that JSON lacks: a mistake of the
             program.
     """
-    result: dict[str, Json] = plain(results.result)
+    result: dict[str, Any] = plain(results.result)
     if not result.get("environment"):
         result["environment"] = environment()
     if not result.get("spec_sha256"):
@@ -127,7 +128,7 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
             partial.unlink(missing_ok=True)
 
 
-def read_run(directory: Path) -> dict[str, Json]:
+def read_run(directory: Path) -> dict[str, Any]:
     """The content of `result.json` of a whole run.
 
     Raises:
@@ -164,7 +165,7 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
 
 
 def _write_files(
-    results: Results, result: dict[str, Json], folder: Path, figures: Mapping[str, bytes]
+    results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
 ) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
     texts = {SPEC: results.resolved_spec}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from inputdesign_cli.outcome.results import Array, Json
+from inputdesign_cli.outcome.results import Array
 
 _A_LINE = 4
 
@@ -16,7 +16,7 @@ def mat_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
     """For MATLAB: columns under their names, which have no units, and `sample_time`."""
     import scipy.io
 
-    content: dict[str, Json] = {name.split()[0]: values[:, None] for name, values in channels.items()}
+    content: dict[str, object] = {name.split()[0]: values[:, None] for name, values in channels.items()}
     buffer = io.BytesIO()
     scipy.io.savemat(buffer, content | {"sample_time": sample_time})
     # The first 116 bytes are a text with the date, which would make equal runs differ.
@@ -26,7 +26,7 @@ def mat_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
 def npz_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
     """For numpy: columns under their names, and `sample_time`."""
     buffer = io.BytesIO()
-    arrays: dict[str, Json] = {name.split()[0]: values for name, values in channels.items()}
+    arrays = {name.split()[0]: values for name, values in channels.items()}
     np.savez(buffer, **arrays, sample_time=sample_time)
     return buffer.getvalue()
 

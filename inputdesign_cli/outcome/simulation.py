@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.codec import others
-from inputdesign_cli.outcome.design import Powers
-from inputdesign_cli.outcome.loop_error import LossMoments, TheoreticalLoss
+from inputdesign_cli.outcome.design import LossMoments, Powers, TheoreticalLoss
 
 Limits = tuple[float, float]
 

@@ -9,15 +9,16 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import orjson
 
-from inputdesign_cli.outcome.results import Array, Json, Table
+from inputdesign_cli.outcome.results import Array, Table
 from inputdesign_cli.regular_file import read_regular
 
 
-def plain(value: Json, where: str = "result") -> Json:
+def plain(value: object, where: str = "result") -> Any:
     """`value` in JSON's own types: arrays as nested lists, complex numbers as {"re", "im"}, tuples as lists.
 
     Keys keep their order. `where` names the value in the diagnostic.
@@ -46,7 +47,7 @@ def plain(value: Json, where: str = "result") -> Json:
     raise TypeError(f"{where} is of type {type(value).__name__}, which JSON cannot hold")
 
 
-def json_text(value: Json) -> str:
+def json_text(value: object) -> str:
     """`value` (anything that `plain` accepts) as JSON text with a final newline."""
     return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from inputdesign_cli.errors import InaccurateError
-from inputdesign_cli.outcome.results import Json, Results
+from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.text_formats import plain
 
 # Numbers of a spec within this many powers of ten of one are not to blame.
@@ -59,10 +59,10 @@ def finite(results: Results, extreme: tuple[str, float]) -> Results:
     return results
 
 
-def most_extreme(data: Json) -> tuple[str, float]:
+def most_extreme(data: object) -> tuple[str, float]:
     """Return the key of the number in plain data that is farthest from one, and its powers of ten."""
 
-    def walk(node: Json, key: str) -> Iterator[tuple[str, float]]:
+    def walk(node: object, key: str) -> Iterator[tuple[str, float]]:
         if isinstance(node, dict):
             for name, value in node.items():
                 yield from walk(value, f"{key}.{name}" if key else str(name))

@@ -6,7 +6,7 @@ from typing import Literal
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
-from inputdesign_cli.outcome.golden_file import Golden, GoldenRun
+from inputdesign_cli.outcome.golden import Golden, GoldenRun
 from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.specification import Spec, load_spec
 

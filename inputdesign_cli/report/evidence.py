@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from inputdesign_cli.outcome import Outcome, RequirementMet, Simulation
-from inputdesign_cli.outcome.exploration import Fit
-from inputdesign_cli.outcome.loop_error import LossMoments, TheoreticalLoss
+from inputdesign_cli.outcome.design import LossMoments, TheoreticalLoss
+from inputdesign_cli.outcome.estimate import Fit
 from inputdesign_cli.outcome.simulation import Limits, Spread, TriedInput
 from inputdesign_cli.report.numbers import BREAK, Fact, Rows, listed, shown, spoken
 

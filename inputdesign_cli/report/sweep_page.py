@@ -20,7 +20,7 @@ from inputdesign_cli.report.charts import Chart, chart
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
-from inputdesign_cli.sweeps.kept import run_flaw
+from inputdesign_cli.sweeps.layout import run_flaw
 
 MOST_ROWS = 200
 _SHOWN = (

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from inputdesign_cli.errors import Location, SpecError, bad_spec
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.specification.models.sweep import range_values
 from inputdesign_cli.specification.yaml.plain import plain
@@ -28,14 +27,6 @@ class Axis:
 
     key: str
     texts: tuple[str, ...]
-
-    @property
-    def numbers(self) -> tuple[float, ...] | None:
-        """The values as numbers, or None if some value is none."""
-        values = [resolve(text.strip()) for text in self.texts]
-        if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-            return None
-        return tuple(float(value) for value in values if isinstance(value, int | float))
 
 
 @dataclass(frozen=True)
@@ -67,7 +58,7 @@ class Grid:
         """The point as `--set` takes it."""
         return [f"{axis.key}={text}" for axis, text in zip(self.axes, point, strict=True)]
 
-    def block(self) -> dict[str, Json]:
+    def block(self) -> dict[str, object]:
         """The grid as the `sweep` block of a spec."""
         values = {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
         return {"set": values, "zip": True} if self.zipped else {"set": values}
@@ -157,14 +148,14 @@ def _split(text: str) -> tuple[str, ...]:
     return (*parts, text[start:].strip())
 
 
-def _text(value: Json) -> str:
+def _text(value: object) -> str:
     """A value of the `sweep` block as the text that `--set` takes."""
     if isinstance(value, str) and _WORD.fullmatch(value) and resolve(value) == value:
         return value
     return json.dumps(value, ensure_ascii=False)
 
 
-def _data(text: str) -> Json:
+def _data(text: str) -> object:
     """What `--set` makes of a text; a text that it cannot read stays one."""
     try:
         return read(text, "--set").data

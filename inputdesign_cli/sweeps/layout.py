@@ -18,20 +18,37 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome.locks import locked
-from inputdesign_cli.outcome.record import PAGE, RESULT, is_page, is_plain, unreadable
-from inputdesign_cli.outcome.results import Json
-from inputdesign_cli.outcome.run_directory import output_errors, replace_text
+from inputdesign_cli.outcome.origin import digest
+from inputdesign_cli.outcome.record import PAGE, RESULT, SPEC as RUN_SPEC, is_page, is_plain, unreadable
+from inputdesign_cli.outcome.run_directory import output_errors, read_run, replace_text
+from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.regular_file import read_regular
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, OWNER, WORKER = ".lock", ".process", ".worker-"
 _ENDLESS = -1.0  # seconds, in the words of `locked`
+_FAILURE = ("status", "code", "message", "hint", "key")
+
+
+def run_flaw(directory: Path, spec: str | None = None) -> str:
+    """Return what is wrong with the run of a point, of this `spec` if it is known; nothing where it holds."""
+    try:
+        result = read_run(directory)
+        written = digest(read_regular(directory / RUN_SPEC).decode("utf-8"))
+    except DataError as error:
+        return error.diagnostics[0].message
+    except (OSError, ValueError) as error:
+        return f"{directory / RUN_SPEC} cannot be read: {error}"
+    if result.get("spec_sha256") != written or (spec is not None and written != digest(spec)):
+        return f"{directory} is not the run of this point: it has another spec"
+    return ""
 
 
 @dataclass(frozen=True)
@@ -56,21 +73,22 @@ class Layout:
         """Whether a point has been tried in vain."""
         return self.failure(key).is_file()
 
-    def read(self, key: str) -> dict[str, Json] | None:
+    def read(self, key: str) -> dict[str, Any] | None:
         """The result of a point, or its failure (which has a `code`), or None.
 
         Raises:
             DataError: `run-unreadable`.
         """
         for path in (self.run(key) / RESULT, self.failure(key)):
-            with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-                try:
-                    content = json.loads(read_regular(path))
-                except (ValueError, RecursionError) as error:
-                    raise unreadable(path, str(error)) from error
-                if not isinstance(content, dict):
-                    raise unreadable(path, "it is no mapping")
-                return content
+            try:
+                content = json.loads(read_regular(path))
+            except (FileNotFoundError, NotADirectoryError):
+                continue
+            except (OSError, ValueError, RecursionError) as error:
+                raise unreadable(path, str(error)) from error
+            if not isinstance(content, dict):
+                raise unreadable(path, "it is no mapping")
+            return content
         return None
 
     def discard(self, key: str) -> None:
@@ -84,14 +102,29 @@ class Layout:
                 shutil.rmtree(partial, ignore_errors=True)
             self.failure(key).unlink(missing_ok=True)
 
-    def write_failure(self, key: str, text: str) -> None:
+    def flaw(self, key: str, spec: str | None = None) -> str:
+        """Return what is wrong with what is there of a point; nothing where it holds, or nothing is there.
+
+        Args:
+            spec: the resolved spec of the point, where it is known.
+        """
+        if self.has_result(key):
+            return run_flaw(self.run(key), spec)
+        try:
+            failure = self.read(key)
+        except DataError as error:
+            return error.diagnostics[0].message
+        whole = failure is None or all(isinstance(failure.get(name), str) for name in _FAILURE)
+        return "" if whole else f"{self.failure(key)} is not what idesign writes of a failure"
+
+    def write_failure(self, key: str, content: Mapping[str, object]) -> None:
         """Note why a point has no result, in one step."""
         path = self.failure(key)
         with output_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        replace_text(path, text)
+        replace_text(path, json_text(content))
 
-    def adopt(self, key: str, files: dict[str, bytes]) -> None:
+    def adopt(self, key: str, files: Mapping[str, bytes]) -> None:
         """Put the run of a point, computed elsewhere, in its place in one step.
 
         Raises:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.figures.sweep_table import read_sweep
 from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.sweeps.grid import Settings
@@ -29,7 +28,7 @@ def sweep(
     verb: Verb = "solve",
     executor: Executor | None = None,
     overwrite: bool = False,
-) -> DataFrame | SweepTable:
+) -> DataFrame:
     """Run a verb at every point of a grid and return the table: one row a point, failures included.
 
     The columns are as in sweep.csv: the keys that are varied, `status`, and the numbers of the results
@@ -47,11 +46,13 @@ def sweep(
         overwrite: whether to replace the table of another sweep.
 
     Returns:
-        A DataFrame, or without pandas a `SweepTable`, whose `table["cost"]` is a column.
+        A DataFrame.
 
     Raises:
         SpecError, OutputError: before anything is computed; later OutputError only.
     """
+    import pandas
+
     text = spec.to_yaml() if isinstance(spec, Spec) else None
     file = spec.resolve_path("<spec>") if isinstance(spec, Spec) else Path(spec)
     with TemporaryDirectory(prefix="idesign-") if directory is None else nullcontext(directory) as kept:
@@ -67,13 +68,5 @@ def sweep(
         )
         table = read_sweep(Path(kept))
     # A folder that is gone holds no runs.
-    columns = {name: cells for name, cells in table.columns.items() if directory is not None or name != "run"}
-    return _framed(replace(table, columns=columns))
-
-
-def _framed(table: SweepTable) -> DataFrame | SweepTable:
-    try:
-        from pandas import DataFrame
-    except ImportError:
-        return table
-    return DataFrame({name: table[name] for name in table.columns})
+    kept_names = (name for name in table.columns if directory is not None or name != "run")
+    return pandas.DataFrame({name: table[name] for name in kept_names})

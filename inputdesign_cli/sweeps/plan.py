@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
-from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.outcome.results import Json
+from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError, bad_spec
+from inputdesign_cli.outcome.origin import digest
+from inputdesign_cli.outcome.provenance import environment
 from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, read_template
+from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps.grid import Grid, Settings, build_grid, parse_settings
+from inputdesign_cli.sweeps.layout import SUMMARY
 from inputdesign_cli.sweeps.point import PointJob
 from inputdesign_cli.version import __version__
 
@@ -37,20 +40,20 @@ class Plan:
         while len(self._keys) <= index:
             overrides = self.grid.overrides(self.grid[len(self._keys)])
             try:
-                digest = self.draft.digest(self.draft.variant(overrides))
+                found = self.draft.digest(self.draft.variant(overrides))
             except SpecError:
-                digest = json.dumps([self.draft.digest(self.draft.data), overrides])
-            name = f"{__version__} {self.verb} {digest}"
+                found = json.dumps([self.draft.digest(self.draft.data), overrides])
+            name = f"{__version__} {self.verb} {found}"
             self._keys.append(
                 hashlib.sha256(name.encode(errors="backslashreplace")).hexdigest()[:_KEY_LENGTH]
             )
         return self._keys[index]
 
-    def job(self, index: int, root: Path, *, figures: str, with_files: bool) -> PointJob:
-        """A point for a worker; `with_files` if the worker may not see the files that the spec names."""
+    def job(self, index: int, root: Path | None, *, figures: str) -> PointJob:
+        """A point for a worker; without a `root`, one that may not see our files."""
         overrides = tuple(self.grid.overrides(self.grid[index]))
         files = None
-        if with_files:
+        if root is None:
             with suppress(SpecError):
                 names = [*self.draft.included, *self.draft.files(self.draft.variant(overrides))]
                 files = {name: read_regular(self.draft.folder / name) for name in names}
@@ -82,20 +85,71 @@ class Plan:
 
     def data(self) -> dict[str, object]:
         """The spec with the grid as its `sweep` block: it repeats the sweep without any settings."""
-        return {**without_sweep(self.draft.data), "sweep": self.grid.block()}
+        return {**self._base, "sweep": self.grid.block()}
 
+    @property
+    def _base(self) -> dict[str, object]:
+        """The content of the spec but for what it says of a sweep."""
+        return {key: value for key, value in self.draft.data.items() if key != "sweep"}
 
-def without_sweep(data: Mapping[str, Json]) -> dict[str, Json]:
-    """The content of a spec but for what it says of a sweep."""
-    return {key: value for key, value in data.items() if key != "sweep"}
+    def summary(self, made_from: Sequence[str], statuses: Mapping[str, int]) -> dict[str, object]:
+        """Return the content of sweep.json.
+
+        Args:
+            made_from: the spec file as it is seen from the directory.
+            statuses: how many points have which status.
+        """
+        return {
+            "format": 1,
+            "kind": "sweep",
+            "title": str(self.draft.data.get("title", "")),
+            "verb": self.verb,
+            "made_from": list(made_from),
+            "asked_sha256": digest(to_yaml(self._base)),
+            "axes": [{"key": axis.key, "values": list(axis.texts)} for axis in self.grid.axes],
+            "zip": self.grid.zipped,
+            "points": len(self.grid),
+            "statuses": statuses,
+            "environment": environment(),
+        }
+
+    def check_place(self, made_from: Sequence[str], root: Path) -> None:
+        """Refuse a directory with the sweep of another spec, of other keys, or of another command.
+
+        The same spec file, or a spec that says the same, may go on with other values of the same keys.
+
+        Raises:
+            OutputError: `output-other-run`.
+        """
+        try:
+            there = json.loads(read_regular(root / SUMMARY))
+            keys = [axis["key"] for axis in there["axes"]]
+            verb, theirs, asked = there["verb"], there.get("made_from"), there.get("asked_sha256")
+        except (OSError, ValueError, RecursionError, KeyError, TypeError):
+            return  # a sweep that was killed at its very start left nothing to compare
+        ours = [axis.key for axis in self.grid.axes]
+        same_file = theirs == list(made_from) != [STANDARD_STREAM]
+        if verb != self.verb:
+            what = f"the command {verb}, not {self.verb}"
+        elif set(keys) != set(ours):
+            what = f"{', '.join(map(str, keys))}, not {', '.join(ours)}"
+        elif not same_file and asked != digest(to_yaml(self._base)):
+            what = "another spec" + (f" ({theirs[0]} as seen from there)" if theirs else "")
+        else:
+            return
+        raise OutputError.because(
+            "output-other-run",
+            f"{root} holds the sweep of {what}, and would lose its table",
+            hint="choose another directory with -o, or replace the sweep with --overwrite",
+        )
 
 
 def build_plan(
     spec: Path,
     settings: Settings,
     *,
-    zipped: bool,
-    verb: Verb,
+    zipped: bool = False,
+    verb: Verb = "solve",
     confine: Path | None = None,
     text: str | None = None,
 ) -> Plan:

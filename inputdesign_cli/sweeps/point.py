@@ -6,28 +6,31 @@ import os
 import tempfile
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from inputdesign_cli.compute.interruptions import bare_interruptions
 from inputdesign_cli.errors import (
-    EXIT_BAD_INPUT,
-    EXIT_INACCURATE,
-    EXIT_INFEASIBLE,
     Diagnostic,
     IdesignError,
+    InaccurateError,
+    InfeasibleError,
     OutputError,
+    SpecError,
 )
 from inputdesign_cli.outcome.provenance import environment
-from inputdesign_cli.outcome.results import Json
-from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.questions.verbs import Verb, run_verb
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweeps.layout import Layout, at_work
 
-STATUS = {EXIT_BAD_INPUT: "invalid", EXIT_INFEASIBLE: "infeasible", EXIT_INACCURATE: "inaccurate"}
+KINDS: dict[str, type[IdesignError]] = {
+    "invalid": SpecError,
+    "infeasible": InfeasibleError,
+    "inaccurate": InaccurateError,
+}
 LOST, BROKEN = "lost", "error"
-FAILURES = frozenset({*STATUS.values(), LOST, BROKEN})
+FAILURES = frozenset({*KINDS, LOST, BROKEN})
 """The statuses of points that were tried and have no result."""
 
 # So far below the temporary folder stand the data files, so that a name such as ../tables/r.csv stays in it.
@@ -46,35 +49,28 @@ class PointJob:
     overrides: tuple[str, ...]
     verb: Verb
     figures: str
-    root: Path
-    files: dict[str, bytes] | None = None  # what the spec names, for a machine that may not see our files
+    root: Path | None  # the directory of the sweep; None on a machine that may not see it
+    files: dict[str, bytes] | None = None  # what the spec names, for such a machine
 
 
 @dataclass(frozen=True)
 class PointEnd:
-    """How a point ended: its status; with `files` if it was computed where our files are out of reach."""
+    """How a point ended: its status, its failure, and its `files` where ours are out of reach."""
 
     status: str
-    failure: str = ""
-    files: dict[str, bytes] | None = None
+    failure: Mapping[str, object] | None = None
+    files: Mapping[str, bytes] | None = None
 
 
 def run_point(job: PointJob) -> PointEnd:
-    """Compute a point and write it into the directory of the sweep.
+    """Compute a point and write its run into the directory of the sweep, or return the files of its run.
 
     Raises:
         OutputError: the files cannot be written, which is not the fault of the point.
     """
-    layout = Layout(job.root)
-    with at_work(job.root):
-        end = _compute(job, layout.run(job.key))
-        if end.failure:
-            layout.write_failure(job.key, end.failure)
-        return replace(end, failure="")
-
-
-def run_point_elsewhere(job: PointJob) -> PointEnd:
-    """Compute a point on a machine that may not see the directory of the sweep, and return its files."""
+    if job.root is not None:
+        with at_work(job.root):
+            return _compute(job, Layout(job.root).run(job.key))
     # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
     with _alone, tempfile.TemporaryDirectory(prefix="idesign-") as folder:
         run = Path(folder) / "run"
@@ -86,9 +82,8 @@ def run_point_elsewhere(job: PointJob) -> PointEnd:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
         end = _compute(replace(job, draft=replace(job.draft, folder=data, confine=None)), run)
-        if end.failure:
-            return end
-        return replace(end, files={path.name: path.read_bytes() for path in sorted(run.iterdir())})
+        files = None if end.failure else {path.name: path.read_bytes() for path in sorted(run.iterdir())}
+        return replace(end, files=files)
 
 
 def _compute(job: PointJob, directory: Path) -> PointEnd:
@@ -107,7 +102,8 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
     except OutputError:
         raise
     except IdesignError as error:
-        status = STATUS.get(error.exit_code, BROKEN)
+        codes = {kind.exit_code: status for status, kind in KINDS.items()}
+        status = codes.get(error.exit_code, BROKEN)
         return failed(status, error.diagnostics[0], time.perf_counter() - started)
     except Exception as error:
         diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
@@ -117,7 +113,7 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
 
 def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:
     """The end of a point without a result, with the content of its failure file."""
-    content: dict[str, Json] = {
+    content = {
         "format": 1,
         "status": status,
         "code": diagnostic.code,
@@ -127,4 +123,4 @@ def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:
         "timing_s": {"point": seconds},
         "environment": environment(),
     }
-    return PointEnd(status, failure=json_text(content))
+    return PointEnd(status, content)

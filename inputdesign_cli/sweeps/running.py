@@ -2,56 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
-from inputdesign_cli.errors import (
-    STANDARD_STREAM,
-    DataError,
-    Diagnostic,
-    IdesignError,
-    InaccurateError,
-    InfeasibleError,
-    OutputError,
-    SpecError,
-)
+from inputdesign_cli.errors import STANDARD_STREAM, DataError, Diagnostic, IdesignError, OutputError
 from inputdesign_cli.outcome.origin import Origin
-from inputdesign_cli.outcome.provenance import environment
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
 from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps.grid import Settings
-from inputdesign_cli.sweeps.kept import check_same_sweep, flaw
 from inputdesign_cli.sweeps.layout import SPEC, SUMMARY, TABLE, Layout, opened
 from inputdesign_cli.sweeps.plan import Plan, build_plan
-from inputdesign_cli.sweeps.point import (
-    BROKEN,
-    FAILURES,
-    LOST,
-    PointEnd,
-    PointJob,
-    failed,
-    run_point,
-    run_point_elsewhere,
-)
+from inputdesign_cli.sweeps.point import BROKEN, FAILURES, KINDS, LOST, PointEnd, PointJob, failed, run_point
 from inputdesign_cli.sweeps.table import PENDING, table_lines
 
 DAMAGED = "damaged"
 """Of a listed point: what is there of it does not hold, so that it is computed again."""
-_ERRORS: dict[str, type[IdesignError]] = {
-    "infeasible": InfeasibleError,
-    "inaccurate": InaccurateError,
-    "invalid": SpecError,
-}
 # While points are computed the table is written anew now and then: first so soon that who follows the sweep
 # sees it, later not more often than this, and for no more than a thirtieth of the time.
 _FIRST, _REST, _SHARE = 2.0, 10.0, 30.0
@@ -96,23 +69,13 @@ class SweepSummary:
         return sum(n for status, n in self.statuses.items() if status in FAILURES)
 
 
-def list_points(
-    spec: Path,
-    settings: Settings = (),
-    *,
-    directory: Path,
-    zipped: bool = False,
-    verb: Verb = "solve",
-    confine: Path | None = None,
-    text: str | None = None,
-) -> Iterator[Listing]:
+def list_points(plan: Plan, directory: Path) -> Iterator[Listing]:
     """The points of a sweep and whether they are done; nothing is computed or written."""
-    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine, text=text)
     layout = Layout(directory)
     for index, point in enumerate(plan.grid):
         key = plan.key(index)
         status = "done" if layout.has_result(key) else "failed" if layout.has_failure(key) else PENDING
-        status = DAMAGED if flaw(layout, key, plan.resolved(index)) else status
+        status = DAMAGED if layout.flaw(key, plan.resolved(index)) else status
         names = (axis.key for axis in plan.grid.axes)
         yield Listing(dict(zip(names, point, strict=True)), key, status)
 
@@ -159,21 +122,24 @@ def run_sweep(
         source = Path(STANDARD_STREAM) if text is not None else spec
         made_from = Origin([source]).seen_from(Path(os.path.realpath(directory)))
         if not overwrite:
-            check_same_sweep(plan, made_from, directory)
+            plan.check_place(made_from, directory)
         layout.remove_page()
-        _write_summary(plan, layout, made_from, {})
-        replace_text(layout.root / SPEC, to_yaml(plan.data()))
+        replace_text(directory / SUMMARY, json_text(plan.summary(made_from, {})))
+        replace_text(directory / SPEC, to_yaml(plan.data()))
         drawn = figure_format if figures else ""
         run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, drawn, watch)
         try:
             run.compute()
         finally:
             statuses = run.write_table()
-            _write_summary(plan, layout, made_from, statuses)
+            replace_text(directory / SUMMARY, json_text(plan.summary(made_from, statuses)))
         if fail_fast and run.first_failure:
             raise run.first_failure
+        from inputdesign_cli.figures.sweep_figures import draw_sweep
+        from inputdesign_cli.figures.sweep_table import read_sweep
+
         files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
-        files += _draw(directory, figure_format)
+        files += draw_sweep(read_sweep(directory), directory, figure_format)
         found = (run.computed, statuses, run.first_failure, files, run.damaged)
         return SweepSummary(directory, len(plan.grid), *found)
 
@@ -191,7 +157,7 @@ class _Run:
     computed: int = 0
     failed: int = 0
     stopped: bool = False
-    lost: dict[str, dict[str, Json]] = field(default_factory=dict)
+    lost: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     damaged: list[str] = field(default_factory=list)
     seen: set[str] = field(default_factory=set)  # keys of which nothing is left that was not looked at
     first_failure: IdesignError | None = None
@@ -202,9 +168,8 @@ class _Run:
         with output_errors(points):
             points.mkdir(exist_ok=True)
         due = time.monotonic() + _FIRST
-        function = run_point if self.executor.shares_files else run_point_elsewhere
         finished: Finished[PointJob, PointEnd]
-        for finished in self.executor.run(function, self._jobs()):
+        for finished in self.executor.run(run_point, self._jobs()):
             self._take(finished)
             if self.stopped:
                 return
@@ -217,8 +182,9 @@ class _Run:
         """Write sweep.csv as things stand, and count the points by status."""
         statuses: Counter[str] = Counter()
 
-        def read(key: str) -> dict[str, Json] | None:
-            content = self._read(key) or self.lost.get(key)
+        def read(key: str) -> Mapping[str, Any] | None:
+            holds = key in self.seen or not self.layout.flaw(key)
+            content = (self.layout.read(key) if holds else None) or self.lost.get(key)
             statuses[content.get("status", "done") if content else PENDING] += 1
             return content
 
@@ -226,35 +192,25 @@ class _Run:
         # The table reads every point twice.
         return {status: n // 2 for status, n in sorted(statuses.items())}
 
-    def _read(self, key: str) -> dict[str, Json] | None:
-        """What is there of a point, unless it does not hold."""
-        damaged = key not in self.seen and flaw(self.layout, key)
-        return None if damaged else self.layout.read(key)
-
     def _jobs(self) -> Iterator[PointJob]:
-        here = self.executor.shares_files
-        root = self.layout.root if here else Path()
+        root = self.layout.root if self.executor.shares_files else None
         for index in range(len(self.plan.grid)):
             if self.stopped:
                 return
-            key = self.plan.key(index)
+            key, known = self.plan.key(index), True
             if key not in self.seen:
-                self._discard_damaged(index, key)
-            known = self.layout.has_result(key) or key in self.seen
-            if not known and self.layout.has_failure(key) and not self.rerun_failed:
-                known = True
-                self._note_failure(index, self.layout.read(key) or {})
-            self.seen.add(key)
+                if why := self.layout.flaw(key, self.plan.resolved(index)):
+                    self.damaged.append(why)
+                    self.layout.discard(key)  # it is computed again
+                self.seen.add(key)
+                known = self.layout.has_result(key)
+                if not known and self.layout.has_failure(key) and not self.rerun_failed:
+                    known = True
+                    self._note_failure(index, self.layout.read(key) or {})
             if known:
                 self._report()
             else:
-                yield self.plan.job(index, root, figures=self.figures, with_files=not here)
-
-    def _discard_damaged(self, index: int, key: str) -> None:
-        """Remove what does not hold, so that the point is computed again."""
-        if why := flaw(self.layout, key, self.plan.resolved(index)):
-            self.damaged.append(why)
-            self.layout.discard(key)
+                yield self.plan.job(index, root, figures=self.figures)
 
     def _take(self, finished: Finished[PointJob, PointEnd]) -> None:
         """File what a worker has answered."""
@@ -271,23 +227,22 @@ class _Run:
                 self.layout.adopt(job.key, end.files)
             except DataError as strange:
                 end = failed(BROKEN, strange.diagnostics[0], 0.0)
-        if end.status == LOST:
-            # Not the fault of the point: the next call tries it again.
-            self.lost[job.key] = json.loads(end.failure)
-        elif end.failure:
-            self.layout.write_failure(job.key, end.failure)
-        elif end.status not in FAILURES:
+        if end.failure is None:
             self.layout.failure(job.key).unlink(missing_ok=True)
-        if end.status in FAILURES:
-            self._note_failure(job.index, self.lost.get(job.key) or self.layout.read(job.key) or {})
+        else:
+            if end.status == LOST:  # not the fault of the point: the next call tries it again
+                self.lost[job.key] = end.failure
+            else:
+                self.layout.write_failure(job.key, end.failure)
+            self._note_failure(job.index, end.failure)
         self._report()
 
-    def _note_failure(self, index: int, content: dict[str, Json]) -> None:
+    def _note_failure(self, index: int, content: Mapping[str, Any]) -> None:
         self.failed += 1
         self.stopped = self.stopped or self.fail_fast
         if self.first_failure is None:
             point = " ".join(f"--set {text}" for text in self.plan.grid.overrides(self.plan.grid[index]))
-            kind = _ERRORS.get(content.get("status", ""), IdesignError)
+            kind = KINDS.get(content.get("status", ""), IdesignError)
             message = f"{content.get('message', '')} (at {point})"
             diagnostic = Diagnostic(content.get("code", ""), message, content.get("hint", ""))
             self.first_failure = kind(replace(diagnostic, key=content.get("key", "")))
@@ -296,26 +251,3 @@ class _Run:
         self.passed += 1
         if self.watch:
             self.watch(Progress(len(self.plan.grid), self.passed, self.computed, self.failed))
-
-
-def _draw(root: Path, figure_format: str) -> list[Path]:
-    from inputdesign_cli.figures.sweep_figures import draw_sweep
-    from inputdesign_cli.figures.sweep_table import read_sweep
-
-    return draw_sweep(read_sweep(root), root, figure_format)
-
-
-def _write_summary(plan: Plan, layout: Layout, made_from: Sequence[str], statuses: dict[str, int]) -> None:
-    content = {
-        "format": 1,
-        "kind": "sweep",
-        "title": str(plan.draft.data.get("title", "")),
-        "verb": plan.verb,
-        "made_from": list(made_from),
-        "axes": [{"key": axis.key, "values": list(axis.texts)} for axis in plan.grid.axes],
-        "zip": plan.grid.zipped,
-        "points": len(plan.grid),
-        "statuses": statuses,
-        "environment": environment(),
-    }
-    replace_text(layout.root / SUMMARY, json_text(content))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.outcome.text_formats import csv_line, shortest
 from inputdesign_cli.sweeps.plan import Plan
 
-Read = Callable[[str], Mapping[str, Json] | None]
+Read = Callable[[str], Mapping[str, Any] | None]
 
 PENDING = "pending"
 MOST_ENTRIES = 4
@@ -66,9 +66,9 @@ def table_lines(plan: Plan, read: Read) -> Iterator[str]:
             yield csv_line([*point, content.get("status", "done"), *cells, seconds, "", "", f"points/{key}"])
 
 
-def scalars(value: Json, path: str = "") -> dict[str, Json]:
+def scalars(value: object, path: str = "") -> dict[str, object]:
     """Every number, text and truth value of a result by its path (`power.input[0]`), short lists included."""
-    found: dict[str, Json] = {}
+    found: dict[str, object] = {}
     if isinstance(value, Mapping):
         for key, item in value.items():
             if key not in _LEFT_OUT:
@@ -82,7 +82,7 @@ def scalars(value: Json, path: str = "") -> dict[str, Json]:
     return found
 
 
-def _cell(value: Json) -> str:
+def _cell(value: object) -> str:
     if value is None:
         return ""
     return shortest(value) if isinstance(value, float) else str(value)

@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli.cli.completion import error_codes, spec_keys
 from inputdesign_cli.cli.sweep import ProgressLine, pace
-from inputdesign_cli.compute.threads import ONE_THREAD
+from inputdesign_cli.compute.executor import ONE_THREAD
 from inputdesign_cli.sweeps.running import Progress
 from tests.support.sweep_files import SPEC
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
-from inputdesign_cli.outcome.golden import compare
-from inputdesign_cli.outcome.golden_file import load_golden
+from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions.verbs import execute
 from tests.support.outcomes import typed

@@ -12,10 +12,7 @@ from tests.support.run_directories import a_run, marks, names
 
 
 @pytest.mark.parametrize("name", ["../precious.txt", "{}/precious.txt", "..", ".", "", "a/b", "x\0y", 7])
-@pytest.mark.parametrize("exchange", [True, False])
-def test_a_record_that_names_files_elsewhere_moves_none(tmp_path, monkeypatch, name, exchange):
-    if not exchange:
-        monkeypatch.setattr(replacing, "_exchange", lambda: None)
+def test_a_record_that_names_files_elsewhere_moves_none(tmp_path, name):
     precious = tmp_path / "precious.txt"
     precious.write_text("mine")
     target = tmp_path / "a"

@@ -11,7 +11,7 @@ from inputdesign_cli.findings.frequency_responses import contradicted
 from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions import explore, identify
-from inputdesign_cli.questions.assessment.responses import response_of_data
+from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import parse_spec
 from tests.support.loops import LAWS, loop

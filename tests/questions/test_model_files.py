@@ -9,7 +9,7 @@ import yaml
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import identify as identify_model
-from inputdesign_cli.questions.assessment.estimates import model_text
+from inputdesign_cli.questions.assessment.outcome import model_text
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import is_prior

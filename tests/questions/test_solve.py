@@ -8,8 +8,7 @@ import pytest
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.outcome.golden import compare
-from inputdesign_cli.outcome.golden_file import load_golden
+from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.questions.least_cost.methods import GridMethod
 from inputdesign_cli.questions.verbs import execute
 

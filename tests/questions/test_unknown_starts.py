@@ -8,10 +8,9 @@ import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_begun_anywhere
-from inputdesign_cli.outcome.assessment import Assessment
-from inputdesign_cli.outcome.design import RequirementMet
+from inputdesign_cli.outcome.design import RequirementMet, Signal
+from inputdesign_cli.outcome.estimate import Assessment
 from inputdesign_cli.outcome.outcome import Outcome
-from inputdesign_cli.outcome.signal import Signal
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.report.evidence import verdict
 

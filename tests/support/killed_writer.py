@@ -1,6 +1,6 @@
 """Replaces a run by another, killed before each of its calls of the file system; prints what is left.
 
-    python -m tests.support.killed_writer FOLDER exchange|moves plain|folder
+    python -m tests.support.killed_writer FOLDER plain|folder
 
 Each line is a JSON object: the state right after the kill, and after the next `read_run`.
 """
@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome import replacing
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from tests.support.outcomes import typed
@@ -80,10 +79,8 @@ def attempt(folder: Path, step: int, users: str) -> dict | None:
     return left | {"in_the_end": state(target), "notes": (target / "notes.txt").read_text()}
 
 
-def main(folder: str, how: str, users: str) -> None:
+def main(folder: str, users: str) -> None:
     os.fsync = lambda handle: None  # for a power cut, not for a kill
-    if how == "moves":
-        replacing._exchange = lambda: None
     step = 1
     while (left := attempt(Path(folder), step, users)) is not None:
         print(json.dumps(left))

@@ -3,7 +3,6 @@
 import itertools
 
 import pytest
-from hypothesis import given, strategies as st
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import Sweep, parse_spec
@@ -58,9 +57,9 @@ def test_a_key_is_swept_once():
     assert caught.value.diagnostics[0].code == "sweep-twice"
 
 
-@given(st.lists(st.lists(st.integers(), min_size=1, max_size=4), min_size=1, max_size=4))
-def test_a_grid_is_the_product_of_its_axes(values):
-    axes = [Axis(f"k{i}", tuple(map(str, v))) for i, v in enumerate(values)]
+@pytest.mark.parametrize("lengths", [(1,), (3, 1), (2, 4, 3), (1, 2, 1, 2)])
+def test_a_grid_is_the_product_of_its_axes(lengths):
+    axes = [Axis(f"k{i}", tuple(map(str, range(n)))) for i, n in enumerate(lengths)]
     assert list(Grid(tuple(axes))) == list(itertools.product(*(axis.texts for axis in axes)))
 
 
@@ -91,7 +90,6 @@ def test_the_block_of_a_spec_and_the_command_line():
     block = Sweep.model_validate(BLOCK)
     grid = build_grid(block, [], zipped=False)
     assert [axis.texts for axis in grid.axes] == [("1", "white", '{"type": "fir"}'), ("0", "0.1", "0.2")]
-    assert [axis.numbers for axis in grid.axes] == [None, (0.0, 0.1, 0.2)]
     replaced = build_grid(block, [Axis("a", ("7", "8")), Axis("c", ("x", "y"))], zipped=False)
     assert {axis.key: axis.texts for axis in replaced.axes} == {
         "a": ("7", "8"), "b": ("0", "0.1", "0.2"), "c": ("x", "y")

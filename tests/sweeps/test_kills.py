@@ -63,7 +63,7 @@ def test_an_interrupt_from_the_terminal_ends_everything_in_order(spec, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("points", "kills"), [(12, 3), pytest.param(120, 20, marks=pytest.mark.slow)], ids=["few", "twenty"]
+    ("points", "kills"), [(5, 3), pytest.param(120, 20, marks=pytest.mark.slow)], ids=["few", "twenty"]
 )
 def test_a_killed_sweep_is_finished_by_the_same_command(spec, tmp_path, points, kills):
     killed, whole = tmp_path / "killed", tmp_path / "whole"

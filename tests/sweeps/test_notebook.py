@@ -1,6 +1,5 @@
 """`sweep` from Python: a function in whatever order things are imported, of a file or a spec, to a table."""
 
-import itertools
 import pkgutil
 import subprocess
 import sys
@@ -27,7 +26,7 @@ def test_no_public_name_is_that_of_a_module():
     assert modules & {name for name in inputdesign_cli.__all__ if name != "__version__"} == set()
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(IMPORTS)), ids=str)
+@pytest.mark.parametrize("order", [IMPORTS, IMPORTS[1:] + IMPORTS[:1], IMPORTS[2:] + IMPORTS[:2]], ids=str)
 def test_it_is_a_function_in_every_order_of_imports(order):
     code = "\n".join([*order, "import inputdesign_cli as i", "from inputdesign_cli import sweep"])
     code += "\nfrom inputdesign_cli.sweeps.notebook import sweep as function"
@@ -76,15 +75,6 @@ def test_points_without_a_result_are_rows(spec, stub):
     frame = sweep(spec, {"experiment.samples": [6, 7, 9]})
     assert list(frame["status"]) == ["optimal", "infeasible", "error"]
     assert np.isfinite(frame["objective.value"]).tolist() == [True, False, False]
-
-
-def test_without_pandas_a_table_has_columns(spec, stub, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    table = sweep(spec, {"experiment.samples": [10, 20], "solver.any_spectrum": [True, False]}, zipped=True)
-    np.testing.assert_array_equal(table["experiment.samples"], [10, 20])
-    assert table["solver.any_spectrum"] == [True, False]
-    assert table["status"] == ["optimal", "optimal"]
-    assert table["code"] == ["", ""]
 
 
 def test_nothing_to_vary_is_an_error(spec, stub):

@@ -12,6 +12,7 @@ from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.figures.sweep_table import read_sweep
 from inputdesign_cli.sweeps.layout import Layout
+from inputdesign_cli.sweeps.plan import build_plan
 from inputdesign_cli.sweeps.running import list_points, run_sweep
 from inputdesign_cli.sweeps.table import scalars, table_lines
 from tests.support.processes import running
@@ -161,11 +162,11 @@ def test_swept_texts_are_no_formulas(spec, stub, tmp_path):
 
 def test_listing_writes_nothing(spec, stub, tmp_path):
     out = tmp_path / "out"
-    listed = list(list_points(spec, ["experiment.samples=6,7"], directory=out))
+    listed = list(list_points(build_plan(spec, ["experiment.samples=6,7"]), out))
     assert [point.status for point in listed] == ["pending", "pending"]
     assert not out.exists()
     run_sweep(spec, ["experiment.samples=6,7"], directory=out)
-    listed = list(list_points(spec, ["experiment.samples=6,7,8"], directory=out))
+    listed = list(list_points(build_plan(spec, ["experiment.samples=6,7,8"]), out))
     assert [point.status for point in listed] == ["done", "failed", "pending"]
     assert (out / "points" / listed[0].key / "result.json").is_file()
 
@@ -290,7 +291,7 @@ def test_a_worker_writes_nothing_but_the_files_of_a_run(tmp_path, files):
 def test_a_layout_reads_results_before_failures(tmp_path):
     layout = Layout(tmp_path)
     assert layout.read("k") is None
-    layout.write_failure("k", '{"code": "x"}')
+    layout.write_failure("k", {"code": "x"})
     assert layout.read("k") == {"code": "x"}
     layout.adopt("k", {"spec.yaml": b"", "result.json": b'{"format": 1}'})
     assert layout.read("k") == {"format": 1}

@@ -26,8 +26,8 @@ from inputdesign_cli.findings.neglected import Neglected, neglected, objections,
 from inputdesign_cli.findings.top_up_levels import level_notes, prior_left_out
 from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
-from inputdesign_cli.outcome.assessment import Verdict
 from inputdesign_cli.outcome.curves import Curves
+from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.assessment.identify import (
@@ -38,7 +38,7 @@ from inputdesign_cli.questions.assessment.identify import (
     identified,
     told,
 )
-from inputdesign_cli.questions.assessment.responses import response_of_data
+from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.least_cost.outcome import requirement_met
 from inputdesign_cli.records import Preparation
 

@@ -46,8 +46,13 @@ from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model, TransferMatrix
-from inputdesign_cli.questions.assessment.estimate_curves import bound_of_data, data_curves
-from inputdesign_cli.questions.assessment.estimates import identification_entry, information_entry, model_text
+from inputdesign_cli.questions.assessment.outcome import (
+    bound_of_data,
+    data_curves,
+    identification_entry,
+    information_entry,
+    model_text,
+)
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge, that_agrees
 from inputdesign_cli.records import Preparation, Record, read_data

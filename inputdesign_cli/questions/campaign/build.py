@@ -19,7 +19,8 @@ from inputdesign_cli.questions.building.uncertainty import farthest_radius
 from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.rounds import Rounds
 from inputdesign_cli.questions.campaign.schedule import Rules, Schedule
-from inputdesign_cli.questions.campaign.study import CampaignStudy, CampaignTask
+from inputdesign_cli.questions.campaign.study import CampaignTask
+from inputdesign_cli.questions.campaign.trials import CampaignStudy
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Campaign, Pilot
@@ -154,8 +155,6 @@ def build_campaign(spec: Spec) -> CampaignTask:
             planner=planner,
             rules=rules,
             true=replace(planner.nominal, model=truth, loop=loop),
-            step=planner.step,
-            cost=study.cost,
             runs=study.runs,
             seed=study.seed,
             white="white" in study.compare,

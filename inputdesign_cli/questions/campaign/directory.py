@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -13,18 +13,18 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.campaigns import campaign_refuted, planned_otherwise, withdrawn_record
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
+from inputdesign_cli.outcome.record import listed_files
 from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.run_directory import output_errors
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.acceptance import accepted
-from inputdesign_cli.questions.campaign.memory import VERSION, Memory
+from inputdesign_cli.questions.campaign.memory import VERSION, Memory, digests
 from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
-from inputdesign_cli.questions.campaign.schedule import Planned, Standing, power_of
-from inputdesign_cli.questions.campaign.unchanged import digests
+from inputdesign_cli.questions.campaign.schedule import Planned, power_of
 from inputdesign_cli.regular_file import read_regular
 
 Decide = Callable[[Past], Decision]
@@ -38,15 +38,17 @@ def begun(decide: Decide, folder: Path, directory: Path) -> Results:
         directory: where the campaign will be.
     """
     decision = decide(Past())
+    task = decision.task
     campaign = Campaign(
         version=VERSION,
-        time_unit=decision.header.units.time_unit,
+        time_unit=task.identification.header.units.time_unit,
         folder=os.path.relpath(os.path.realpath(folder), os.path.realpath(directory)),
         state="running",
-        samples=decision.rules.schedule.samples,
-        max_samples=decision.rules.end,
+        samples=task.rules.schedule.samples,
+        max_samples=task.rules.end,
         records=(),
         rounds=(),
+        digests={},
     )
     return _decided(decision, campaign, {}, Outcome())
 
@@ -131,9 +133,8 @@ def _again(
             regardless=bool(campaign.regardless),
         )
         decision = decide(past)
-    if decision.judged.refuted:
-        every = len(counting) == len(campaign.records)
-        end = decision.rules.end
+    if decision.refuted:
+        every, end = len(counting) == len(campaign.records), decision.task.rules.end
         said = said.saying(campaign_refuted(memory.directory, campaign.done, end, counting, every=every))
     results = _decided(decision, campaign, files, said)
     provenance = {**results.outcome.provenance, "made_from": list(memory.made_from)}
@@ -159,24 +160,20 @@ def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | Non
         paths = [Path(folder) / name for name in names]
         for path in paths:
             path.write_bytes(files[path.name])
+
+        def named(diagnostic: Diagnostic) -> Diagnostic:
+            text, place = [diagnostic.message], diagnostic.location
+            if place is not None:
+                text.append(place.file.removeprefix(f"{folder}{os.sep}"))
+            if given is not None:
+                text = [one.replace(names[-1], given.name) for one in text]
+            placed = None if place is None else replace(place, file=text[1])
+            return replace(diagnostic, message=text[0], location=placed)
+
         try:
             yield paths
         except DataError as error:
-            known = {} if given is None else {names[-1]: given.name}
-            told = [_of_the_campaign(one, Path(folder), known) for one in error.diagnostics]
-            raise DataError(told) from error
-
-
-def _of_the_campaign(diagnostic: Diagnostic, folder: Path, known: Mapping[str, str]) -> Diagnostic:
-    """Return a diagnostic that names the file of the user or of the directory, not the one in `folder`."""
-    message = diagnostic.message
-    for name, user in known.items():
-        message = message.replace(name, user)
-    place = diagnostic.location
-    if place is not None and Path(place.file).is_relative_to(folder):
-        name = Path(place.file).name
-        place = replace(place, file=known.get(name, name))
-    return replace(diagnostic, message=message, location=place)
+            raise DataError([named(one) for one in error.diagnostics]) from error
 
 
 def _due(memory: Memory) -> PlannedPart:
@@ -213,42 +210,59 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
     Args:
         said: notes and findings that come first.
     """
-    judged, number, header = decision.judged, len(campaign.records), decision.header
+    number, header, rules = len(campaign.records), decision.task.identification.header, decision.task.rules
     tables: dict[str, Table] = {}
     curves: dict[str, Curves] = {}
     outcome = Outcome(title=header.title, timing_s={})
-    if judged.assessed is not None:
-        assessed = judged.assessed
+    if (assessed := decision.assessed) is not None:
         outcome, tables, curves = assessed.outcome, dict(assessed.tables), dict(assessed.curves)
         files[f"model_{number:02d}.yaml"] = assessed.files["model.yaml"]
-    said = said.saying(judged.findings)
+    said = said.saying(decision.findings)
     entry = Round(
         samples=campaign.done,
         energy=sum((record.energy for record in campaign.records), start=0.0),
         records=tuple(n for n, record in enumerate(campaign.records, 1) if not record.withdrawn),
-        state=decision.judged.state,
+        state=decision.state,
     )
-    if judged.standing is not None:
-        entry = _estimated(entry, judged.standing)
-        if judged.standing.share == 1.0:
+    if (stands := decision.standing) is not None:
+        names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
+        entry = replace(
+            entry,
+            estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
+            standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
+            worst_ratio=stands.ratio,
+            share=stands.share,
+        )
+        if stands.share == 1.0:
             campaign = replace(campaign, last=entry.estimate)
     plan = decision.plan
     if plan is not None and decision.part is not None:
         file = f"plan_{number + 1:02d}.csv"
         files[file] = csv_text(decision.part).encode()
-        said = said.saying(_of_the_plan(file, plan, decision, campaign.done))
+        fragile = rules.robust_last and rules.schedule.last(campaign.done) and plan.kind == "nominal"
+        said = said.saying(
+            planned_otherwise(
+                file,
+                why=plan.why,
+                capped=plan.capped,
+                share=plan.share,
+                beyond=plan.beyond,
+                part_cost=plan.part_cost,
+                fragile=fragile,
+            )
+        )
         entry = replace(entry, plan=_planned(file, plan, decision))
         if plan.designed and campaign.first_cost is None:
             campaign = replace(campaign, first_cost=plan.cost)
         tables["signal"], curves["signal"] = decision.part, _signal(decision.part)
-    campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=judged.state)
+    campaign = replace(campaign, rounds=(*campaign.rounds, entry), state=decision.state)
     campaign = replace(campaign, digests=digests(campaign, files))
-    tables["rounds"], progress = history(campaign.rounds, decision.rules.end)
+    tables["rounds"], progress = history(campaign.rounds, rules.end)
     notes = tuple(dict.fromkeys([*(said.notes or ()), *(outcome.notes or ())]))
     findings = (*(said.findings or ()), *(outcome.findings or ()))
     outcome = replace(
         outcome,
-        status=judged.state,
+        status=decision.state,
         samples=campaign.done,
         campaign=campaign,
         notes=notes or None,
@@ -256,19 +270,6 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
     )
     time_unit, curves = header.units.time_unit, curves | progress
     return Results(outcome, header.resolved_spec, time_unit, tables, curves, files)
-
-
-def _estimated(entry: Round, stands: Standing) -> Round:
-    """Return a round with the model that is built on."""
-    names = stands.model.names
-    deviation = np.sqrt(np.diag(np.linalg.inv(stands.information)))
-    return replace(
-        entry,
-        estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
-        standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
-        worst_ratio=stands.ratio,
-        share=stands.share,
-    )
 
 
 def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:
@@ -283,22 +284,9 @@ def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:
         kind=plan.kind,
         capped=plan.capped,
         seed=decision.seed,
-        offset=tuple(decision.offsets.tolist()),
+        offset=tuple(decision.task.offsets.tolist()),
         design=None if plan.claim is None else plan.claim(),
         why=plan.why or None,
-    )
-
-
-def _of_the_plan(file: str, plan: Planned, decision: Decision, done: int) -> list[Finding]:
-    rules = decision.rules
-    return planned_otherwise(
-        file,
-        why=plan.why,
-        capped=plan.capped,
-        share=plan.share,
-        beyond=plan.beyond,
-        part_cost=plan.part_cost,
-        fragile=rules.robust_last and rules.schedule.last(done) and plan.kind == "nominal",
     )
 
 
@@ -315,21 +303,33 @@ def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]
         end: samples after which the campaign is over at the latest.
     """
     known = [one for one in rounds if one.estimate is not None]
-    samples = np.array([one.samples for one in known], dtype=float)
-    energy = np.array([one.energy for one in known], dtype=float)
-    ratio = np.array([one.worst_ratio for one in known], dtype=float)
+
+    def column(values: Iterable[float | None]) -> Array:
+        return np.array(list(values), dtype=float)
+
+    samples, energy = column(one.samples for one in known), column(one.energy for one in known)
+    ratio = column(one.worst_ratio for one in known)
     columns = {"samples": samples, "energy": energy, "worst_ratio": ratio}
     if not known:
         return Table(columns), {}
-    estimates = _by_name([one.estimate or {} for one in known])
-    spreads = _by_name([one.standard_deviation or {} for one in known])
-    for name, values in estimates.items():
-        columns |= {name: values, f"sd_{name}": spreads[name]}
+    names = list(known[0].estimate or {})
+    estimates = {name: column((one.estimate or {})[name] for one in known) for name in names}
+    spreads = {name: column((one.standard_deviation or {})[name] for one in known) for name in names}
+    for name in names:
+        columns |= {name: estimates[name], f"sd_{name}": spreads[name]}
     return Table(columns), {
         "campaign": CampaignCurves(samples, ratio, energy, end),
         "estimates": EstimateCurves(samples, estimates, spreads),
     }
 
 
-def _by_name(rows: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    return {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+def with_earlier_pictures(results: Results, directory: Path) -> Results:
+    """Return the results with the pictures of the last decision.
+
+    Raises:
+        OutputError: a picture cannot be read.
+    """
+    names = [name for name in listed_files(directory) if name.endswith(".png")]
+    with output_errors(directory):
+        pictures = {name: read_regular(directory / name) for name in names}
+    return replace(results, files={**results.files, **pictures})

@@ -14,22 +14,21 @@ before or after.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome import OutcomeError, read_plain
+from inputdesign_cli.outcome import OutcomeError, read_plain, write_plain
 from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC, load_result, unreadable
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
-from inputdesign_cli.outcome.text_formats import csv_columns
-from inputdesign_cli.questions.campaign.unchanged import check_decisions, check_files
+from inputdesign_cli.outcome.text_formats import plain
 from inputdesign_cli.regular_file import read_regular
 
 VERSION = 1
@@ -43,8 +42,9 @@ _HINTS = {
     "run-unreadable": _FROM_A_COPY,
 }
 _KEPT = re.compile(r"(plan|record|model)_\d\d+(_as_given)?\.[a-z0-9]+")
-_RECORDS = "record_*"
-_LOCK = ".lock"
+# Files that decisions rest on; spec and signal of a run have digests of their own.
+_READ = re.compile(r"(plan|record)_\d\d+\.csv")
+_DIGESTS = "digests"
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def _no_run(directory: Path) -> Iterator[None]:
     try:
         yield
     except DataError as error:
-        begun = any(directory.glob(_RECORDS))
+        begun = any(directory.glob("record_*"))
         hints = _HINTS | ({"run-missing": _FROM_A_COPY} if begun else {})
         raise DataError(
             [replace(each, hint=hints.get(each.code, each.hint)) for each in error.diagnostics]
@@ -105,61 +105,60 @@ def _read(directory: Path, withdrawing: int | None) -> Memory:
             f"the campaign in {directory} has version {campaign.get('version')}, not {VERSION}",
             hint="go on with the version of idesign that began it: see environment in result.json",
         )
-    names = result.get("files")
-    damaged = unreadable(directory / RESULT, "its campaign is not what idesign writes")
     try:
         found = read_plain(Campaign, campaign)
     except OutcomeError as error:
-        raise damaged from error
-    if not _possible(found) or not isinstance(names, list):
-        raise damaged
+        raise unreadable(directory / RESULT, "its campaign is not what idesign writes") from error
+    names = {name for name in result.get("files", ()) if _KEPT.fullmatch(name) or name in (SPEC, SIGNAL)}
     with output_errors(directory):
-        kept = [name for name in names if isinstance(name, str) and _KEPT.fullmatch(name)]
-        files = {name: read_regular(directory / name) for name in kept}
-        applied = [name for name in (SIGNAL,) if name in names]
-        others = {name: read_regular(directory / name) for name in (SPEC, *applied)}
-    check_files(directory, result, found, files | others, withdrawing)
-    if not _fits(found, files):
-        raise unreadable(directory / RESULT, "its campaign does not fit its plans and records")
-    check_decisions(directory, campaign)
-    spec = others[SPEC].decode("utf-8")
-    origin = tuple(map(str, result.get("made_from", ())))
-    return Memory(directory, found, spec, origin, files)
+        files = {name: read_regular(directory / name) for name in sorted(names)}
+    due = dict.fromkeys([RESULT, *(one.file for one in (*found.records, *found.plans))], "")
+    known = due | {**found.digests, SPEC: result.get("spec_sha256", ""), SIGNAL: result.get("signal_sha256")}
+    out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
+    now = {name: _sha256(content) for name, content in files.items()} | {RESULT: _decisions(campaign)}
+    for name, digest in known.items():
+        if digest is not None and name not in out and digest != now.get(name):
+            raise _changed(directory, name, found)
+    spec, kept = files[SPEC].decode("utf-8"), {n: c for n, c in files.items() if n not in (SPEC, SIGNAL)}
+    return Memory(directory, found, spec, tuple(map(str, result.get("made_from", ()))), kept)
 
 
-def _possible(campaign: Campaign) -> bool:
-    """Return whether the numbers are of a kind that idesign writes."""
-    lengths = [record.samples for record in campaign.records] + [plan.samples for plan in campaign.plans]
-    sizes = [*(record.energy for record in campaign.records), *(plan.power for plan in campaign.plans)]
-    cost = campaign.first_cost
-    return (
-        bool(campaign.rounds)
-        and min(lengths, default=1) > 0
-        and min(sizes, default=0.0) >= 0.0
-        and (cost is None or cost > 0.0)
+def digests(campaign: Campaign, files: Mapping[str, bytes]) -> dict[str, str]:
+    """Return SHA-256 of each file that decisions rest on, and of the decisions themselves.
+
+    A record keeps its digest: one that was withdrawn may have changed since. Plans may be made anew.
+    """
+    found = {name: _sha256(content) for name, content in files.items() if _READ.fullmatch(name)}
+    records = {name: digest for name, digest in campaign.digests.items() if name.startswith("record")}
+    return {**found, RESULT: _decisions(write_plain(campaign)), **records}
+
+
+def _changed(directory: Path, name: str, campaign: Campaign) -> DataError:
+    """Return the error about a file that is not as it was kept."""
+    numbers = {record.file: n for n, record in enumerate(campaign.records, 1)}
+    due = None if campaign.plan is None else campaign.plan.file
+    more = ""
+    if name in numbers:
+        more = f", or go on without it: `idesign next {directory} --withdraw {numbers[name]}`"
+    elif name in (SIGNAL, due):
+        more = f": {due if name == SIGNAL else SIGNAL} in the same directory holds the same samples"
+    elif name == SPEC:
+        more = "; for another question begin another campaign, in a directory of its own"
+    return DataError.because(
+        "campaign-changed",
+        f"{directory / name} is not what the campaign kept under this name: it was changed since",
+        f"put it back as it was{more}",
     )
 
 
-def _fits(campaign: Campaign, files: Mapping[str, bytes]) -> bool:
-    """Return whether all files of the campaign are there, and plans as long as was applied of them."""
-    plans = [(record.plan, record.samples) for record in campaign.records]
-    due = campaign.plan
-    plans += [] if due is None else [(due.file, due.samples)]
-    estimated = [set(one.estimate) for one in campaign.rounds if one.estimate]
-    return (
-        all(record.file in files for record in campaign.records)
-        and all(name in files and _rows(files[name]) >= samples for name, samples in plans)
-        and (campaign.last is None or set(campaign.last) in estimated)
-    )
+def _decisions(campaign: Mapping[str, object]) -> str:
+    """Return the digest of all but the digests, whatever the order of the keys."""
+    kept = {key: value for key, value in campaign.items() if key != _DIGESTS}
+    return _sha256(json.dumps(plain(kept), sort_keys=True).encode())
 
 
-def _rows(content: bytes) -> int:
-    """Return the length of a table of numbers; -1 if it is none."""
-    try:
-        columns = list(csv_columns(content).values())
-    except ValueError:
-        return -1
-    return len(columns[0]) if columns and np.isfinite(columns).all() else -1
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 @contextmanager
@@ -174,7 +173,7 @@ def held(directory: Path) -> Iterator[None]:
         load_result(directory)
     with ExitStack() as stack:
         with output_errors(directory):
-            alone = stack.enter_context(locked(directory / _LOCK))
+            alone = stack.enter_context(locked(directory / ".lock"))
         if not alone:
             message = f"another process works on the campaign in {directory}"
             raise OutputError.because("output-busy", message, "wait for it, and see `idesign status` then")

@@ -16,10 +16,9 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.campaigns import campaign_doubted, estimate_not_used, no_estimate_yet
 from inputdesign_cli.findings.other_systems import contradictions, differences
 from inputdesign_cli.identification import information_of_data
-from inputdesign_cli.outcome.assessment import Verdict
 from inputdesign_cli.outcome.campaign import State
+from inputdesign_cli.outcome.estimate import Verdict
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.assess import judge
 from inputdesign_cli.questions.assessment.identify import (
@@ -78,38 +77,24 @@ class Past:
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """The state of a campaign by its records.
+class Decision:
+    """The outcome of a round.
 
     Attributes:
+        seed: of the record of the next part.
         standing: the model that is built on; None while the data say too little.
         assessed: the estimate and its accuracy; None as long as there is no estimate.
         refuted: whether the campaign ends before its time since tests refute the structure.
+        plan: the next part; None at the end. `part`: its samples and their times for signal.csv.
     """
 
+    task: Rounds
+    seed: int
     state: State
     standing: Standing | None = None
     assessed: Results | None = None
     findings: tuple[Finding, ...] = ()
     refuted: bool = False
-
-
-@dataclass(frozen=True)
-class Decision:
-    """The outcome of a round.
-
-    Attributes:
-        plan: the next part; None at the end.
-        part: its samples and their times for signal.csv.
-        seed: of its record.
-        offsets: (r,) the levels that they vary about.
-    """
-
-    header: Header
-    rules: Rules
-    judged: Judgement
-    offsets: Array
-    seed: int
     plan: Planned | None = None
     part: Table | None = None
 
@@ -122,13 +107,13 @@ class Part:
         table: times, inputs, outputs and, in a loop, the reference.
         excitation: (n, r), u or the reference; None if the file has no column of it.
         rows: (n,), the numbers of the samples from the first one on; samples without values are left out.
-        of_loop: whether the excitation is the reference of a loop.
+        kind: of the excitation: "u", or "r", the reference of a loop.
     """
 
     table: Table
     excitation: Array | None
     rows: NDArray[np.int64]
-    of_loop: bool
+    kind: str
     notes: tuple[str, ...]
 
     @property
@@ -144,41 +129,41 @@ def decide(task: Rounds, past: Past) -> Decision:
         DataError: a record cannot be used.
         IdesignError: nothing can be planned.
     """
-    judged, seed = _judged(task, past), task.rules.seed_of(past.number)
-    decision = Decision(task.identification.header, task.rules, judged, task.offsets, seed)
-    if judged.state != "running":
+    decision = _judged(task, past)
+    if decision.state != "running":
         return decision
     before = None if past.applied is None else past.applied - task.offsets
-    plan = task.planner.plan(task.rules, judged.standing, past.done, seed, past.first_cost, before)
+    plan = task.planner.plan(task.rules, decision.standing, past.done, decision.seed, past.first_cost, before)
     return replace(decision, plan=plan, part=_part(task, plan, past.done))
 
 
-def _judged(task: Rounds, past: Past) -> Judgement:
-    state: State = "missed" if past.done >= task.rules.end else "running"
+def _judged(task: Rounds, past: Past) -> Decision:
+    rules = task.rules
+    decision = Decision(task, rules.seed_of(past.number), "missed" if past.done >= rules.end else "running")
     if not past.records:
-        return Judgement(state)
+        return decision
     started = time.perf_counter()
     try:
         found = _found(task, past.records)
     except DataError as error:
         if not {one.code for one in error.diagnostics} <= _TOO_LITTLE:
             raise
-        return Judgement(state, findings=tuple(no_estimate_yet(told(error))))
+        return replace(decision, findings=tuple(no_estimate_yet(told(error))))
     assessment = judge(task.identification, found, started, first=past.last is None)
     stands = _standing(task, found, past)
     findings = estimate_not_used(None if stands is None else stands.share, found.unasked)
-    refuted, looks = False, task.rules.schedule.looks
+    decision, looks = replace(decision, standing=stands, assessed=assessment.results), rules.schedule.looks
     if differences(found.estimate, [name for name, _ in found.data.files], looks) or contradictions(
         found.estimate, looks
     ):
-        state = "undecided"
-    elif task.rules.over(past.done, met=stands is not None and stands.met):
-        state = _ENDED[assessment.verdict]
+        decision = replace(decision, state="undecided")
+    elif rules.over(past.done, met=stands is not None and stands.met):
+        decision = replace(decision, state=_ENDED[assessment.verdict])
     elif _refuted(task, found, past):
-        state, refuted = "undecided", True
+        decision = replace(decision, state="undecided", refuted=True)
     elif assessment.verdict == "undecided":
         findings += campaign_doubted()
-    return Judgement(state, stands, assessment.results, tuple(findings), refuted)
+    return replace(decision, findings=tuple(findings))
 
 
 def _refuted(task: Rounds, found: Identified, past: Past) -> bool:
@@ -203,7 +188,7 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
     if data.r is not None:
         columns |= {f"r{j + 1}": values for j, values in enumerate(data.r.T)}
     applied = data.r if units.closed_loop else inputs
-    return Part(Table(columns), applied, _numbered(data.time), units.closed_loop, data.notes)
+    return Part(Table(columns), applied, _numbered(data.time), units.excitation, data.notes)
 
 
 def _numbered(time: Array) -> NDArray[np.int64]:

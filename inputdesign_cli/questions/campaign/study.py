@@ -3,47 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.errors import IdesignError, bad_spec
-from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.questions.campaign.outcome import campaigns_curves, campaigns_entry
-from inputdesign_cli.questions.campaign.plans import Planner
 from inputdesign_cli.questions.campaign.schedule import Oracle, Rules, Schedule
-from inputdesign_cli.questions.campaign.trials import CampaignJob, Ended, energy_of, run_campaigns
+from inputdesign_cli.questions.campaign.trials import CampaignStudy, Ended, energy_of, run_campaigns
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
-
-
-@dataclass(frozen=True)
-class CampaignStudy:
-    """A study of whole campaigns.
-
-    Attributes:
-        true: the experiment on the true system, of the planned length.
-        step: time between samples in the unit of the experiment's frequencies.
-        cost: weights of the powers.
-        white: whether to compare with white excitation that suffices at the estimate.
-        uncertain: whether the spec or a pilot bounds the error of the first estimate.
-        has_prior: whether the spec states information that runs would have to draw.
-    """
-
-    planner: Planner
-    rules: Rules
-    true: Experiment
-    step: float
-    cost: Mapping[PowerKind, Weight]
-    runs: int
-    seed: int
-    white: bool
-    uncertain: bool
-    has_prior: bool
 
 
 @dataclass(frozen=True)
@@ -102,7 +74,7 @@ def oracle_of(study: CampaignStudy) -> Oracle | None:
         cost, record = study.planner.knowing(study.true.model)
     except IdesignError:
         return None
-    energy = 0.0 if record is None else energy_of(record, study.true, study.step, study.cost)
+    energy = 0.0 if record is None else energy_of(study.planner, record, study.true)
     return Oracle(cost, energy or None)
 
 
@@ -123,7 +95,7 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
 
 def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
     """Return the runs of one way of experimenting."""
-    job = CampaignJob(study.planner, rules, study.true, study.step, study.cost)
+    job = replace(study, rules=rules)
     # One run a batch: all ways meet the same noise in the same run.
     parts = run_batches(run_campaigns, job, runs=study.runs, size=1, seed=study.seed, executor=executor)
     return [run for part in parts for run in part]

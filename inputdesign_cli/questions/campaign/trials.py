@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import OnModelError, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.findings.neglected import mattering, neglected
 from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
@@ -28,20 +28,24 @@ _SEEDS = 2**31
 
 
 @dataclass(frozen=True)
-class CampaignJob:
-    """What all runs of one way of experimenting need.
+class CampaignStudy:
+    """A study of whole campaigns.
 
     Attributes:
-        true: the experiment on the true system.
-        step: time between samples in the unit of the experiment's frequencies.
-        cost: weights of the powers.
+        true: the experiment on the true system, of the planned length.
+        white: whether to compare with white excitation that suffices at the estimate.
+        uncertain: whether the spec or a pilot bounds the error of the first estimate.
+        has_prior: whether the spec states information that runs would have to draw.
     """
 
     planner: Planner
     rules: Rules
     true: Experiment
-    step: float
-    cost: Mapping[PowerKind, Weight]
+    runs: int
+    seed: int
+    white: bool
+    uncertain: bool
+    has_prior: bool
 
 
 @dataclass(frozen=True)
@@ -68,16 +72,16 @@ class Ended:
     shrunk: int
 
 
-def run_campaigns(job: CampaignJob, runs: int, rng: np.random.Generator) -> list[Ended]:
+def run_campaigns(study: CampaignStudy, runs: int, rng: np.random.Generator) -> list[Ended]:
     """Return several campaigns from rest, one after the other."""
-    return [_Run(job, rng).end() for _ in range(runs)]
+    return [_Run(study, rng).end() for _ in range(runs)]
 
 
 @dataclass
 class _Run:
     """One campaign. The noise of all samples is drawn first, so that other ways meet the same noise."""
 
-    job: CampaignJob
+    study: CampaignStudy
     rng: np.random.Generator
     known: Standing | None = None
     first: float | None = None
@@ -85,18 +89,18 @@ class _Run:
     shrunk: set[int] = field(default_factory=set)  # parts, by their numbers
 
     def __post_init__(self) -> None:
-        true = self.job.true
-        size = (self.job.rules.schedule.most, true.model.outputs)
+        true = self.study.true
+        size = (self.study.rules.schedule.most, true.model.outputs)
         self.e = self.rng.standard_normal(size) @ np.linalg.cholesky(true.model.covariance).T
         self.r: Array = np.zeros((0, true.inputs))
-        self.sound = self.last = self.job.planner.nominal.model
+        self.sound = self.last = self.study.planner.nominal.model
 
     def end(self) -> Ended:
         """Run the campaign from its first plan to its end."""
-        rules = self.job.rules
+        rules = self.study.rules
         while True:
             try:
-                plan = self.job.planner.plan(
+                plan = self.study.planner.plan(
                     rules, self.known, len(self.r), int(self.rng.integers(_SEEDS)), self.first, self.r
                 )
             except (InfeasibleError, InaccurateError, SpecError):
@@ -120,16 +124,16 @@ class _Run:
                 return self._ended("undecided" if against else "stopped" if met else "missed")
 
     def _measured(self) -> tuple[Array, Array]:
-        true, n = self.job.true, len(self.r)
+        true, n = self.study.true, len(self.r)
         if true.loop is None:
-            caused, noise = true.model.simulate(self.r[None], self.e[None, :n], self.job.step)
+            caused, noise = true.model.simulate(self.r[None], self.e[None, :n], self.study.planner.step)
             return self.r, (caused + noise)[0]
         y, u = true.loop.signals(self.r[None], self.e[None, :n])
         return u[0], y[0]
 
     def _estimate(self, u: Array, y: Array) -> None:
         """Estimate from the last estimate, or from several starts if there is none."""
-        model, step = self.last, self.job.step
+        model, step = self.last, self.study.planner.step
         if self.known is not None:
             found = fit_batch(model, u[None], y[None], step, start=model.theta)
             if found.converged[0]:
@@ -139,10 +143,10 @@ class _Run:
 
     def _doubted(self, u: Array, y: Array) -> bool:
         """Return whether tests at the present estimate refute the structure."""
-        if self.known is None or not self.job.rules.stops:
+        if self.known is None or not self.study.rules.stops:
             return False
         full = self._identified(u, y, near=True)
-        return full is not None and self.job.rules.refuted(full)
+        return full is not None and self.study.rules.refuted(full)
 
     def _anew(self, u: Array, y: Array) -> Estimate | None:
         """Return the estimate from several starts, which is built on from now on; None if there is none."""
@@ -152,7 +156,7 @@ class _Run:
         return full
 
     def _identified(self, u: Array, y: Array, *, near: bool = False) -> Estimate | None:
-        model, step, feedback = self.last, self.job.step, self._feedback
+        model, step, feedback = self.last, self.study.planner.step, self.study.true.loop is not None
         try:
             return identify(model, u, y, step, start=model.theta, feedback=feedback, rest=True, near=near)
         except SpecError:  # too little is known yet
@@ -165,17 +169,13 @@ class _Run:
         known = self.known
         if known is None or not known.met:  # more parameters miss it all the more
             return False
-        question = self.job.planner.question(known.model, known.information)
+        question = self.study.planner.question(known.model, known.information)
         errors = model_errors(question.requirements)
         return bool(mattering(neglected(known.model, full, errors, question.information)))
 
-    @property
-    def _feedback(self) -> bool:
-        return self.job.true.loop is not None
-
     def _stand(self, estimate: Model, u: Array, y: Array) -> None:
-        informed = partial(information_of_data, u=u, y=y, step=self.job.step)
-        stands = standing(self.job.planner, estimate, informed, self.sound)
+        informed = partial(information_of_data, u=u, y=y, step=self.study.planner.step)
+        stands = standing(self.study.planner, estimate, informed, self.sound)
         if stands is None:
             return
         self.known, self.last = stands, stands.model
@@ -190,48 +190,48 @@ class _Run:
         return Ended(
             status,
             samples,
-            energy_of(self.r, self.job.true, self.job.step, self.job.cost) if samples else 0.0,
+            energy_of(self.study.planner, self.r, self.study.true) if samples else 0.0,
             self.last.theta,
             self._true_ratio() if samples else None,
-            {of: within(self.job, self.last, of) for of in _REFERENCES},
+            {of: within(self.study, self.last, of) for of in _REFERENCES},
             self.parts,
             len(self.shrunk),
         )
 
     def _true_ratio(self) -> float | None:
         """Return the ratio of the true plant by the samples applied."""
-        true = replace(self.job.true, samples=len(self.r))
+        true = replace(self.study.true, samples=len(self.r))
         if true.model.names != self.last.names:
             return None
-        information = FiniteRecord(true, len(self.r), self.job.step).information(self.r)
+        information = FiniteRecord(true, len(self.r), self.study.planner.step).information(self.r)
         try:
-            question = self.job.planner.question(true.model, information)
+            question = self.study.planner.question(true.model, information)
             return ratio_of(question, question.information)
         except (IdesignError, np.linalg.LinAlgError):
             return None
 
 
-def energy_of(r: Array, true: Experiment, step: float, cost: Mapping[PowerKind, Weight]) -> float:
-    """Return the cost of a record (n, r) on the true plant, summed over its samples; see `CampaignJob`."""
-    at = FiniteRecord(true, len(r), step)
+def energy_of(planner: Planner, r: Array, true: Experiment) -> float:
+    """Return the cost of a record (n, r) on the true plant, summed over its samples."""
+    at = FiniteRecord(true, len(r), planner.step)
     powers: dict[PowerKind, list[float]] = {
         kind: np.mean(at.signals(kind, r) ** 2, axis=0).tolist() for kind in POWER_KINDS
     }
-    return len(r) * weighted_sum(cost, powers)
+    return len(r) * weighted_sum(planner.cost, powers)
 
 
-def within(job: CampaignJob, estimate: Model, of: Reference) -> bool | None:
+def within(study: CampaignStudy, estimate: Model, of: Reference) -> bool | None:
     """Return whether |G_hat - G_0| <= r_adm of the truth, the estimate or the spec at all frequencies."""
     models: dict[Reference, Model] = {
-        "true": job.true.model,
+        "true": study.true.model,
         "estimate": estimate,
-        "design": job.planner.nominal.model,
+        "design": study.planner.nominal.model,
     }
     try:
-        errors = model_errors(job.planner.question(models[of], np.eye(len(models[of].names))).requirements)
+        errors = model_errors(study.planner.question(models[of], np.eye(len(models[of].names))).requirements)
     except IdesignError:
         return None
-    return all(_kept(error, estimate, job.true.model) for error in errors) if errors else None
+    return all(_kept(error, estimate, study.true.model) for error in errors) if errors else None
 
 
 def _kept(error: OnModelError, estimate: Model, truth: Model) -> bool:

@@ -20,7 +20,7 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, foreseen_rivals, not_foreseen
 from inputdesign_cli.identification import Earlier, Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.monte_carlo.searched_runs import searched_run
+from inputdesign_cli.monte_carlo.study import searched_run
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.design import Foreseen as Entry
 from inputdesign_cli.outcome.simulation import Searched

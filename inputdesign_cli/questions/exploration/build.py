@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
 from inputdesign_cli.explore import Found, output_error_form
 from inputdesign_cli.outcome.model_words import blocks_of
-from inputdesign_cli.outcome.results import Json
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.assessment.identify import Identification
@@ -124,7 +124,7 @@ def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
     return "\n".join([head, *lines]) + doubted
 
 
-def _inside(noise: Json, samples: int) -> tuple[Json, list[str]]:
+def _inside(noise: Mapping[str, Any], samples: int) -> tuple[dict[str, Any], list[str]]:
     """Return the block with roots of C and D not too near to the unit circle, and the letters that changed.
 
     Their modulus is at most 1 - 1 / samples: a record of this length cannot resolve nearer roots.

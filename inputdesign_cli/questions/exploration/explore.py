@@ -34,7 +34,7 @@ from inputdesign_cli.questions.assessment.identify import (
     identification_results,
     told,
 )
-from inputdesign_cli.questions.assessment.responses import response_of_data
+from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.exploration.build import build_explored, spec_text, warned
 from inputdesign_cli.questions.exploration.outcome import (
     exploration_notes,

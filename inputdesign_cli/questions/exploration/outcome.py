@@ -11,7 +11,7 @@ from inputdesign_cli.findings.explored_inputs import open_parameters
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driving_nothing
 from inputdesign_cli.outcome.curves import Curves, FitCurves, FitPanel, OrderCurves
-from inputdesign_cli.outcome.exploration import (
+from inputdesign_cli.outcome.estimate import (
     Exploration,
     ExploredOutput,
     FeedbackInput,

@@ -30,7 +30,7 @@ from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
-from inputdesign_cli.questions.assessment.responses import response_of_data
+from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.frequency_response.measured import Judged, Measured, measured_results
 from inputdesign_cli.questions.frequency_response.terms import ResponseTerms
 from inputdesign_cli.questions.frequency_response.whole_periods import Counted, whole_periods

@@ -31,7 +31,7 @@ from inputdesign_cli.outcome import (
     White,
 )
 from inputdesign_cli.outcome.curves import Curves, DirectionCurves, LossCurves, SpectrumCurves
-from inputdesign_cli.outcome.loop_error import ActivePower, LossMoments, TheoreticalLoss
+from inputdesign_cli.outcome.design import ActivePower, LossMoments, TheoreticalLoss
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
 from inputdesign_cli.outcome.units import Header

@@ -126,7 +126,7 @@ def test_exchanged_channels_are_named(run, tmp_path):
     header, table = recorded(tmp_path / "c", "two")
     record = saved(tmp_path / "x.csv", header, table[:, [0, 2, 1, 3, 4]])
     code, _, err = run("next", "c", record)
-    assert (code, "record-unlike" in err, "it holds them as 2, 1" in err) == (2, True, True)
+    assert (code, "record-unlike" in err, "u2 follows plan_01.csv as u1 should" in err) == (2, True, True)
     columns = "u1=u2,u2=u1,y1=y1,y2=y2"
     assert run("next", "c", record, "--columns", columns, "--no-figures")[0] == 0
 

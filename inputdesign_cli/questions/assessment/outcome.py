@@ -1,0 +1,232 @@
+"""What an estimate gives: its entries of `result.json`, model.yaml, tables and curves."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import worst
+from inputdesign_cli.accuracy.model_error import OnModelError
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.findings.frequency_responses import BY_U
+from inputdesign_cli.findings.rivals import rival_entries
+from inputdesign_cli.identification import Estimate, FrequencyResponse, ResidualTest, Rival, ScoreTest
+from inputdesign_cli.outcome import Identification, Information, MeasuredLines, ModelError as Bound
+from inputdesign_cli.outcome.curves import (
+    BoundCurves,
+    Curves,
+    FitCurves,
+    FitPanel,
+    ResidualCurves,
+    ResponseCurves,
+    ResponsePanel,
+)
+from inputdesign_cli.outcome.estimate import PriorAgreement, Test
+from inputdesign_cli.outcome.model_words import blocks_of
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.plant import Model
+from inputdesign_cli.questions.common.bound import Informed
+from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.records import Preparation
+from inputdesign_cli.specification import is_prior
+
+# Beyond a disc by more than this share of G.
+_FAR = 0.2
+
+
+def identification_entry(
+    estimate: Estimate, preparation: Preparation, ruled_out: Sequence[Rival]
+) -> Identification:
+    """Return `identification` of `result.json`."""
+    single, centred = estimate.noise.size == 1, preparation.detrend == "constant"
+    levels = None if centred else dict(preparation.levels)
+    return Identification(
+        theta=dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
+        standard_deviation=_deviations(estimate),
+        variance=float(estimate.noise[0, 0]) if single else tuple(map(tuple, estimate.noise.tolist())),
+        converged=estimate.converged,
+        steps=estimate.steps,
+        starts=estimate.starts,
+        whiteness=_test(estimate.whiteness),
+        independence=_test(estimate.independence),
+        tests={test.name: _test(test, test.lag) for test in estimate.all_tests},
+        failed=tuple(test.name for test in estimate.failed),
+        free_start=estimate.free,
+        rivals=rival_entries(estimate, estimate.rivals) or None,
+        ruled_out=rival_entries(estimate, ruled_out) or None,
+        prior=None if estimate.agreement is None else PriorAgreement(estimate.agreement),
+        records=tuple(estimate.lengths) if len(estimate.lengths) > 1 else None,
+        means_removed=centred or None,
+        operating_point=levels or None,
+        fit_percent=estimate.fit[0] if single else tuple(estimate.fit),
+    )
+
+
+def information_entry(estimate: Estimate) -> Information:
+    """Return `information` of `result.json`."""
+    return Information(estimate.names, estimate.information, estimate.covariance, _deviations(estimate))
+
+
+def _deviations(estimate: Estimate) -> dict[str, float]:
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    return dict(zip(estimate.names, deviations.tolist(), strict=True))
+
+
+def _test(test: ResidualTest | ScoreTest, lag: int | None = None) -> Test:
+    return Test(test.statistic, test.freedom, test.probability, lag)
+
+
+def model_text(units: Units, model: Model, estimate: Estimate) -> str:
+    """Return the blocks to paste, with the clock of the data and the prior for a next experiment."""
+    lines = [
+        f"# Estimated from {len(estimate.errors)} samples: paste in place of the blocks of the same names,",
+        "# or write include: and the name of this file in a spec without them.",
+        f"sample_time: {units.sample_time!r}",
+        f"time_unit: {units.time_unit}",
+    ]
+    for key, block in blocks_of(model).items():
+        lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]
+    values = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
+    lines += [
+        "# How far to trust them; a later spec may say experiment: {prior: {information: model.yaml}}.",
+        "estimate:",
+        f"  parameters: {json.dumps(values)}",
+    ]
+    covariance = estimate.covariance.tolist()
+    if is_prior(values, covariance):
+        lines += ["  covariance:", *(f"    - {json.dumps(row)}" for row in covariance)]
+    else:
+        lines += [
+            "  # No covariance: it is singular to rounding, for the data do not distinguish some of these.",
+            "  # Take more data, or fewer parameters; this file is no prior.",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def data_curves(
+    units: Units, u: Array, y: Array, estimate: Estimate
+) -> tuple[dict[str, Table], dict[str, Curves]]:
+    """Return fit.csv and residuals.csv with their figures.
+
+    Args:
+        u, y: the records, (samples, r) and (samples, p).
+    """
+    instants = units.sample_time * np.arange(len(y), dtype=np.float64)
+    predicted = y - estimate.errors
+    columns = {units.time_header: instants}
+    if len(estimate.lengths) > 1:
+        columns["record"] = np.repeat(np.arange(1.0, len(estimate.lengths) + 1), estimate.lengths)
+    columns |= {**_columns(units, "u", u), **_columns(units, "y", y)}
+    columns |= _columns(units, "y", predicted, "_predicted")
+    panels = []
+    for i, fit in enumerate(estimate.fit):
+        curve = None if fit is None else estimate.simulated[:, i]
+        if curve is not None:
+            columns[f"y{_number(units, i)}_simulated"] = curve
+        panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i, units.label(f"y{i + 1}")))
+    columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
+    white, cross = estimate.whiteness, estimate.independence
+    shared = min(white.lags.size, cross.lags.size)
+    residuals = {"autocorrelation_lag": white.lags[:shared]}
+    residuals |= _pairs(units, "autocorrelation", white.correlation[:shared])
+    residuals |= {"cross_correlation_lag": cross.lags[:shared]}
+    residuals |= _pairs(units, "cross_correlation", cross.correlation[:shared])
+    curves: dict[str, Curves] = {
+        "fit": FitCurves(instants, tuple(panels), tuple(estimate.lengths)),
+        "residuals": ResidualCurves(
+            white.lags,
+            white.correlation,
+            cross.lags,
+            cross.correlation,
+            white.limit,
+            white.probability,
+            cross.probability,
+        ),
+    }
+    return {"fit": Table(columns), "residuals": Table(residuals)}, curves
+
+
+def bound_of_data(
+    units: Units, confidence: Confidence, errors: Sequence[OnModelError], *, asked: bool, information: Array
+) -> tuple[Table, BoundCurves, Bound]:
+    """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
+
+    Args:
+        errors: what has r_u; `asked` says whether requirements state r_adm.
+        information: (k, k) of the data.
+    """
+    bound = Bound(confidence.alpha, confidence=confidence.reported)
+    if asked:
+        violation = worst([error.worst(information) for error in errors])
+        frequency = violation.frequency
+        bound = replace(
+            bound,
+            worst_ratio=violation.ratio,
+            worst_frequency=None if frequency is None else frequency / units.frequency,
+        )
+    table, curves = Informed(units, errors, information, asked, label="data").bound()
+    return table, curves, bound
+
+
+def _number(units: Units, channel: int) -> str:
+    return "" if units.single else f"{channel + 1}"
+
+
+def _columns(units: Units, name: str, values: Array, of: str = "") -> dict[str, Array]:
+    return {f"{name}{_number(units, i)}{of}": column for i, column in enumerate(values.T)}
+
+
+def _pairs(units: Units, name: str, values: Array) -> dict[str, Array]:
+    _, rows, columns = values.shape
+    return {f"{name}{units.suffix(i, j)}": values[:, i, j] for i in range(rows) for j in range(columns)}
+
+
+def response_of_data(
+    units: Units,
+    model: Model,
+    found: FrequencyResponse,
+    *,
+    by_reference: bool,
+    inputs: Sequence[int] | None = None,
+    loop: bool = False,
+) -> tuple[Table, ResponseCurves, MeasuredLines]:
+    """Return the table, its figure, and `frequency_response` of the result.
+
+    Args:
+        model: the estimate that it stands beside.
+        by_reference: whether a reference from outside was used.
+        inputs: the inputs (from zero) of `found`; None: all.
+        loop: whether the data come from a loop, which the spec need not state.
+    """
+    w = found.frequency / units.sample_time
+    G = model.plant_at(w * units.frequency)
+    columns: dict[str, Array] = {units.frequency_header: w}
+    panels, outside, far = [], list[NDArray[np.bool_]](), list[NDArray[np.bool_]]()
+    for i in range(units.outputs):
+        for k, j in enumerate(range(units.inputs) if inputs is None else inputs):
+            own, radius, modelled = found.G[:, i, k], found.radius[:, i, k], G[:, i, j]
+            listed = {"G_re": own.real, "G_im": own.imag, "G_abs": np.abs(own), "radius": radius}
+            listed["model_abs"] = np.abs(modelled)
+            columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
+            entry = None if units.single else (i, j)
+            panels.append(ResponsePanel(w, own, radius, modelled, entry, units.passage((i, j))))
+            apart, size = np.abs(own - modelled), np.maximum(np.abs(own), np.abs(modelled))
+            outside.append(apart > radius)
+            far.append(apart > radius + _FAR * size)
+        number = "" if units.single else f"_{i + 1}"
+        columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}
+    told = MeasuredLines(
+        method=found.method,
+        excitation="r" if by_reference else "u",
+        frequencies=int(w.size),
+        entries=len(panels),
+        model_outside=float(np.mean(outside)),
+        model_far_outside=float(np.mean(far)),
+        caveat=BY_U if (units.closed_loop or loop) and not by_reference else None,
+    )
+    return Table(columns), ResponseCurves(tuple(panels)), told
