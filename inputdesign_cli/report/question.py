@@ -10,6 +10,7 @@ from inputdesign_cli.specification import PolynomialPlant, Spec, parse_spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
 from inputdesign_cli.specification.models.uncertainty import SOURCES
+from inputdesign_cli.specification.plugins import added
 
 _SPECTRA = {
     "white": "white excitation",
@@ -181,6 +182,7 @@ def _accuracy(spec: Spec) -> list[str]:
         "standard_deviation": "Standard deviations of parameters are bounded.",
         "closed_loop_error": "A controller is designed on the model; what counts is the error of its loop.",
     }
+    others |= {name: (one.__doc__ or name).splitlines()[0] for name, one in added("requirements").items()}
     sentences += [others[name] for name, value in accuracy if name in others and value is not None]
     if accuracy.mean_squared_error is not None:
         target = accuracy.mean_squared_error.target

@@ -17,6 +17,7 @@ from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
 from inputdesign_cli.specification.models.wording import show
+from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.schema import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import compose
@@ -133,6 +134,7 @@ def build(tree: Tree, folder: FilePath | None = None, design: bool | None = True
     Raises:
         SpecError: As `load_spec`.
     """
+    install()
     check_mapping(tree)
     design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +25,16 @@ from inputdesign_cli.questions.building.parameters import embedded
 from inputdesign_cli.questions.building.weights import build_weight, check_finite
 from inputdesign_cli.questions.common.within_limits import StatedBound
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.plugins import added
 
 _RELATIVE_ZERO = 1e-9
+
+
+class AddedRequirement(Protocol):
+    """A section of `accuracy` that another package adds (`specification.plugins`)."""
+
+    def build(self, spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+        """Return what makes its requirements in the coordinates of a design."""
 
 
 def build_requirements(
@@ -47,6 +56,8 @@ def build_requirements(
     def made(key: str) -> list[RequirementFactory]:
         if key in ("model_error", "loop") and nominal is not None:
             return [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
+        if key in added("requirements"):
+            return cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
         return BUILDERS[key](spec, experiment)
 
     return [make for key in spec.accuracy.requirements for make in made(key)]
@@ -211,4 +222,4 @@ BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "standard_deviation": _standard_deviations,
     "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
 }
-"""The builder of each key of `accuracy`; a new requirement adds its own."""
+"""The builder of each key of `accuracy`."""

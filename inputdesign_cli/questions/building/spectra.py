@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol, cast
+
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
@@ -18,6 +20,7 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
     WhiteSpectrum,
 )
+from inputdesign_cli.specification.plugins import added
 from inputdesign_cli.spectrum import (
     Basis,
     FirBasis,
@@ -30,6 +33,13 @@ from inputdesign_cli.spectrum import (
 
 _DEFAULT_ORDER = 20
 _SAME = 1e-9
+
+
+class AddedSpectrum(Protocol):
+    """A section of `spectrum` that another package adds (`specification.plugins`)."""
+
+    def build(self, spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
+        """Return the family of spectra of inputs in a band; see `build_basis`."""
 
 
 def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
@@ -67,6 +77,8 @@ def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
             basis = _fir(spec, inputs, order)
         case GivenSpectrum():
             raise _refused(spec, "the excitation is given: there is nothing to design")
+        case other if other.type in added("spectra"):
+            basis = cast(AddedSpectrum, other).build(spec, inputs, band)
         case other:
             raise _refused(spec, f"spectra of type {other.type} are not designed for this plant and accuracy")
     if spec.limits.spectrum is not None and not basis.has_density:

@@ -27,7 +27,7 @@ class Control(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """There is one law, and its transfer functions are stable."""
-        yield from self.exactly_one("model_reference", "internal_model", "minimum_variance")
+        yield from self.exactly_one(*type(self).model_fields)
         if self.model_reference is not None:
             yield from check_stable(self.model_reference, "model_reference")
         if self.internal_model is not None:

@@ -117,6 +117,8 @@ class Section(BaseModel):
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {}
     """Common keys that this section does not have -> a hint on its own keys."""
+    CODES: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+    """Of a section from another package: the codes of its errors, with title, text and remedy."""
 
     def stated(self, *keys: str) -> tuple[str, ...]:
         """Return the keys that have a value."""

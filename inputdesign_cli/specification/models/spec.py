@@ -88,7 +88,7 @@ class Spec(Section):
         default=Cost(input_power=1.0),
         description="Weights of the powers. Default: input_power 1; in closed loop also output_power 1.",
     )
-    accuracy: Accuracy = Field(default=Accuracy(), description="What the model must reach.")
+    accuracy: Accuracy = Field(default_factory=Accuracy, description="What the model must reach.")
     objective: Objective | None = optional(
         "least_cost, best_accuracy or shortest_experiment; default: from the rest."
     )
