@@ -291,8 +291,11 @@ def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     if stated is not None:
         return stated.over(spec, experiment.model.names)
     record = prior_record(spec)
-    if record is None:
-        return None
+    return None if record is None else information_in(spec, experiment, record)
+
+
+def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
+    """Return the information (k, k) about the plant in the samples (n, r) of an earlier excitation."""
     earlier = replace(experiment, samples=len(record))
     return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
 

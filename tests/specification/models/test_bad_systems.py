@@ -59,13 +59,13 @@ ROWS: list[Row] = [
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, §B: [1]}"}),
     ("unknown-word", "plant.sample", "zoh", {
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §foh}"}),
-    ("unknown-word", "plant.sample", "foh is not supported: write sample: zoh (", {
+    ("unknown-word", "plant.sample", "write zoh", {
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §foh}"}),
     ("unknown-word", "plant.sample", 'did you mean "zoh"?', {
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §zho}"}),
     ("unknown-word", "plant.sample", "write zoh", {
         "plant": "{continuous: {numerator: [1], denominator: [1, 1]}, sample: §true}"}),
-    ("unknown-word", "experiment.controller.pid.sample", "sample: tustin, sample: backward or sample: zoh", {
+    ("unknown-word", "experiment.controller.pid.sample", "must be tustin, backward or zoh", {
         "experiment": "{controller: {pid: {Kp: 1, sample: §foh}}}"}),
     ("unsuitable-key", "noise.C", "not sampled", {"plant": CONTINUOUS, "noise": "{variance: 1, C: §[1]}"}),
     ("unsuitable-key", "experiment.controller", "sample: zoh", {
