@@ -264,13 +264,9 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
     siblings = FAMILIES.get(model.family, []) if model else []
     others = [sibling.phrase for sibling in siblings if key in sibling.model_fields]
     if others and model:
-        return PathDiagnostic(
-            "unsuitable-key",
-            f"{format_key(path)} does not go with {model.phrase}",
-            f'"{key}" belongs to {choices(list(dict.fromkeys(others)))}; remove it, or change to that',
-            path,
-            at_key=True,
-        )
+        message = f"{format_key(path)} does not go with {model.phrase}"
+        hint = f'"{key}" belongs to {choices(list(dict.fromkeys(others)))}; remove it, or change to that'
+        return PathDiagnostic("unsuitable-key", message, hint, path, at_key=True)
     near, homes = nearest(key, known), _homes(root).get(key, [])
     inside = [f"under {name}" for name in known if model and key in _keys_below(model, name)]
     hint = f"the keys of {owner} are {', '.join(known)}" if known else "remove it"
