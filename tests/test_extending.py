@@ -1,71 +1,100 @@
-"""The promise of docs/CONTRIBUTING.md: what its examples add from outside is designed and proved."""
+"""The promise of docs/CONTRIBUTING.md: what another package adds by entry points is designed and proved."""
 
+import json
+import os
 import re
-from dataclasses import replace
+import subprocess
+import sys
 from pathlib import Path
 
 import cvxpy as cp
 import numpy as np
-import pydantic
 import pytest
 
-from extending.pieces import PiecesBasis
-from extending.total_variance import TotalVariance
-from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import SpecError
-from inputdesign_cli.questions.building import requirements as builders
-from inputdesign_cli.questions.task import build_task
-from inputdesign_cli.specification import loading
-from inputdesign_cli.specification.models import accuracy as words
-from inputdesign_cli.specification.models.spec import Spec
-
-PAGE = (Path(__file__).parent.parent / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
 SAMPLES, VARIANCE, ORDER = 200, 0.5, 6
+EDGES, TARGET = [0.0, 0.5, 1.4, 3.14159], [[60, 35, 5], [35, 60, 35], [5, 35, 60]]
 
-SPEC = """
-plant: {{B: [0, 1, 0.5, 0.2]}}
-noise: {{variance: 0.5}}
-experiment: {{samples: 200}}
-accuracy: {accuracy}
-spectrum: {{type: fir, order: 6}}
-signal: {{seed: 1}}
+HEAD = """
+from typing import Literal
+import numpy as np
+from pydantic import Field
+from extending.integrated_variance import IntegratedVariance
+from extending.pieces import PiecesBasis
+from inputdesign_cli.design.loop_error.laws import ModelReference
+from inputdesign_cli.plant import Rational, TransferMatrix
+from inputdesign_cli.questions.building.spectra import build_basis
+from inputdesign_cli.specification.models.fields import Frequencies, Index, Numbers, Positive
+from inputdesign_cli.specification.models.section import Section
+"""
+LAW = """
+class DeadBeat(Section):
+    steps: Index = Field(description="Samples until the output follows.")
+    CODES = {"too-dead": {"title": "T", "text": "X", "remedy": "R"}}
+
+    def build(self, spec, plant):
+        return ModelReference(TransferMatrix.diagonal(Rational(np.eye(self.steps + 1)[-1]), plant.outputs))
+"""
+ENTRY_POINTS = """
+[idesign.requirements]
+integrated_variance = h2:H2
+[idesign.spectra]
+pieces = h2:Pieces
+[idesign.control_laws]
+dead_beat = h2:DeadBeat
+"""
+PLANT = (
+    "plant: {B: [0, 1, 0.5, 0.2]}\nnoise: {variance: 0.5}\nexperiment: {samples: 200}\nsignal: {seed: 1}\n"
+)
+SPECS = {
+    "flat": PLANT + "accuracy: {integrated_variance: {max: 0.01}}\nspectrum: {type: fir, order: 6}",
+    "weighted": PLANT
+    + "accuracy: {integrated_variance: {max: 0.02, weight: [1, -0.8]}}\nspectrum: {type: fir, order: 6}",
+    "pieces": PLANT + f"accuracy: {{information: {TARGET}}}\nspectrum: {{type: pieces, edges: {EDGES}}}",
+    "loop": PLANT
+    + "accuracy: {closed_loop_error: {control: {dead_beat: {steps: 1}}}}\nlimits: {input_power: 1}",
+    "stated loop": PLANT
+    + "accuracy: {closed_loop_error: {control: {model_reference: {numerator: [0, 1]}}}}\n"
+    "limits: {input_power: 1}",
+}
+RUN = """
+import json, sys
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.findings import explanations
+from inputdesign_cli.specification import json_schema
+specs, schema = json.loads(sys.argv[1]), json_schema()
+print(json.dumps(default=lambda a: a.tolist(), obj={
+    "schema": [sorted(schema["$defs"]), sorted(schema["$defs"]["Accuracy"]["properties"])],
+    "codes": sorted(explanations()),
+    **{name: solve(parse_spec(text)).result for name, text in specs.items()},
+}))
 """
 
 
-def run_block(file, names, old="", new=""):
-    """Run the block of the page that belongs to this file of the package; `names` is what the file holds."""
-    (block,) = re.findall(rf"<!-- {re.escape(file)} -->\n```python\n(.*?)```", PAGE, flags=re.DOTALL)
-    exec(compile(block.replace(old, new) if old else block, file, "exec", dont_inherit=True), names)
-    return names
+def run(folder, *arguments):
+    """Run Python where the package is installed; a shell finds it by its .dist-info alone."""
+    path = os.pathsep.join([str(folder), str(ROOT / "docs"), str(ROOT)])
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = [sys.executable, *arguments]
+    return subprocess.run(done, env=environment, capture_output=True, text=True, timeout=120, check=False)
 
 
-@pytest.fixture
-def total_variance(monkeypatch):
-    """The package with the requirement of the page."""
-    # On the page a line is added to `Accuracy`; from outside, a class that has the line takes its place.
-    more = run_block(
-        "specification/models/accuracy.py",
-        dict(vars(words)),
-        old="class Accuracy(Section)",
-        new="class Accuracy(Accuracy)",
-    )["Accuracy"]
-    monkeypatch.setattr(
-        loading, "Spec", pydantic.create_model("Spec", __base__=Spec, accuracy=(more, more()))
-    )
-    table = dict(builders.BUILDERS)
-    names = {**vars(builders), "BUILDERS": table, "TotalVariance": TotalVariance}
-    run_block("questions/building/requirements.py", names)
-    monkeypatch.setattr(builders, "BUILDERS", table)
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    blocks = re.findall(r"<!-- (?:h2.py|pieces) -->\n```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    (folder / "h2.py").write_text("\n".join([HEAD, *blocks, LAW]))
+    (folder / "h2-1.dist-info").mkdir()
+    (folder / "h2-1.dist-info" / "entry_points.txt").write_text(ENTRY_POINTS)
+    return folder
 
 
-def spec_of(accuracy):
-    return parse_spec(SPEC.format(accuracy=accuracy))
-
-
-def autocovariances():
-    """r_0 .. r_m of a FIR spectrum in cvxpy: traces along the diagonals of a positive Gram matrix."""
-    gram = cp.Variable((ORDER + 1, ORDER + 1), PSD=True)
-    return [cp.trace(np.eye(ORDER + 1, k=-lag) @ gram) for lag in range(ORDER + 1)]
+@pytest.fixture(scope="module")
+def found(installed):
+    done = run(installed, "-c", RUN, json.dumps(SPECS))
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
 def information_of(r):
@@ -73,63 +102,67 @@ def information_of(r):
     return cp.bmat([[r[abs(i - j)] for j in range(3)] for i in range(3)])
 
 
-def least_power(weights, most):
-    """By a plain program, sum_i w_i e_i^T M^-1 e_i <= most."""
-    r = autocovariances()
-    spread = cp.matrix_frac(np.diag(np.sqrt(weights)), information_of(r))
-    problem = cp.Problem(cp.Minimize(r[0]), [spread <= most * SAMPLES / VARIANCE])
-    return problem.solve(solver="CLARABEL")
-
-
-@pytest.mark.usefixtures("total_variance")
-def test_equal_weights_are_best_served_by_white_input():
+def test_an_even_weight_is_best_served_by_white_input(found):
     """tr R^-1 >= k^2 / tr R with equality for R in proportion to I: the power is k sigma^2 / (N max)."""
-    result = solve(spec_of("{total_variance: {weights: {b1: 1, b2: 1, b3: 1}, max: 0.01}}")).result
-    assert result["cost"] == pytest.approx(3 * VARIANCE / (SAMPLES * 0.01), rel=1e-7)
-    assert result["objective"]["relative_gap"] < 1e-6
-    assert result["status"] == "optimal"
+    assert found["flat"]["cost"] == pytest.approx(3 * VARIANCE / (SAMPLES * 0.01), rel=1e-7)
+    assert found["flat"]["objective"]["relative_gap"] < 1e-6
 
 
-@pytest.mark.usefixtures("total_variance")
-def test_the_optimum_is_that_of_a_plain_program():
-    found = solve(spec_of("{total_variance: {weights: {b1: 1, b2: 9, b3: 2}, max: 0.02}}"))
-    result = found.result
-    assert result["cost"] == pytest.approx(least_power([1.0, 9.0, 2.0], 0.02), rel=1e-5)
+def test_the_optimum_is_that_of_a_plain_program(found):
+    """The integral is the trace of P times the Toeplitz matrix of the autocovariances of W."""
+    result = found["weighted"]
+    weight = np.array([[1.64, -0.8, 0.0], [-0.8, 1.64, -0.8], [0.0, -0.8, 1.64]])
+    gram = cp.Variable((ORDER + 1, ORDER + 1), PSD=True)
+    r = [cp.trace(np.eye(ORDER + 1, k=-lag) @ gram) for lag in range(ORDER + 1)]
+    spread = cp.matrix_frac(np.linalg.cholesky(weight), information_of(r))
+    plain = cp.Problem(cp.Minimize(r[0]), [spread <= 0.02 * SAMPLES / VARIANCE])
+    assert result["cost"] == pytest.approx(plain.solve(solver="CLARABEL"), rel=1e-5)
     assert result["objective"]["relative_gap"] < 1e-6
     assert result["objective"]["lower_bound"] <= result["cost"] * (1 + 1e-12)
     (listed,) = result["requirements"]
-    assert listed["name"] == "total_variance"
+    assert listed["name"] == "integrated_variance"
     assert listed["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
-    variances = np.array([result["information"]["standard_deviation"][f"b{i}"] for i in (1, 2, 3)]) ** 2
-    assert variances @ [1.0, 9.0, 2.0] == pytest.approx(0.02, rel=1e-5)
     # The record is judged by it as well: chosen to meet it with its own samples.
     assert result["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
-@pytest.mark.usefixtures("total_variance")
-def test_its_words_are_checked_like_all_others():
-    with pytest.raises(SpecError, match="max"):
-        spec_of("{total_variance: {weights: {b1: 1}, max: -1}}")
-    with pytest.raises(SpecError, match='no parameter "b9"'):
-        build_task(spec_of("{total_variance: {weights: {b9: 1}, max: 1}}"))
-
-
-def test_a_new_family_of_spectra_is_designed_and_proved():
+def test_a_new_family_of_spectra_is_designed_and_proved(found):
     """Powers in three bands: M is a sum of Toeplitz matrices of sin(k w) / k, and the rest plain cvxpy."""
-    edges, target = np.array([0.0, 0.5, 1.4, np.pi]), [[60, 35, 5], [35, 60, 35], [5, 35, 60]]
-    made = PiecesBasis(1, tuple(edges))
-    task = build_task(spec_of(f"{{information: {target}}}"))
-    asked = replace(task.asked, question=replace(task.asked.question, basis=made))
-    found = replace(task, asked=asked).solve().result
-
-    powers = cp.Variable(3, nonneg=True)
+    powers, edges = cp.Variable(3, nonneg=True), np.array(EDGES)
     lags = np.arange(3)[:, None]
     primitive = np.where(lags == 0, edges, np.sin(lags * edges) / np.maximum(lags, 1))
     shares = np.diff(primitive) / np.diff(edges)
     M = SAMPLES / VARIANCE * information_of([shares[lag] @ powers for lag in range(3)])
-    plain = cp.Problem(cp.Minimize(cp.sum(powers)), [M >> np.array(target)])
+    plain = cp.Problem(cp.Minimize(cp.sum(powers)), [M >> np.array(TARGET)])
     plain.solve(solver="CLARABEL")
+    assert found["pieces"]["cost"] == pytest.approx(plain.value, rel=1e-6)
+    assert found["pieces"]["objective"]["relative_gap"] < 1e-6
+    assert found["pieces"]["spectrum"]["powers"] == pytest.approx(powers.value, abs=1e-5 * plain.value)
 
-    assert found["cost"] == pytest.approx(plain.value, rel=1e-6)
-    assert found["objective"]["relative_gap"] < 1e-6
-    assert found["spectrum"]["powers"] == pytest.approx(powers.value, abs=1e-5 * plain.value)
+
+def test_a_control_law_is_that_of_its_desired_loop(found):
+    assert found["loop"]["objective"]["value"] == found["stated loop"]["objective"]["value"]
+
+
+def test_schema_and_explanations_know_it(found):
+    sections, keys = found["schema"]
+    assert {"H2", "Pieces", "DeadBeat"} <= set(sections)
+    assert "integrated_variance" in keys
+    assert "too-dead" in found["codes"]
+
+
+def test_its_words_are_checked_like_all_others(installed, tmp_path):
+    spec = tmp_path / "s.yaml"
+    spec.write_text(PLANT + "accuracy:\n  integrated_variance: {max: -1, weihgt: [1]}\n")
+    done = run(installed, "-m", "inputdesign_cli", "validate", str(spec))
+    assert done.returncode == 2
+    assert "integrated_variance.max must be greater than 0" in done.stderr
+    assert 'did you mean "weight"' in done.stderr
+
+
+def test_a_broken_package_is_named(tmp_path):
+    (tmp_path / "x-1.dist-info").mkdir()
+    (tmp_path / "x-1.dist-info" / "entry_points.txt").write_text("[idesign.spectra]\nnew = nowhere:New\n")
+    done = run(tmp_path, "-m", "inputdesign_cli", "schema")
+    assert done.returncode == 2
+    assert "bad-plug-in" in done.stderr

@@ -9,6 +9,7 @@ from pkgutil import iter_modules
 from inputdesign_cli import error_codes
 from inputdesign_cli.error_codes import Explanation
 from inputdesign_cli.finding import KINDS, FindingKind
+from inputdesign_cli.specification import plugins
 
 
 def kinds() -> dict[str, FindingKind]:
@@ -21,4 +22,5 @@ def kinds() -> dict[str, FindingKind]:
 def explanations() -> dict[str, Explanation]:
     """Return the explanation of every code: errors first, then findings."""
     found = {code: Explanation(kind.title, kind.text, kind.remedy) for code, kind in kinds().items()}
-    return {**error_codes.explanations(), **found}
+    added = {code: Explanation(**entry) for code, entry in plugins.codes().items()}
+    return {**error_codes.explanations(), **found, **added}

@@ -11,6 +11,7 @@ from inputdesign_cli.specification.models.accuracy import FrequencyResponse, Mod
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
 from inputdesign_cli.specification.models.uncertainty import SOURCES
+from inputdesign_cli.specification.plugins import added
 
 _SPECTRA = {
     "white": "white excitation",
@@ -150,7 +151,9 @@ def _accuracy(spec: Spec) -> list[str]:
             "The frequency response is measured line by line, without a model, by an input that repeats: its "
             f"standard deviation must not exceed {_admitted(accuracy.frequency_response)} at any line."
         )
-    sentences += [text for name, text in _SENTENCES.items() if dict(accuracy)[name] is not None]
+    plugins = {name: (one.__doc__ or name).splitlines()[0] for name, one in added("requirements").items()}
+    said, values = _SENTENCES | plugins, dict(accuracy)
+    sentences += [text for name, text in said.items() if values.get(name) is not None]
     squared = accuracy.mean_squared_error
     if squared is not None:
         most = "is to be small" if squared.target is None else f"must not exceed {squared.target:g}"

@@ -17,6 +17,7 @@ from inputdesign_cli.specification.models.section import PathDiagnostic
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
 from inputdesign_cli.specification.models.wording import show
+from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.schema import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import compose
@@ -44,22 +45,17 @@ def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", path, at_key=True)
         elif _positive(duration) and _positive(step):
             samples = int(duration / step + _WHOLE)
-            if samples < 1:
+            if samples >= 1:
+                section["samples"] = samples
+            else:
                 message = f"{{key}} is {show(float(duration))}, less than sample_time"
                 yield PathDiagnostic("out-of-range", message, "look at sample_time and time_unit", path)
-            else:
-                section["samples"] = samples
-    _take_all(data)
-
-
-def _take_all(data: dict[str, Plain]) -> None:
     limits, experiment = data.get("limits"), data.get("experiment", {})
-    if data.get("objective") == "shortest_experiment" or not isinstance(limits, dict):
-        return
-    if isinstance(experiment, dict) and not {"samples", "duration"} & experiment.keys():
-        most = limits.get("samples")
-        if isinstance(most, int) and _positive(most):
-            data["experiment"] = {**experiment, "samples": most}
+    most = limits.get("samples") if isinstance(limits, dict) else None
+    stated = not isinstance(experiment, dict) or {"samples", "duration"} & experiment.keys()
+    whole = isinstance(most, int) and _positive(most)
+    if whole and not stated and data.get("objective") != "shortest_experiment":
+        data["experiment"] = {**experiment, "samples": most}
 
 
 def _positive(value: Plain) -> bool:
@@ -133,6 +129,7 @@ def build(tree: Tree, folder: FilePath | None = None, design: bool | None = True
     Raises:
         SpecError: As `load_spec`.
     """
+    install()
     check_mapping(tree)
     design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)

@@ -44,13 +44,9 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
             said = f" ({first.code} at {format_key(['estimate', *first.path])})"
             raise
     except (SpecError, ValidationError) as error:
-        raise spec.complain(
-            "bad-model-file",
-            f"{name} cannot be read as a model that identify wrote: it has no sound block estimate{said}",
-            hint="name a model.yaml, which holds estimate: {parameters: {..}, covariance: [[..]]} with a "
-            "covariance that is positive definite",
-            key=key,
-        ) from error
+        message = f"{name} is no model that identify wrote: it has no sound block estimate{said}"
+        hint = "name a model.yaml with estimate: {parameters: {..}, covariance: [[..]]}, positive definite"
+        raise spec.complain("bad-model-file", message, hint=hint, key=key) from error
     _check_clock(spec, name, data, key)
     return estimated
 
@@ -71,11 +67,7 @@ def _check_clock(spec: Spec, name: str, data: Mapping[str, Plain], key: str) -> 
         return
     if unit == spec.time_unit and isclose(step, spec.sample_time, rel_tol=_SAME):
         return
-    raise spec.complain(
-        "wrong-estimate",
-        f"{name} is an estimate from samples {step:g} {unit} apart, and sample_time is {spec.sample_time:g} "
-        f"{spec.time_unit} here",
-        hint=f"write sample_time: {step!r} and time_unit: {unit}, or take both with plant and noise by "
-        f"include: {name}; what does not depend on the sampling may stand here in numbers",
-        key=key,
-    )
+    here = f"sample_time is {spec.sample_time:g} {spec.time_unit} here"
+    message = f"{name} is an estimate from samples {step:g} {unit} apart, and {here}"
+    hint = f"write sample_time: {step!r} and time_unit: {unit}, or take them by include: {name}"
+    raise spec.complain("wrong-estimate", message, hint=hint, key=key)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -58,7 +57,7 @@ def from_control(
         raise bad_spec("not-sampled", message, hint="give it one: tf(num, den, 0.1)", key="sample_time")
     _check_arguments(discrete, sample_time, delay, known, blocks)
     if parameters is None:
-        plant = _transfer(_entries(system), discrete=discrete)
+        plant = _transfer(system, discrete=discrete)
     elif isinstance(system, control.StateSpace):
         plant = _states(system, parameters, discrete=discrete)
     else:
@@ -105,61 +104,53 @@ def _states(
         raise _bad_parameter("must be a mapping of names to entries")
     matrices: dict[str, Plain] = {letter: array.tolist() for letter, array in arrays.items()}
     values: dict[str, Plain] = {}
-    taken: dict[tuple[str, int, int], str] = {}
+    taken: dict[Place, str] = {}
     for name, place in parameters.items():
-        letter, i, j = _place(name, place, {letter: array.shape for letter, array in arrays.items()})
-        other = taken.setdefault((letter, i, j), str(name))
+        letter, i, j = found = _place(str(name), place, arrays)
+        other = taken.setdefault(found, str(name))
         if other != name:
             raise _bad_parameter(f"names the entry {letter}[{i}, {j}] twice: {other} and {name}")
         values[str(name)], matrices[letter][i][j] = matrices[letter][i][j], str(name)
-    return {
-        "parameters": values,
-        "state_space": matrices | {"time": "discrete" if discrete else "continuous"},
-    }
+    time = "discrete" if discrete else "continuous"
+    return {"parameters": values, "state_space": {**matrices, "time": time}}
 
 
-def _place(name: str, place: object, shapes: Mapping[str, tuple[int, ...]]) -> Place:
+def _place(name: str, place: object, arrays: Mapping[str, np.ndarray]) -> Place:
     """The entry of a parameter; indices below 0 count from the end, as in Python."""
     if isinstance(place, str) or not isinstance(place, Sequence) or len(place) != 3:
         raise _bad_parameter(f"{name} must be a matrix, a row and a column, not {place!r}")
     letter, *indices = place
-    if not isinstance(letter, str) or letter not in shapes:
-        raise _bad_parameter(f"{name} is in {letter!r}: the matrices are {', '.join(shapes)}")
+    if not isinstance(letter, str) or letter not in arrays:
+        raise _bad_parameter(f"{name} is in {letter!r}: the matrices are {', '.join(arrays)}")
+    rows, columns = arrays[letter].shape
     try:
-        i, j = (operator.index(k) + (n if k < 0 else 0) for k, n in zip(indices, shapes[letter], strict=True))
+        return letter, range(rows)[indices[0]], range(columns)[indices[1]]
     except TypeError:
         raise _bad_parameter(f"{name}: row and column must be whole numbers, not {indices}") from None
-    rows, columns = shapes[letter]
-    if not (0 <= i < rows and 0 <= j < columns):
-        raise _bad_parameter(f"{name}: {letter} is {rows} x {columns} and has no entry {indices}, from 0")
-    return letter, i, j
+    except IndexError:
+        message = f"{name}: {letter} is {rows} x {columns} and has no entry {indices}, from 0"
+        raise _bad_parameter(message) from None
 
 
 def _bad_parameter(message: str) -> SpecError:
     return _bad_argument("parameters", message, "write parameters={'k': ('B', 1, 0)}: B, row 1, column 0")
 
 
-def _entries(system: control.TransferFunction | control.StateSpace) -> list[list[Entry]]:
-    """Rows of columns of numerators and denominators, descending."""
+def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete: bool) -> dict[str, Plain]:
+    """The plant of numerators and denominators, in rows of columns; in discrete time in q^-1."""
+    entries: list[list[Entry]]
     if hasattr(system, "A"):
-        discrete = system.isdtime(strict=True)
-        return transfer_functions(system.A, system.B, system.C, system.D, discrete=discrete)
-    return [
-        [
-            (np.atleast_1d(system.num[i][j]).tolist(), np.atleast_1d(system.den[i][j]).tolist())
-            for j in range(system.ninputs)
-        ]
-        for i in range(system.noutputs)
-    ]
-
-
-def _transfer(rows: list[list[Entry]], *, discrete: bool) -> dict[str, Plain]:
-    if not discrete:
-        above, below = ([[entry[k] for entry in row] for row in rows] for k in (0, 1))
-        return {"continuous": {"numerator": _plain(above), "denominator": _plain(below)}}
-    held = [[_in_delays(*entry) for entry in row] for row in rows]
-    B, F = ([[entry[k] for entry in row] for row in held] for k in (0, 1))
-    return {"B": _plain(B), "F": _plain(F)}
+        entries = transfer_functions(system.A, system.B, system.C, system.D, discrete=discrete)
+    else:
+        each = [[(i, j) for j in range(system.ninputs)] for i in range(system.noutputs)]
+        entries = [[(list(system.num[i][j]), list(system.den[i][j])) for i, j in row] for row in each]
+    if discrete:
+        entries = [[_in_delays(*entry) for entry in row] for row in entries]
+    above, below = ([[entry[k] for entry in row] for row in entries] for k in (0, 1))
+    parts = [rows[0][0] if len(rows) == len(rows[0]) == 1 else rows for rows in (above, below)]
+    if discrete:
+        return dict(zip("BF", parts, strict=True))
+    return {"continuous": dict(zip(("numerator", "denominator"), parts, strict=True))}
 
 
 def _in_delays(top: list[float], bottom: list[float]) -> Entry:
@@ -178,8 +169,3 @@ def _in_delays(top: list[float], bottom: list[float]) -> Entry:
     late = [0.0] * (below.size - above.size)
     ascending = np.trim_zeros(below / below[0], "b").tolist()
     return [*late, *np.trim_zeros(above / below[0], "b")] if above.size else [0.0], ascending
-
-
-def _plain(rows: list[list[list[float]]]) -> Plain:
-    """One entry as it is, several as rows of columns."""
-    return rows[0][0] if len(rows) == len(rows[0]) == 1 else rows

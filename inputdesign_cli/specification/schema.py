@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 
 from inputdesign_cli.specification.models.fields import FILE_FORMAT
 from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
+from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.yaml.files import is_outside, outside
 from inputdesign_cli.specification.yaml.overrides import KEY
 from inputdesign_cli.specification.yaml.places import Path, format_key
@@ -21,6 +22,7 @@ def json_schema() -> dict[str, Plain]:
 
     `idesign validate` checks conditions on several keys (shapes, stability, contradictions).
     """
+    install()
     schema = _tidy(Spec.model_json_schema())
     names = {"type": "string", "minLength": 1}
     schema["properties"][KEY] = {
@@ -85,6 +87,7 @@ def keep_inside(tree: Tree, folder: FilePath, confine: FilePath) -> None:
 
 @cache
 def _keys() -> frozenset[str]:
+    install()
     return frozenset(_file_keys(Spec.model_json_schema()))
 
 

@@ -16,8 +16,8 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
-from inputdesign_cli.questions.building.tables import read_columns, read_header, read_samples
-from inputdesign_cli.records import Preparation, read_log
+from inputdesign_cli.questions.building.tables import read_columns, read_samples
+from inputdesign_cli.records import Preparation, read_log, read_sheet
 
 U, Y = np.arange(20.0) % 7, np.arange(20.0) % 5
 
@@ -281,7 +281,7 @@ def test_nothing_is_shown_of_a_file_that_holds_no_numbers(text, tmp_path):
 def test_the_header_of_a_table_is_shown(tmp_path):
     (tmp_path / "u.csv").write_text("day,valve,level\n2026-01-01,1,2\n2026-01-02,3,4\n")
     assert "day, valve, level" in named(tmp_path / "u.csv").message
-    assert read_header(tmp_path / "u.csv", key="") == ["day", "valve", "level"]
+    assert read_sheet(tmp_path / "u.csv", key="").header == ["day", "valve", "level"]
 
 
 @pytest.mark.parametrize("line", ["", "# 3,0"])

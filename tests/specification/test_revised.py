@@ -50,7 +50,7 @@ def test_places_of_other_keys_stay_and_new_values_name_their_source():
 
 def test_no_text_is_parsed(monkeypatch):
     spec = parse_spec(TEXT)
-    monkeypatch.setattr(reader, "_PARSER", None)
+    monkeypatch.setattr(reader, "_Loader", None)
     assert spec.with_(**{"experiment.samples": 600}).experiment.samples == 600
     assert Spec.from_dict(spec.content).model_dump() == spec.model_dump()
 

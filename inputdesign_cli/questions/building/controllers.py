@@ -161,11 +161,8 @@ def process_of(spec: Spec) -> Process:
 
 def _refusal(spec: Spec) -> Callable[[str], Exception]:
     def refuse(why: str) -> Exception:
-        return spec.complain(
-            "not-supported",
-            f"{why}, and the rules of tuning are for a gain, one or two lags and a dead time",
-            hint="tune it yourself: accuracy.loop.controller: {pid: {Kp: .., Ti: ..}}",
-            key=_KEY,
-        )
+        message = f"{why}, and the rules of tuning are for a gain, one or two lags and a dead time"
+        hint = "tune it yourself: accuracy.loop.controller: {pid: {Kp: .., Ti: ..}}"
+        return spec.complain("not-supported", message, hint=hint, key=_KEY)
 
     return refuse

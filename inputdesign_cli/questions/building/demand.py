@@ -6,7 +6,6 @@ The sizes of single keys stand in `specification.models.sizes`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
@@ -35,12 +34,8 @@ def check_model(spec: Spec, model: Model) -> None:
     channels = model.outputs * model.inputs
     room = _MOST_BYTES // (16 * _NODES * channels)
     if len(model.names) > room:
-        raise _too_large(
-            spec,
-            "plant",
-            f"a model of {len(model.names)} parameters and {channels} entries",
-            f"{room} parameters",
-        )
+        what = f"a model of {len(model.names)} parameters and {channels} entries"
+        raise _too_large(spec, "plant", what, f"{room} parameters")
 
 
 def check_effects(spec: Spec, experiment: Experiment) -> None:
@@ -57,31 +52,16 @@ def check_effects(spec: Spec, experiment: Experiment) -> None:
     moved = slope * np.abs(model.theta)[:, None, None]
     small = np.all((moved < _TRACE * G[:, None]) | (slope == 0.0), axis=(0, 2, 3)) & (model.theta != 0.0)
     silent = ~np.any(slope, axis=(0, 2, 3)) & ~np.any(model.noise_gradient(w), axis=(0, 2, 3))
-    if np.any(model.in_plant & silent):
-        names = _names_of(model, model.in_plant & silent)
-        raise spec.complain(
-            "without-effect",
-            f"{names}: a small change of it does not change G at the nominal parameters, so that no data "
-            "determine it",
-            hint=f"choose nominal values at which G depends on it, or write plant.known: [{names}]",
-            key="plant",
-        )
-    lost = model.in_plant & small
+    lost = model.in_plant & (silent | small)
     if not np.any(lost):
         return
-    names = _names_of(model, lost)
-    raise spec.complain(
-        "without-effect",
-        f"{names}: a change by all of its value moves G by less than {_TRACE:g} of itself at every "
-        "frequency of the experiment, so that no data determine it",
-        hint="dynamics that are much faster than the sampling leave no trace: sample faster (sample_time), "
-        f"or write plant.known: [{names}]",
-        key="plant",
-    )
-
-
-def _names_of(model: Model, which: NDArray[np.bool_]) -> str:
-    return ", ".join(name for name, listed in zip(model.names, which, strict=True) if listed)
+    names = ", ".join(name for name, listed in zip(model.names, lost, strict=True) if listed)
+    still = np.any(model.in_plant & silent)
+    what = "a small change of it does not change G" if still else "G hardly changes with all of its value"
+    other = "choose nominal values at which G depends on it" if still else "sample faster (sample_time)"
+    message = f"{names}: {what} at any frequency of the experiment, so that no data determine it"
+    hint = f"{other}, or write plant.known: [{names}]"
+    raise spec.complain("without-effect", message, hint=hint, key="plant")
 
 
 def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
@@ -111,20 +91,13 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
     limit = max(spec.solver.time_limit, 1.0)
     if seconds(size) > limit:
         fits = max(k for k in range(size) if seconds(k) <= limit)
-        raise spec.complain(
-            "too-large",
-            f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more; "
-            f"solver.time_limit is {limit:g}",
-            hint=f"{fits} parameters fit: lower the orders, or write solver.time_limit: "
-            f"{_rounded(_GENEROUS * seconds(size))} or more",
-            key="plant",
+        need = f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more"
+        more = f"{_GENEROUS * seconds(size):.2g}"
+        hint = (
+            f"{fits} parameters fit: lower the orders, or write solver.time_limit: {float(more):.0f} or more"
         )
-
-
-def _rounded(seconds: float) -> str:
-    """Round up to two digits, and write them out."""
-    unit = 10 ** max(len(f"{seconds:.0f}") - 2, 0)
-    return str(int(-(-seconds // unit) * unit))
+        message = f"{need}; solver.time_limit is {limit:g}"
+        raise spec.complain("too-large", message, hint=hint, key="plant")
 
 
 def check_record(spec: Spec, parameters: int) -> None:
@@ -138,13 +111,9 @@ def check_record(spec: Spec, parameters: int) -> None:
     stated = "signal" in spec.model_fields_set and spec.goal != "shortest_experiment"
     if samples > room and (stated or spec.plant.kind == "regression"):
         key = "signal.samples" if spec.signal.samples else "experiment.samples"
-        raise spec.complain(
-            "too-large",
-            f"the record has {samples} samples, and at most {room} are computed for a model of {parameters} "
-            "parameters",
-            hint=f"write signal.samples: {room} or less; experiment.samples may be as large as you like",
-            key=key,
-        )
+        message = f"the record has {samples} samples, and at most {room} are computed for this model"
+        hint = f"write signal.samples: {room} or less; experiment.samples may be as large as you like"
+        raise spec.complain("too-large", message, hint=hint, key=key)
 
 
 def longest_record(parameters: int, outputs: int) -> int:

@@ -42,26 +42,20 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     if not experiment.model.continuous:
         unbounded = _growing(experiment, source.noise_gradient)
         if unbounded:
-            fed_back = "" if experiment.loop is None else " and fed back"
             first = unbounded.split(", ")[0]
-            part = "plant" if _moves_plant(experiment, first) else "noise"
-            another = (
-                "in q^-1 it may be free as a root of A, where the noise passes through it as well"
-                if part == "plant"
-                else "or say noise: {drift: true}, and leave that root out of D"
-            )
-            hint = f"list it in {part}.known: [{first}]; {another}"
-            if any(spec.noise.drifts) and not all(spec.noise.drifts):
-                hint = (
-                    "the inputs wander with the drift that they counteract: let every output drift (noise: "
-                    "{drift: true})"
+            of_plant = experiment.model.in_plant[experiment.model.names.index(first)]
+            part, other = "noise", "say noise: {drift: true}, and leave that root out of D"
+            if of_plant:
+                part, other = (
+                    "plant",
+                    "in q^-1 let it be a root of A, where the noise passes through it as well",
                 )
-            raise spec.complain(
-                "infinite-information",
-                f"the noise alone, integrated{fed_back}, gives infinite information about {unbounded}",
-                hint=hint,
-                key=part,
-            )
+            hint = f"list it in {part}.known: [{first}], or {other}"
+            if any(spec.noise.drifts) and not all(spec.noise.drifts):
+                hint = "let every output drift (noise: {drift: true}): the inputs wander with each drift"
+            through = "integrated" if experiment.loop is None else "integrated and fed back"
+            message = f"the noise alone, {through}, gives infinite information about {unbounded}"
+            raise spec.complain("infinite-information", message, hint=hint, key=part)
     lo, hi = experiment.band
     grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
     if not grown and not (lo == 0.0 and _wanders(experiment)):
@@ -70,19 +64,17 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     if lowest is not None and lowest > 0.0:
         return replace(experiment, band=(0.5 * lowest, hi))
     unit = build_units(spec).frequency
-    loop = ", under a controller" if experiment.loop is None else ", under a controller that integrates"
+    integrates = "" if experiment.loop is None else " that integrates"
     # A FIR spectrum has power everywhere.
     fir = spec.plant.sampled and (spec.spectrum is None or spec.spectrum.type == "fir")
     other = "spectrum: {type: free} with " if fir else ""
+    what = f"gives infinite information about {grown}" if grown else "makes the outputs drift without bound"
+    band = f"limits: {{band: [{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}"
     raise spec.complain(
         "infinite-information" if grown else "infinite-output",
-        f"the plant integrates: power at frequency zero gives infinite information about {grown}, so that no "
-        "design with power there has a value"
-        if grown
-        else "the plant integrates: power at frequency zero makes the outputs drift without bound, so that "
-        "they have no power",
-        hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}limits: {{band: "
-        f"[{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}; or make the experiment in closed loop{loop}",
+        f"the plant integrates: power at frequency zero {what}",
+        hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}{band}; or make the "
+        f"experiment in closed loop, under a controller{integrates}",
         key="spectrum" if spec.spectrum is not None else "plant",
     )
 
@@ -93,13 +85,6 @@ def _wanders(experiment: Experiment) -> bool:
     if experiment.loop is not None or model.continuous:
         return False
     return bool(np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None])))
-
-
-def _moves_plant(experiment: Experiment, name: str) -> bool:
-    """Whether G depends on a parameter."""
-    model = experiment.model
-    gradient = model.plant_gradient([0.3 * experiment.band[1]])
-    return bool(np.any(gradient[:, model.names.index(name)]))
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:

@@ -8,41 +8,35 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
-from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.signal_settings import stated_moves, stated_peaks
 from inputdesign_cli.questions.building.tables import bad_table, read_frequency_table
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.limits import Curve
+from inputdesign_cli.specification.models.limits import Curve, PowerLimit as PowerBounds
 
 _KEY = "limits.spectrum"
 
 
 def build_power_limits(spec: Spec) -> list[PowerLimit]:
     """Return the upper and lower limits on the powers, without lower limits of zero."""
-    limits: list[PowerLimit] = []
-    stated_limits = {
-        "input": spec.limits.input_power,
-        "output": spec.limits.output_power,
-        "excitation": spec.limits.excitation_power,
-    }
-    for kind in POWER_KINDS:
-        stated = stated_limits[kind]
-        if stated is None:
-            continue
-        for value, upper in ((stated.max, True), (stated.min, False)):
-            if value is None:
-                continue
-            values = value if isinstance(value, tuple) else (value,)
-            single = len(values) == 1
-            limits += [
-                PowerLimit(kind, float(v), upper, None if single else channel)
-                for channel, v in enumerate(values)
-                if upper or v > 0
-            ]
-    return limits
+    limits = spec.limits
+    stated: tuple[tuple[PowerKind, PowerBounds | None], ...] = (
+        ("input", limits.input_power),
+        ("output", limits.output_power),
+        ("excitation", limits.excitation_power),
+    )
+    return [
+        PowerLimit(kind, float(v), upper, None if np.size(value) == 1 else channel)
+        for kind, bounds in stated
+        if bounds is not None
+        for value, upper in ((bounds.max, True), (bounds.min, False))
+        if value is not None
+        for channel, v in enumerate(np.ravel(value))
+        if upper or v > 0
+    ]
 
 
 def implied_limits(spec: Spec) -> list[PowerLimit]:
@@ -83,26 +77,19 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
             zero = float(grid[int(np.argmin(level(grid)))])
         if zero is not None:
             why = "no spectrum with a density vanishes there and is positive around it"
-            relative = "how far a spectrum stays above it is counted relative to it"
-            raise spec.complain(
-                "bad-limit",
-                f"the {'upper' if upper else 'lower'} bound vanishes at {zero / unit:.6g} "
-                f"rad/{spec.time_unit}: {why if upper else relative}",
-                hint="give a small positive bound instead",
-                key=key,
-            )
+            if not upper:
+                why = "how far a spectrum stays above it is counted relative to it"
+            bound = f"the {'upper' if upper else 'lower'} bound vanishes at"
+            message = f"{bound} {zero / unit:.6g} rad/{spec.time_unit}: {why}"
+            raise spec.complain("bad-limit", message, hint="give a small positive bound instead", key=key)
         limits.append(DensityLimit(level, grid, upper))
     if len(limits) == 2:
         grid = np.union1d(limits[0].grid, limits[1].grid)
         room = limits[0].level(grid) - limits[1].level(grid)
         if room.min() <= 0:
-            at = grid[int(np.argmin(room))] / unit
-            raise spec.complain(
-                "bad-limit",
-                f"min reaches max at {at:.6g} rad/{spec.time_unit}: no spectrum fits in between",
-                hint="lower min or raise max there",
-                key=_KEY,
-            )
+            at = f"{grid[int(np.argmin(room))] / unit:.6g} rad/{spec.time_unit}"
+            message = f"min reaches max at {at}: no spectrum fits in between"
+            raise spec.complain("bad-limit", message, hint="lower min or raise max there", key=_KEY)
     return limits
 
 

@@ -151,13 +151,10 @@ def _check_nowhere_void(spec: Spec, weight: ScalarTransfer, band: tuple[float, f
     """Raise `SpecError` (`not-supported`) if a weight vanishes: ellipsoids are compared with r_adm."""
     void, units = on_the_limit(weight.zero_points, band), build_units(spec)
     if void is not None:
-        raise spec.complain(
-            "not-supported",
-            f"{key} vanishes at {void / units.frequency:.6g} {units.per_time}, where region: ellipsoid has "
-            "nothing to bound",
-            hint="leave that frequency out of the band, move the zero off it, or use region: first_order",
-            key=key,
-        )
+        where = f"{void / units.frequency:.6g} {units.per_time}"
+        message = f"{key} vanishes at {where}, where region: ellipsoid has nothing to bound"
+        hint = "leave that frequency out of the band, move the zero off it, or use region: first_order"
+        raise spec.complain("not-supported", message, hint=hint, key=key)
 
 
 def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
@@ -165,14 +162,12 @@ def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> Sp
     stated = spec.accuracy.loop
     if stated is None or not isinstance(admissible, Sensitivity):
         return None
-    peak = float(np.max(admissible.nominal(made.grid)))
+    peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
+    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
     return spec.complain(
         "admissible-not-positive",
-        f"with the nominal plant |S| of the loop reaches {peak:.4g} already, and the margin asks for "
-        f"{stated.peak:.4g} at most",
-        hint="tune the controller more slowly (a larger tau_c), or ask for less of a margin than "
-        f"{stated.allowing(peak)} (the nearer, the longer the experiment), for example "
-        f"{stated.allowing(1.2 * peak)}",
+        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most",
+        hint=f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}",
         key=_LOOP,
     )
 
@@ -197,13 +192,10 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
         # A weight may hide the pole.
         if not np.isfinite(close) or close > _GROWS * far:
             where = f"{at / units.frequency:.6g} {units.per_time}"
-            raise spec.complain(
-                "unbounded-error",
-                f"G has a pole on the unit circle, at {where}, that is estimated: no experiment bounds the "
-                "error there",
-                hint=f"leave that frequency out: {key}.band: [{_beside(at, lo, hi, units.frequency)}]",
-                key=key,
-            )
+            cause = f"G has a pole on the unit circle, at {where}, that is estimated"
+            message = f"{cause}: no experiment bounds the error there"
+            hint = f"leave that frequency out: {key}.band: [{_beside(at, lo, hi, units.frequency)}]"
+            raise spec.complain("unbounded-error", message, hint=hint, key=key)
 
 
 def _beside(at: float, lo: float, hi: float, unit: float) -> str:
@@ -216,23 +208,16 @@ def _beside(at: float, lo: float, hi: float, unit: float) -> str:
 
 def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
     """Raise `SpecError` (`not-supported`) unless the entry is a fraction affine in the parameters."""
+    key = f"{_KEY}.region"
     if entry is None:
-        raise spec.complain(
-            "not-supported",
-            "region: ellipsoid is for the entries of G one by one, not for the norm of the error",
-            hint="use region: first_order, or norm: entry with relative, absolute or table",
-            key=f"{_KEY}.region",
-        )
+        message = "region: ellipsoid is for the entries of G one by one, not for the norm of the error"
+        hint = "use region: first_order, or norm: entry with relative, absolute or table"
+        raise spec.complain("not-supported", message, hint=hint, key=key)
     if np.any(model.bends(*entry)):
         named = build_units(spec).entry(*entry) or "G"
-        raise spec.complain(
-            "not-supported",
-            f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not: it has "
-            "both A and F, is sampled from s, has a dead time that is estimated, or expressions that are not "
-            "linear",
-            hint="use region: first_order for this structure",
-            key=f"{_KEY}.region",
-        )
+        message = f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not"
+        hint = "use region: first_order for this structure (A and F, sampled from s, an estimated dead time)"
+        raise spec.complain("not-supported", message, hint=hint, key=key)
 
 
 def _admissible_of(
@@ -285,15 +270,13 @@ def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str
     columns = read_frequency_table(spec, name, [column], key)
     frequency, value = columns["frequency"], columns[column]
     if np.any(value <= 0):
-        row = int(np.argmax(value <= 0)) + 2
-        message = f"{column} is {value[row - 2]:g} in row {row}: it must be positive"
+        row = int(np.argmax(value <= 0))
+        message = f"{column} is {value[row]:g} in row {row + 2}: it must be positive"
         hint = "leave frequencies that do not matter out, and restrict band"
         raise bad_table(spec, name, message, hint, key)
     if frequency[0] > band[0] * (1 + 1e-9) or frequency[-1] < band[1] * (1 - 1e-9):
-        covered, asked = (
-            f"{lo / units.frequency:g} to {hi / units.frequency:g} {units.per_time}"
-            for lo, hi in ((frequency[0], frequency[-1]), band)
-        )
+        ends = np.array([frequency[0], frequency[-1], *band]) / units.frequency
+        covered, asked = (f"{low:g} to {high:g} {units.per_time}" for low, high in ends.reshape(2, 2))
         message = f"it covers {covered}, but the band is {asked}"
         hint = f"extend the table, or restrict {key.rpartition('.')[0]}.band"
         raise bad_table(spec, name, message, hint, key)
@@ -301,29 +284,25 @@ def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str
 
 
 def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float, float]) -> Sensitivity:
-    asked = error.sensitivity
-    loop_kept = spec.accuracy.loop
-    if loop_kept is not None:
-        given = loop_controller(spec, loop_kept, model)
+    asked, kept = error.sensitivity, spec.accuracy.loop
+    if kept is not None:
+        given = loop_controller(spec, kept, model)
     else:
         given = None if asked is None else asked.controller or spec.experiment.controller
-    if asked is None or given is None:
-        raise ValueError("the spec has been checked: a bound on the sensitivity has a loop")
+    assert asked is not None
+    assert given is not None
+    key = f"{_KEY}.sensitivity" if kept is None else _LOOP
     loop = build_loop(spec, model, given)
     if not np.any(loop.controller.numerator):
-        raise spec.complain(
-            "no-feedback",
-            "the controller is zero: no model error can harm the sensitivity",
-            hint="give the controller of the loop to be kept",
-            key=f"{_KEY}.sensitivity" if loop_kept is None else _LOOP,
-        )
+        message = "the controller is zero: no model error can harm the sensitivity"
+        hint = "give the controller of the loop to be kept"
+        raise spec.complain("no-feedback", message, hint=hint, key=key)
     if asked.weight is not None:
         weight = rational(asked.weight)
-        check_finite(spec, weight, band, "admissible-not-positive", f"{_KEY}.sensitivity")
+        check_finite(spec, weight, band, "admissible-not-positive", key)
         return Sensitivity(loop, weight)
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
-    settings = _settings(given) if loop_kept is not None else None
-    return Sensitivity(loop, Rational.build([peak]), settings)
+    return Sensitivity(loop, Rational.build([peak]), None if kept is None else _settings(given))
 
 
 def _settings(controller: Controller) -> dict[str, float] | None:

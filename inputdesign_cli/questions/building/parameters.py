@@ -58,12 +58,9 @@ def reparametrised(
         found = _of_named(spec, plant, parameters)
         words = Words(plant.written, {one.label: one.place for one in named}, words.known)
     if not np.any(found.free):
-        raise spec.complain(
-            "nothing-to-estimate",
-            "every parameter of the model is known",
-            hint="take those out of known that the experiment is to find",
-            key="plant.known",
-        )
+        message = "every parameter of the model is known"
+        hint = "take those out of known that the experiment is to find"
+        raise spec.complain("nothing-to-estimate", message, hint=hint, key="plant.known")
     return Reparametrised(model, found, words)
 
 
@@ -88,12 +85,9 @@ def _of_named(
     )
     for label, moves in zip(labels, np.any(made.jacobian != 0.0, axis=0), strict=True):
         if not moves:
-            raise spec.complain(
-                "unused-parameter",
-                f"no coefficient that is estimated changes with {label} at the nominal parameters",
-                hint="look for a factor that is zero there, or a leading coefficient that vanishes",
-                key="plant.parameters",
-            )
+            message = f"no coefficient that is estimated changes with {label} at the nominal parameters"
+            hint = "look for a factor that is zero there, or a leading coefficient that vanishes"
+            raise spec.complain("unused-parameter", message, hint=hint, key="plant.parameters")
     return replace(made, free=~np.array(fixed))
 
 
@@ -117,12 +111,9 @@ def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
     if name not in known:
         of_plant = spec.plant.known if spec.plant.kind != "regression" else None
         fixed = name in (*(of_plant or ()), *(spec.noise.known or ())) and not key.endswith("known")
-        raise spec.complain(
-            "unknown-parameter",
-            f"{name} is known: it is not estimated" if fixed else f'the model has no parameter "{name}"',
-            hint=f"its parameters are {', '.join(known)}" if known else "it has none here",
-            key=key,
-        )
+        message = f"{name} is known: it is not estimated" if fixed else f'the model has no parameter "{name}"'
+        hint = f"its parameters are {', '.join(known)}" if known else "it has none here"
+        raise spec.complain("unknown-parameter", message, hint=hint, key=key)
 
 
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
@@ -135,12 +126,9 @@ def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[st
         check_known(spec, known, name, key)
     listed = tuple(names or known)
     if len(matrix) != len(listed):
-        raise spec.complain(
-            "wrong-shape",
-            f"the matrix is {len(matrix)} x {len(matrix)}, but there are {len(listed)} parameters",
-            hint=f"order its rows as {', '.join(known)}, or name its parameters",
-            key=key,
-        )
+        message = f"the matrix is {len(matrix)} x {len(matrix)}, but there are {len(listed)} parameters"
+        hint = f"order its rows as {', '.join(known)}, or name its parameters"
+        raise spec.complain("wrong-shape", message, hint=hint, key=key)
     full = np.zeros((len(known), len(known)))
     index = [list(known).index(name) for name in listed]
     full[np.ix_(index, index)] = matrix

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +26,16 @@ from inputdesign_cli.questions.building.parameters import embedded
 from inputdesign_cli.questions.building.weights import build_weight, check_finite
 from inputdesign_cli.questions.common.within_limits import StatedBound
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.plugins import added
 
 _RELATIVE_ZERO = 1e-9
+
+
+class AddedRequirement(Protocol):
+    """A section of `accuracy` that another package adds (`specification.plugins`)."""
+
+    def build(self, spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+        """Return what makes its requirements in the coordinates of a design."""
 
 
 def build_requirements(
@@ -47,6 +57,8 @@ def build_requirements(
     def made(key: str) -> list[RequirementFactory]:
         if key in ("model_error", "loop") and nominal is not None:
             return [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
+        if key in added("requirements"):
+            return cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
         return BUILDERS[key](spec, experiment)
 
     return [make for key in spec.accuracy.requirements for make in made(key)]
@@ -66,12 +78,9 @@ def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment]
         scale = experiment.model.theta
         if np.any(scale == 0.0):
             name = experiment.model.names[int(np.argmax(scale == 0.0))]
-            raise spec.complain(
-                "zero-parameter",
-                f"{name} is zero, so that it has no relative error",
-                hint="use scale: absolute, or drop the parameter from the model",
-                key="accuracy.scale",
-            )
+            message = f"{name} is zero, so that it has no relative error"
+            hint = "use scale: absolute, or drop the parameter from the model"
+            raise spec.complain("zero-parameter", message, hint=hint, key="accuracy.scale")
 
     def make(coordinates: Experiment) -> Criterion:
         factor = np.eye(coordinates.size) if coordinates.factor is None else coordinates.factor
@@ -102,12 +111,11 @@ def stated_bounds(spec: Spec) -> list[StatedBound]:
     error, variance = accuracy.error, accuracy.weighted_variance
     if error is not None and error.region == "ellipsoid":
         return []
-    if error is not None:
-        key = "accuracy.model_error"
-        if error.relative is not None:
-            found.append(StatedBound(f"{key}.relative", "relative", error.relative, fraction=True))
-        if error.absolute is not None:
-            found.append(StatedBound(f"{key}.absolute", "absolute", error.absolute))
+    key = "accuracy.model_error"
+    if error is not None and error.relative is not None:
+        found.append(StatedBound(f"{key}.relative", "relative", error.relative, fraction=True))
+    if error is not None and error.absolute is not None:
+        found.append(StatedBound(f"{key}.absolute", "absolute", error.absolute))
     if accuracy.application is not None:
         key, gamma = "accuracy.application.gamma", accuracy.application.gamma
         found.append(StatedBound(key, "gamma", gamma, power=-2))
@@ -169,17 +177,9 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
     weight = build_weight(spec, stated.weight, f"{key}.weight")
     band = required_band(spec, experiment, stated.band)
     check_finite(spec, weight, band, "admissible-not-positive", f"{key}.weight")
-    found = [
-        WeightedVariance(
-            experiment=experiment,
-            band=band,
-            entry=entry,
-            weight=weight,
-            limit=stated.max,
-            relative=stated.relative,
-        )
-        for entry in active_entries(experiment.model, band[1])
-    ]
+    bound = partial(WeightedVariance, experiment=experiment, band=band, weight=weight, limit=stated.max)
+    entries = active_entries(experiment.model, band[1])
+    found = [bound(entry=entry, relative=stated.relative) for entry in entries]
     for variance in found:
         check_bounded(spec, variance, key)
         if stated.relative:
@@ -194,12 +194,9 @@ def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
     if size.min() <= _RELATIVE_ZERO * np.median(size):
         at = grid[int(np.argmin(size))] / units.frequency
         named = f"entry {units.entry(*variance.entry)} of G" if variance.entry and not units.single else "G"
-        raise spec.complain(
-            "admissible-not-positive",
-            f"{named} vanishes at {at:.6g} {units.per_time}, where its relative variance is infinite",
-            hint="restrict `band` to the frequencies that matter",
-            key="accuracy.weighted_variance",
-        )
+        message = f"{named} vanishes at {at:.6g} {units.per_time}: its relative variance is infinite there"
+        hint, key = "restrict `band` to the frequencies that matter", "accuracy.weighted_variance"
+        raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
 
 
 BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
@@ -211,4 +208,4 @@ BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "standard_deviation": _standard_deviations,
     "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
 }
-"""The builder of each key of `accuracy`; a new requirement adds its own."""
+"""The builder of each key of `accuracy`."""

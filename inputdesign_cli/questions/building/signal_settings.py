@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import chain
+
 import numpy as np
 
 from inputdesign_cli.arrays import Array
@@ -33,11 +36,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     check_record(spec, parameters)
     step, limits, signal = record_step(spec), spec.limits, spec.signal
     lo, hi = excitation_band(spec)
-    stated = {
-        "limits.amplitude": limits.amplitude,
-        "limits.rate": limits.rate,
-        "signal.quantisation": signal.quantisation,
-    }
+    stated = ("limits.amplitude", "limits.rate", "signal.quantisation")
     return RecordRequest(
         settings=build_signal_settings(spec),
         bounds=build_bounds(spec),
@@ -51,7 +50,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         longest=longest_record(parameters, spec.plant.outputs),
         stated_method=signal.type is not None,
         others=tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
-        limit_keys=tuple(key for key, value in stated.items() if value is not None),
+        limit_keys=tuple(key for key in stated if spec.at(*key.split(".")) is not None),
         delivery=Delivery(
             operating_points=None if signal.offset is None else operating_points(spec),
             also=signal.also or (),
@@ -176,32 +175,28 @@ def _method(spec: Spec) -> Method:
     signal = spec.signal
     if signal.type is not None:
         return signal.type
-    if signal.phases is not None or signal.lines is not None:
+    if signal.stated("phases", "lines"):
         return "multisine"
-    if signal.bits is not None:
-        return "prbs"
-    return _usual_method(spec)
+    return "prbs" if signal.bits is not None else _usual_method(spec)
 
 
 def _usual_method(spec: Spec) -> Method:
     """The type if none is stated: filtered noise for one input and output in q^-1, otherwise a multisine."""
     plant, spectrum = spec.plant, spec.spectrum
-    if spec.accuracy.frequency_response is not None:
-        return "multisine"
     single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
     banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
-    return "filtered_noise" if single and not banded else "multisine"
+    noise = single and not banded and spec.accuracy.frequency_response is None
+    return "filtered_noise" if noise else "multisine"
 
 
 def _other_methods(spec: Spec) -> tuple[Method, ...]:
     """Other types that may serve as well; empty if the spec states how the signal is made."""
-    signal = spec.signal
-    if signal.phases is not None or signal.lines is not None or signal.bits is not None:
+    if spec.signal.stated("phases", "lines", "bits"):
         return ()
-    levels: tuple[Method, ...] = ("binary",) if spec.plant.sampled and not signal.ramp else ()
-    if levels and _ramps_needed(spec):
-        levels = ("slewed",)
-    others: list[Method] = list(dict.fromkeys((_usual_method(spec), "multisine", *levels)))
+    levels: list[Method] = ["slewed" if _ramps_needed(spec) else "binary"]
+    if not spec.plant.sampled or spec.signal.ramp:
+        levels = []
+    others = dict.fromkeys((_usual_method(spec), "multisine", *levels))
     return tuple(method for method in others if method != _method(spec))
 
 
@@ -217,6 +212,8 @@ def per_channel(value: float | tuple[float, ...], channels: int) -> Array:
 
 
 _STEPS_ROUNDING = 1e-12
+Fault = tuple[str, str, str, str]
+"""Code, key, message and hint of settings that no record can have."""
 
 
 def check_signal(spec: Spec) -> None:
@@ -225,139 +222,93 @@ def check_signal(spec: Spec) -> None:
     Raises:
         SpecError: `conflicting-keys` when the samples are no whole number of periods of held values, or
             the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few
-            levels, and for ramps between levels without a limit on moves;
+            levels, and for ramps between levels without a limit on moves; `out-of-range`;
             `coarse-converter` when a limit is below the converter's step;
             `no-sample-rate` for a WAV file of a sampling rate that is not a whole number of hertz.
     """
     settings = build_signal_settings(spec)
-    samples = spec.signal_samples
     fixed = spec.goal != "shortest_experiment" or spec.signal.samples is not None
-    if fixed and samples % settings.block:
-        below = samples - samples % settings.block
-        nearest = " or ".join(str(n) for n in (below, below + settings.block) if n)
-        key = "signal.periods" if settings.periods > 1 else "signal.hold"
-        raise spec.complain(
-            "conflicting-keys",
-            f"{samples} samples do not make "
-            + (f"{settings.periods} equal periods" if settings.periods > 1 else "a whole number")
-            + (f" of values held for {settings.hold} samples" if settings.hold > 1 else ""),
-            hint=f"write signal.samples: {nearest}, or another number of periods",
-            key=key,
-        )
-    least, period = least_period(spec.plant.inputs), samples // settings.block
-    if fixed and settings.block > 1 and period < least:
-        raise spec.complain(
-            "conflicting-keys",
-            f"one period has {period} {'value' if period == 1 else 'values'}, and needs at least {least}",
-            hint="ask for more samples, fewer periods or a shorter hold",
-            key="signal.periods" if settings.periods > 1 else "signal.hold",
-        )
-    if settings.ramp and settings.method in FROM_LEVELS:
-        raise spec.complain(
-            "unsuitable-key",
-            f"ramp does not go with type: {settings.method}, whose values are of a few levels",
-            hint="remove it, or use filtered_noise or multisine",
-            key="signal.ramp",
-        )
-    if 2 * settings.ramp > samples and fixed:
-        raise spec.complain(
-            "out-of-range",
-            f"ramp is {settings.ramp}, but the signal has {samples} samples to fade in and out",
-            hint=f"write at most {samples // 2}",
-            key="signal.ramp",
-        )
-    if settings.method == "slewed" and (spec.closed_loop or spec.limits.rate is None):
-        raise spec.complain(
-            "unsuitable-key",
-            "type: slewed is a signal of ramps between two levels, at the speed of limits.rate, which "
-            + ("in a loop does not limit what is applied" if spec.closed_loop else "is not stated"),
-            hint=("" if spec.closed_loop else "state limits.rate, or ")
-            + "use type: binary, which switches at once",
-            key="signal.type",
-        )
-    _check_harmonics(spec, settings, samples if fixed else None)
-    _check_register(spec, settings)
-    _check_files(spec)
-    bounds = build_bounds(spec)
-    for channel in range(spec.plant.inputs):
-        amplitude = None if bounds.amplitude is None else float(bounds.amplitude[channel])
-        rate = None if bounds.rate is None else float(bounds.rate[channel])
-        _check_level(spec, channel, amplitude)
-        if bounds.quantisers:
-            _check_converter(spec, bounds.quantisers[channel], amplitude, rate)
+    by_length = _length_faults(spec, settings) if fixed else iter(())
+    by_level = (_level_faults(spec, channel) for channel in range(spec.plant.inputs))
+    for code, key, message, hint in chain(by_length, _kind_faults(spec, settings), *by_level):
+        raise spec.complain(code, message, hint=hint, key=key)
 
 
-def _check_harmonics(spec: Spec, settings: SignalSettings, samples: int | None) -> None:
-    if samples is None or not isinstance(settings.lines, tuple):
-        return
-    block = settings.period(samples) // blocks_of(settings.vectors, spec.plant.inputs)
-    top = block // 2
-    if settings.lines[-1] > top:
-        raise spec.complain(
-            "out-of-range",
-            f"lines reaches harmonic {settings.lines[-1]}, but a period of {block} values has "
-            f"harmonics 0 to {top}",
-            hint="remove the higher ones, or make the period longer",
-            key="signal.lines",
-        )
-
-
-def _check_register(spec: Spec, settings: SignalSettings) -> None:
-    """Refuse a sequence too short for several inputs, which apply shifted parts of it."""
-    least = least_period(spec.plant.inputs)
-    if settings.method == "prbs" and settings.bits is not None and 2**settings.bits - 1 < least:
-        raise spec.complain(
-            "out-of-range",
-            f"a register of {settings.bits} bits repeats after {2**settings.bits - 1} values, too few for "
-            f"{spec.plant.inputs} inputs",
-            hint="take more bits, or remove the key",
-            key="signal.bits",
-        )
-
-
-def _check_level(spec: Spec, channel: int, most: float | None) -> None:
-    if spec.signal.amplitudes is None or most is None or spec.closed_loop:
-        return
-    level = float(per_channel(spec.signal.amplitudes, spec.plant.inputs)[channel])
-    if level > most:
-        raise spec.complain(
-            "conflicting-keys",
-            f"amplitudes is {level:g}, above limits.amplitude {most:g}"
-            + (f" of input {channel + 1}" if spec.plant.inputs > 1 else ""),
-            hint="lower it, or remove it: the tool finds the level that the accuracy needs",
-            key="signal.amplitudes",
-        )
-
-
-def _check_converter(spec: Spec, quantiser: Quantiser, amplitude: float | None, rate: float | None) -> None:
-    step = quantiser.step
-    if quantiser.reach() < step:
-        raise spec.complain(
-            "coarse-converter",
-            f"the offset {quantiser.offset:g} leaves the converter no room: its values reach from "
-            f"{-quantiser.span:g} to {quantiser.span - step:g}",
-            hint="move the offset, or widen quantisation.range",
-            key="signal.offset",
-        )
-    for key, bound in (("limits.amplitude", amplitude), ("limits.rate", rate)):
-        if bound is not None and not spec.closed_loop and bound * (1 + _STEPS_ROUNDING) < step:
-            raise spec.complain(
-                "coarse-converter",
-                f"{key} is {bound:g}, less than one step {step:g} of the converter",
-                hint="take a converter of more bits or of a smaller range, or raise the limit",
-                key=key,
+def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
+    """Samples, periods, holds, ramps and harmonics fit each other."""
+    samples, block, ramp = spec.signal_samples, settings.block, settings.ramp
+    key = "signal.periods" if settings.periods > 1 else "signal.hold"
+    least, period = least_period(spec.plant.inputs), samples // block
+    if samples % block:
+        nearest = " or ".join(str(n) for n in (samples - samples % block, block * (period + 1)) if n)
+        parts = f"{settings.periods} equal periods" if settings.periods > 1 else "a whole number"
+        held = f" of values held for {settings.hold} samples" if settings.hold > 1 else ""
+        hint = f"write signal.samples: {nearest}, or another number of periods"
+        yield "conflicting-keys", key, f"{samples} samples do not make {parts}{held}", hint
+    elif block > 1 and period < least:
+        has = f"{period} {'value' if period == 1 else 'values'}"
+        hint = "ask for more samples, fewer periods or a shorter hold"
+        yield "conflicting-keys", key, f"one period has {has}, and needs at least {least}", hint
+    if 2 * ramp > samples:
+        message = f"ramp is {ramp}, but the signal has {samples} samples to fade in and out"
+        yield "out-of-range", "signal.ramp", message, f"write at most {samples // 2}"
+    if isinstance(settings.lines, tuple):
+        values = settings.period(samples) // blocks_of(settings.vectors, spec.plant.inputs)
+        top, last = values // 2, settings.lines[-1]
+        if last > top:
+            message = (
+                f"lines reaches harmonic {last}, but a period of {values} values has harmonics 0 to {top}"
             )
+            yield "out-of-range", "signal.lines", message, "remove the higher ones, or make the period longer"
 
 
-def _check_files(spec: Spec) -> None:
-    """Refuse files of `signal.also` that cannot hold the record."""
-    if "wav" not in (spec.signal.also or ()):
-        return
+def _kind_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
+    """Settings and files go with the type of the signal."""
+    method, bits, inputs = settings.method, settings.bits, spec.plant.inputs
+    if settings.ramp and method in FROM_LEVELS:
+        message = f"ramp does not go with type: {method}, whose values are of a few levels"
+        yield "unsuitable-key", "signal.ramp", message, "remove it, or use filtered_noise or multisine"
+    if method == "slewed" and (spec.closed_loop or spec.limits.rate is None):
+        why = "in a loop does not limit what is applied" if spec.closed_loop else "is not stated"
+        message = f"type: slewed ramps between two levels at the speed of limits.rate, which {why}"
+        instead = "" if spec.closed_loop else "state limits.rate, or "
+        yield "unsuitable-key", "signal.type", message, f"{instead}use type: binary, which switches at once"
+    if method == "prbs" and bits is not None and 2**bits - 1 < least_period(inputs):
+        # Several inputs apply shifted parts of the sequence.
+        message = f"a register of {bits} bits repeats after {2**bits - 1} values, too few for {inputs} inputs"
+        yield "out-of-range", "signal.bits", message, "take more bits, or remove the key"
     rate = sampling_rate(spec)
-    if round(rate) < 1 or abs(rate - round(rate)) > 1e-9 * rate:
-        raise spec.complain(
-            "no-sample-rate",
-            f"a WAV file needs a whole number of samples a second; the sample time gives {rate:.6g}",
-            hint="use mat, or signal.csv, which has time stamps",
-            key="signal.also",
-        )
+    if "wav" in (spec.signal.also or ()) and (round(rate) < 1 or abs(rate - round(rate)) > 1e-9 * rate):
+        message = f"a WAV file needs a whole number of samples a second; the sample time gives {rate:.6g}"
+        yield "no-sample-rate", "signal.also", message, "use mat, or signal.csv, which has time stamps"
+
+
+def _level_faults(spec: Spec, channel: int) -> Iterator[Fault]:
+    """Level, limits and converter of an input fit each other; in a loop, limits are not of the signal."""
+    bounds, stated, inputs = build_bounds(spec), spec.signal.amplitudes, spec.plant.inputs
+    limits = {
+        key: float(bound[channel])
+        for key, bound in (("limits.amplitude", bounds.amplitude), ("limits.rate", bounds.rate))
+        if bound is not None and not spec.closed_loop
+    }
+    most, level = (
+        limits.get("limits.amplitude"),
+        None if stated is None else per_channel(stated, inputs)[channel],
+    )
+    if level is not None and most is not None and level > most:
+        of = f" of input {channel + 1}" if inputs > 1 else ""
+        hint = "lower it, or remove it: the tool finds the level that the accuracy needs"
+        message = f"amplitudes is {level:g}, above limits.amplitude {most:g}{of}"
+        yield "conflicting-keys", "signal.amplitudes", message, hint
+    for quantiser in bounds.quantisers[channel : channel + 1]:
+        step, span = quantiser.step, quantiser.span
+        if quantiser.reach() < step:
+            reach = f"its values reach from {-span:g} to {span - step:g}"
+            message = f"the offset {quantiser.offset:g} leaves the converter no room: {reach}"
+            hint = "move the offset, or widen quantisation.range"
+            yield "coarse-converter", "signal.offset", message, hint
+        for key, bound in limits.items():
+            if bound * (1 + _STEPS_ROUNDING) < step:
+                message = f"{key} is {bound:g}, less than one step {step:g} of the converter"
+                hint = "take a converter of more bits or of a smaller range, or raise the limit"
+                yield "coarse-converter", key, message, hint

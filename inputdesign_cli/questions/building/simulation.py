@@ -68,10 +68,7 @@ def _true_system(spec: Spec) -> TrueSystem | None:
         loop = None if controller is None else build_loop(spec, model, controller)
     except SpecError as error:
         found = error.diagnostics[0]
-        raise bad_spec(
-            found.code,
-            f"with the true plant {found.message}",
-            hint="give a true plant that the controller stabilises as well",
-            key="simulation.plant",
-        ) from error
+        message = f"with the true plant {found.message}"
+        hint = "give a true plant that the controller stabilises as well"
+        raise bad_spec(found.code, message, hint=hint, key="simulation.plant") from error
     return TrueSystem(model, loop, None if study.noise is None else study.noise.relative_std)

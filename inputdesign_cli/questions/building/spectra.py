@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol, cast
+
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
@@ -18,6 +20,7 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
     WhiteSpectrum,
 )
+from inputdesign_cli.specification.plugins import added
 from inputdesign_cli.spectrum import (
     Basis,
     FirBasis,
@@ -29,6 +32,13 @@ from inputdesign_cli.spectrum import (
 
 _DEFAULT_ORDER = 20
 _SAME = 1e-9
+
+
+class AddedSpectrum(Protocol):
+    """A section of `spectrum` that another package adds (`specification.plugins`)."""
+
+    def build(self, spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
+        """Return the family of spectra of inputs in a band; see `build_basis`."""
 
 
 def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
@@ -53,28 +63,25 @@ def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
         case MultisineSpectrum() as stated:
             basis = LinesBasis.at(_line_frequencies(spec, stated, band), inputs)
         case None if not spec.plant.sampled:
-            raise spec.complain(
-                "missing-key",
-                "a design in continuous time needs a family of spectra",
-                hint="add sample: zoh to the plant, or spectrum: {type: polynomial, order: 10, band: "
-                f"[0, {0.5 * np.pi / spec.sample_time:.3g}]}}",
-                key="spectrum",
-            )
+            message = "a design in continuous time needs a family of spectra"
+            band = f"[0, {0.5 * np.pi / spec.sample_time:.3g}]"
+            own = f"spectrum: {{type: polynomial, order: 10, band: {band}}}"
+            hint = f"add sample: zoh to the plant, or {own}"
+            raise spec.complain("missing-key", message, hint=hint, key="spectrum")
         case None:
             basis = _fir(spec, inputs, _DEFAULT_ORDER)
         case FirSpectrum(order=order):
             basis = _fir(spec, inputs, order)
         case GivenSpectrum():
             raise _refused(spec, "the excitation is given: there is nothing to design")
+        case other if other.type in added("spectra"):
+            basis = cast(AddedSpectrum, other).build(spec, inputs, band)
         case other:
             raise _refused(spec, f"spectra of type {other.type} are not designed for this plant and accuracy")
     if spec.limits.spectrum is not None and not basis.has_density:
-        raise spec.complain(
-            "bad-limit",
-            "sinusoids have no density, so that limits.spectrum says nothing about them",
-            hint="use type: fir, or limit the powers",
-            key="limits.spectrum",
-        )
+        message = "sinusoids have no density, so that limits.spectrum says nothing about them"
+        hint = "use type: fir, or limit the powers"
+        raise spec.complain("bad-limit", message, hint=hint, key="limits.spectrum")
     return basis
 
 
@@ -85,12 +92,9 @@ def _refused(spec: Spec, message: str) -> SpecError:
 
 def _fir(spec: Spec, inputs: int, order: int) -> FirBasis:
     if spec.limits.band is not None:
-        raise spec.complain(
-            "bad-limit",
-            "a FIR spectrum does not vanish outside a band: no trigonometric polynomial does",
-            hint="use type: polynomial, multisine or free, or bound the density outside by limits.spectrum",
-            key="limits.band",
-        )
+        message = "a FIR spectrum does not vanish outside a band: no trigonometric polynomial does"
+        hint = "use type: polynomial, multisine or free, or bound the density outside by limits.spectrum"
+        raise spec.complain("bad-limit", message, hint=hint, key="limits.band")
     return FirBasis(inputs, order)
 
 
@@ -98,12 +102,10 @@ def _check_inside(spec: Spec, stated: PolynomialSpectrum) -> None:
     """Refuse a polynomial spectrum whose own band exceeds limits.band."""
     limit, (lo, hi) = spec.limits.band, stated.band
     if limit is not None and (lo < limit[0] * (1 - _SAME) or hi > limit[1] * (1 + _SAME)):
-        raise spec.complain(
-            "bad-limit",
-            f"the band of the spectrum, [{lo:g}, {hi:g}], leaves limits.band, [{limit[0]:g}, {limit[1]:g}]",
-            hint="narrow spectrum.band; limits.band is not needed, a polynomial spectrum has its own",
-            key="spectrum.band",
-        )
+        bounds = f"limits.band, [{limit[0]:g}, {limit[1]:g}]"
+        message = f"the band of the spectrum, [{lo:g}, {hi:g}], leaves {bounds}"
+        hint = "narrow spectrum.band; limits.band is not needed, a polynomial spectrum has its own"
+        raise spec.complain("bad-limit", message, hint=hint, key="spectrum.band")
 
 
 def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, float]) -> Array:
@@ -122,12 +124,9 @@ def _line_frequencies(spec: Spec, stated: MultisineSpectrum, band: tuple[float, 
     even = np.pi * np.arange(1, count + 1) / count
     inside = even[(even >= band[0] * (1 - _SAME)) & (even <= band[1] * (1 + _SAME))]
     if inside.size == 0:
-        raise spec.complain(
-            "too-few-lines",
-            f"none of the {count} evenly spaced lines lies inside the band",
-            hint="ask for more lines, or widen the band",
-            key="spectrum.lines",
-        )
+        message = f"none of the {count} evenly spaced lines lies inside the band"
+        hint = "ask for more lines, or widen the band"
+        raise spec.complain("too-few-lines", message, hint=hint, key="spectrum.lines")
     return inside
 
 
@@ -163,12 +162,10 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
         return TabulatedSpectrum(frequency, values), np.ones(1)
     most = SIZES["spectrum.given.frequencies"]
     if frequency.size > most.most:
-        raise spec.complain(
-            "too-large",
-            f"{name} holds {frequency.size} sinusoids, and at most {most.most} are taken: {most.why}",
-            hint="leave out the sinusoids of the least power",
-            key=_KEY,
-        )
+        what = f"{name} holds {frequency.size} sinusoids"
+        message = f"{what}, and at most {most.most} are taken: {most.why}"
+        hint = "leave out the sinusoids of the least power"
+        raise spec.complain("too-large", message, hint=hint, key=_KEY)
     directions = vectors.swapaxes(1, 2).reshape(-1, r)
     powers = np.maximum(eigenvalues, 0.0).ravel()
     there = powers > 0.0

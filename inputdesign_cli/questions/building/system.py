@@ -65,7 +65,7 @@ def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> 
         "D": np.zeros((p, r)) if stated.D is None else np.array(stated.D),
         "K": np.zeros((n, p)) if stated.K is None else np.array(stated.K),
     }
-    written = [(letter, M.shape) for letter, M in given.items() if letter in plant.stated_matrices]
+    written = [(letter, given[letter].shape) for letter in stated.stated(*given)]
     places = [(letter, i, j) for letter, shape in written for i, j in np.ndindex(shape)]
     free = [place for place in (*places, (DELAY, 0, 0)) if plant.term(*place).names]
     model = StateSpaceModel(
@@ -82,31 +82,24 @@ def _check(spec: Spec, plant: StateSpacePlant, model: StateSpaceModel) -> None:
     key = "plant.state_space"
     coloured = any(spec.noise.drifts) or any(len(np.ravel(x)) > 1 for x in (spec.noise.C, spec.noise.D))
     if plant.state_space.K is not None and coloured:
-        raise spec.complain(
-            "conflicting-keys",
+        message, hint = (
             "K says how the noise is coloured, and noise does so, too",
-            hint="remove K, or C, D and drift",
-            key=f"{key}.K",
+            "remove K, or C, D and drift",
         )
+        raise spec.complain("conflicting-keys", message, hint=hint, key=f"{key}.K")
     away = np.abs(model.predictor_poles[:, None] - model.poles).min(axis=1, initial=np.inf)
     own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # the poles that K makes
     worst = float(np.max(np.abs(model.predictor_poles), initial=0.0))
     if worst > 1.0 + _ROUNDING or np.any(np.abs(own) > 1.0 - _ROUNDING):
         what = "A - K C" if plant.state_space.K is not None else "A"
-        raise spec.complain(
-            "unstable-polynomial",
-            f"the predictor is unstable: {what}, sampled, has an eigenvalue of radius {worst:.6g}",
-            hint="check the signs of A; an unstable plant needs a gain K with which A - K C is stable",
-            key=f"{key}.A",
-        )
+        message = f"the predictor is unstable: {what}, sampled, has an eigenvalue of radius {worst:.6g}"
+        hint = "check the signs of A; an unstable plant needs a gain K with which A - K C is stable"
+        raise spec.complain("unstable-polynomial", message, hint=hint, key=f"{key}.A")
     worst = float(np.max(np.abs(model.poles), initial=0.0))
     if worst > 1.0 + _ROUNDING and not spec.closed_loop:
-        raise spec.complain(
-            "unstable-polynomial",
-            f"the plant is unstable: A, sampled, has an eigenvalue of radius {worst:.6g}",
-            hint="check the signs of A; an unstable plant needs a loop: add experiment.controller",
-            key=f"{key}.A",
-        )
+        message = f"the plant is unstable: A, sampled, has an eigenvalue of radius {worst:.6g}"
+        hint = "check the signs of A; an unstable plant needs a loop: add experiment.controller"
+        raise spec.complain("unstable-polynomial", message, hint=hint, key=f"{key}.A")
 
 
 # The share of pi/sample_time at which a proposed band ends.
@@ -120,10 +113,11 @@ def build_model(spec: Spec) -> Model:
         SpecError: `not-supported` for a regression; what is wrong with known and with named parameters.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
+    noise = spec.noise
+    C, D = per_output(noise.C), per_output(noise.D)
     match spec.plant:
         case PolynomialPlant() as plant:
-            noise = spec.noise
-            one, pairs = np.ones(1), tuple(zip(per_output(noise.D), noise.held, strict=True))
+            one, pairs = np.ones(1), tuple(zip(D, noise.held, strict=True))
             inside = polynomial_model(plant, noise, covariance, [one if held else d for d, held in pairs])
             outside = [d if held else one for d, held in pairs]
             return reparametrised(spec, plant, _coloured(inside, noise, [one], outside))
@@ -139,18 +133,13 @@ def build_model(spec: Spec) -> Model:
                 degrees=degrees_of(plant),
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
-            C, D = per_output(spec.noise.C), per_output(spec.noise.D)
-            return reparametrised(spec, plant, _coloured(model, spec.noise, C, D))
+            return reparametrised(spec, plant, _coloured(model, noise, C, D))
         case StateSpacePlant() as plant:
-            C, D = per_output(spec.noise.C), per_output(spec.noise.D)
             states = state_space_model(spec, plant, covariance)
-            return reparametrised(spec, plant, _coloured(states, spec.noise, C, D))
-    raise spec.complain(
-        "not-supported",
-        "a regression has no dynamics to be estimated here",
-        hint="ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1",
-        key="plant",
-    )
+            return reparametrised(spec, plant, _coloured(states, noise, C, D))
+    message = "a regression has no dynamics to be estimated here"
+    hint = "ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1"
+    raise spec.complain("not-supported", message, hint=hint, key="plant")
 
 
 def _coloured(model: Listed, noise: NoiseShape, C: Sequence[Array], D: Sequence[Array]) -> Listed:
@@ -238,12 +227,12 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
         lo, hi = spec.clip_band(band)
         return lo * spec.sample_time, min(hi * spec.sample_time, np.pi)
     if band is None or not np.isfinite(band[1]):
+        limit = f"limits: {{band: [0, {0.5 * np.pi / spec.sample_time:.3g}]}}"
         raise spec.complain(
             "needs-band",
             "in continuous time frequencies have no end: the band of the excitation is missing",
             hint="add sample: zoh to the plant, whose input is then held for each sample_time; or, to stay "
-            f"in continuous time, limits: {{band: [0, {0.5 * np.pi / spec.sample_time:.3g}]}}, or a "
-            "polynomial spectrum with its band",
+            f"in continuous time, {limit}, or a polynomial spectrum with its band",
             key="spectrum" if spec.spectrum is not None else "limits",
         )
     return band
@@ -256,23 +245,21 @@ def _stated_band(spec: Spec) -> tuple[float, float] | None:
             return band
         case MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
             return _around(given)
-        case GivenSpectrum(given=GivenSignal()) if spec.limits.band is None and not spec.plant.sampled:
-            return 0.0, np.pi / spec.sample_time
-        case GivenSpectrum(given=GivenMultisine(frequencies=given)) if (
-            spec.limits.band is None and not spec.plant.sampled and given[-1] > 0
-        ):
-            return _around(given)
-        case GivenSpectrum(given=GivenTable(file=name)) if (
-            spec.limits.band is None and not spec.plant.sampled
-        ):
-            rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)["frequency"]
-            return _around(rows.tolist()) if rows[-1] > 0 else None
+        case GivenSpectrum(given=given) if spec.limits.band is None and not spec.plant.sampled:
+            match given:
+                case GivenSignal():
+                    return 0.0, np.pi / spec.sample_time
+                case GivenMultisine():
+                    return _around(given.frequencies)
+                case GivenTable(file=name):
+                    rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)
+                    return _around(rows["frequency"].tolist())
     return spec.limits.band
 
 
-def _around(frequencies: Sequence[float]) -> tuple[float, float]:
+def _around(frequencies: Sequence[float]) -> tuple[float, float] | None:
     lo, hi = frequencies[0], frequencies[-1]
-    return (lo, hi) if hi > lo else (0.5 * lo, 1.5 * hi)
+    return None if hi == 0.0 else (lo, hi) if hi > lo else (0.5 * lo, 1.5 * hi)
 
 
 def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
@@ -291,8 +278,11 @@ def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     if stated is not None:
         return stated.over(spec, experiment.model.names)
     record = prior_record(spec)
-    if record is None:
-        return None
+    return None if record is None else information_in(spec, experiment, record)
+
+
+def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
+    """Return the information (k, k) about the plant in the samples (n, r) of an earlier excitation."""
     earlier = replace(experiment, samples=len(record))
     return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
 

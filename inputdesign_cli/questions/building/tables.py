@@ -60,22 +60,13 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
     return found
 
 
-def read_header(path: Path, *, key: str) -> list[str]:
-    """Return the names of the columns of a data file, in small letters.
-
-    Raises:
-        DataError: `data-unreadable`.
-    """
-    return read_sheet(path, key=key).header
-
-
 def has_column(path: Path, start: str, *, key: str) -> bool:
     """Return whether some header of a data file begins like this.
 
     Raises:
         DataError: `data-unreadable`.
     """
-    return any(name.startswith(start) for name in read_header(path, key=key))
+    return any(name.startswith(start) for name in read_sheet(path, key=key).header)
 
 
 def read_frequency_table(

@@ -66,16 +66,12 @@ def check_every_direction_counts(spec: Spec, question: Question) -> None:
 
 
 def _free_direction(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:
-    which = f"a combination of the {spec.plant.inputs} inputs"
-    if silent.size:
-        which = f"the power of input {silent[0] + 1}"
+    which = f"the power of input {silent[0] + 1}" if silent.size else "a combination of the inputs"
     if spec.goal == "least_cost":
-        unseen = "" if silent.size else ": it does not show in the powers that are paid for"
         hint = "give input_power a weight for every input, however small"
-        return spec.complain("no-cost", f"{which} costs nothing{unseen}", hint=hint, key="cost")
-    unseen = "" if silent.size else ": it does not show in the powers that are limited"
+        return spec.complain("no-cost", f"{which} costs nothing", hint=hint, key="cost")
     hint = "add limits.input_power, or limits.excitation_power in closed loop"
-    return spec.complain("needs-limits", f"nothing limits {which}{unseen}", hint=hint, key="limits")
+    return spec.complain("needs-limits", f"nothing limits {which}", hint=hint, key="limits")
 
 
 def check_reach(spec: Spec, question: Question) -> Reach:
@@ -89,7 +85,9 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         return Reach()
     units = build_units(spec)
     places = " and ".join(units.named(w) for w in found.frequencies)
-    free = f"excitation at {places} informs about the parameters and {_uncounted(question)}"
+    keys = dict.fromkeys(limit.key for limit in question.limits if limit.upper)
+    uncounted = "costs nothing" if question.goal == "cost" else f"is not limited by {', '.join(keys)}"
+    free = f"excitation at {places} informs about the parameters and {uncounted}"
     others, band = _others(spec, question), _band(spec, question, found)
     lo, hi = question.experiment.band
     off = 2.0 * _OFF * hi
@@ -103,12 +101,9 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         section = "cost" if question.goal == "cost" else "limits"
         add = "give a weight, however small, to" if section == "cost" else "add"
         avoid = f"leave it out by {band}" if question.basis.free else "choose other lines"
-        raise spec.complain(
-            "no-cost" if question.goal == "cost" else "needs-limits",
-            f"{free}: {outcome}, and no spectrum is the best",
-            hint=f"{add} {others}; or {avoid}",
-            key=section,
-        )
+        code = "no-cost" if section == "cost" else "needs-limits"
+        message = f"{free}: {outcome}, and no spectrum is the best"
+        raise spec.complain(code, message, hint=f"{add} {others}; or {avoid}", key=section)
     if found.unbounded or inside:
         return Reach(
             bounded=False,
@@ -120,13 +115,6 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         return Reach(attained=False, band=inner)
     note = f"{free}: {approached}, which no record can follow; add {others}, or leave it out by {band}"
     return Reach(attained=False, band=inner, note=note)
-
-
-def _uncounted(question: Question) -> str:
-    if question.goal == "cost":
-        return "costs nothing"
-    keys = dict.fromkeys(limit.key for limit in question.limits if limit.upper)
-    return f"is not limited by {', '.join(keys)}"
 
 
 def _others(spec: Spec, question: Question) -> str:

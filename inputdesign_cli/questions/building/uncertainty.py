@@ -18,7 +18,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.questions.building.demand import check_effects
 from inputdesign_cli.questions.building.integrators import on_finite_information
-from inputdesign_cli.questions.building.knowledge import KEY, Draw, UncertainPlant
+from inputdesign_cli.questions.building.knowledge import KEY, UncertainPlant
 from inputdesign_cli.questions.building.requirements import build_asked
 from inputdesign_cli.questions.building.system import build_loop
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
@@ -58,13 +58,12 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis | None) -> Pla
     if isinstance(stated.scenarios, tuple):
         return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
     number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
-    draw = scenario.drawing()
-    batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
+    batch = scenario.batch(number, np.random.default_rng([stated.seed, 0]))
 
     def afresh() -> Iterator[Batch]:
         rng = np.random.default_rng([stated.seed, 1])
         for begun in range(0, stated.fresh, _AT_A_TIME):
-            yield scenario.batch(draw, min(_AT_A_TIME, stated.fresh - begun), rng)
+            yield scenario.batch(min(_AT_A_TIME, stated.fresh - begun), rng)
 
     return Plants(
         batch,
@@ -87,21 +86,15 @@ def _needed(spec: Spec, basis: Basis | None) -> int | None:
     if stated is None or stated.risk is None:
         return None
     if basis is not None and basis.free:
-        raise spec.complain(
-            "not-supported",
-            "how many plants a risk takes depends on the number of unknowns, and a free spectrum has none",
-            hint="write scenarios: 200 in place of risk, or choose spectrum: {type: fir}",
-            key=f"{KEY}.risk",
-        )
+        message = "how many plants a risk takes depends on the number of unknowns: a free spectrum has none"
+        hint = "write scenarios: 200 in place of risk, or choose spectrum: {type: fir}"
+        raise spec.complain("not-supported", message, hint=hint, key=f"{KEY}.risk")
     needed = samples_for(stated.risk, 1.0 - CONFIDENCE, _unknowns(spec, basis))
     if needed > most("uncertainty.scenarios"):
-        raise spec.complain(
-            "too-large",
-            f"a risk of {stated.risk:g} with {_unknowns(spec, basis)} unknowns takes {needed} plants, and at "
-            f"most {most('uncertainty.scenarios')} are taken",
-            hint="allow more risk, or lower the order of the spectrum",
-            key=f"{KEY}.risk",
-        )
+        takes = f"a risk of {stated.risk:g} with {_unknowns(spec, basis)} unknowns takes {needed} plants"
+        message = f"{takes}, and at most {most('uncertainty.scenarios')} are taken"
+        hint = "allow more risk, or lower the order of the spectrum"
+        raise spec.complain("too-large", message, hint=hint, key=f"{KEY}.risk")
     return needed
 
 
@@ -127,23 +120,17 @@ def farthest_radius(spec: Spec, experiment: Experiment) -> float:
     within = None if spec.uncertainty is None else spec.uncertainty.stable_within
     if nominal.continuous:
         if within is not None:
-            raise spec.complain(
-                "unsuitable-key",
-                "a radius is one of poles in z, and the plant is not sampled",
-                hint="remove stable_within: unstable plants are not drawn",
-                key=f"{KEY}.stable_within",
-            )
+            message = "a radius is one of poles in z, and the plant is not sampled"
+            hint = "remove stable_within: unstable plants are not drawn"
+            raise spec.complain("unsuitable-key", message, hint=hint, key=f"{KEY}.stable_within")
         return 1.0
     own = (experiment.loop or nominal).radius
     if within is None:
         return max(_DEFAULT_RADIUS, 0.5 * (1.0 + own))
     if own > within:
-        raise spec.complain(
-            "no-stable-plant",
-            f"the nominal model itself has a pole, or a zero of its noise, at radius {own:.6g}",
-            hint=f"write {0.5 * (1.0 + own):.6g}, or leave it out",
-            key=f"{KEY}.stable_within",
-        )
+        message = f"the nominal model itself has a pole, or a zero of its noise, at radius {own:.6g}"
+        hint = f"write {0.5 * (1.0 + own):.6g}, or leave it out"
+        raise spec.complain("no-stable-plant", message, hint=hint, key=f"{KEY}.stable_within")
     return within
 
 
@@ -158,7 +145,7 @@ class _NoPlantError(Exception):
 class _Scenarios(UncertainPlant):
     """Makes plants of parameters."""
 
-    @property
+    @cached_property
     def _radius(self) -> float:
         """The radius beyond which poles are too near to the unit circle, or outside."""
         return farthest_radius(self.spec, self.experiment)
@@ -223,12 +210,9 @@ class _Scenarios(UncertainPlant):
             return
         longest = spec.experiment.samples * (1.0 if spec.plant.sampled else spec.sample_time)
         if longest <= model.memory > self.nominal.memory:
-            raise spec.complain(
-                "delay-beyond-record",
-                f"at the scenario {self._named(theta)} a dead time outlasts the experiment",
-                hint="take more samples, or state the uncertainty more tightly",
-                key=KEY,
-            )
+            message = f"at the scenario {self._named(theta)} a dead time outlasts the experiment"
+            hint = "take more samples, or state the uncertainty more tightly"
+            raise spec.complain("delay-beyond-record", message, hint=hint, key=KEY)
 
     def _named(self, theta: Array) -> str:
         return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self.nominal.names, theta, strict=True))
@@ -244,19 +228,17 @@ class _Scenarios(UncertainPlant):
             try:
                 plants.append(self.at(theta, farthest))
             except _NoPlantError as error:
-                raise self.spec.complain(
-                    error.code,
-                    f"at the scenario {self._named(theta)} {error.what}",
-                    hint="leave the scenario out, or mend its parameters",
-                    key=key,
-                ) from error
+                message = f"at the scenario {self._named(theta)} {error.what}"
+                hint = "leave the scenario out, or mend its parameters"
+                raise self.spec.complain(error.code, message, hint=hint, key=key) from error
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
 
     def worst_region(self, confidence: float) -> Region:
         """Return the region of this confidence in which the worst plant is searched."""
-        name, centre, columns, box = self.region(confidence)
-        return Region(name, centre, columns, box, self.possible)
+        found = self.region(confidence)
+        name = "the intervals" if found.box else f"the ellipsoid of confidence {confidence:g}"
+        return Region(name, found.centre, found.columns, found.box, self.possible)
 
     def possible(self, theta: Array) -> Alternative | None:
         """Return the plant with these parameters; None if there is none, or it is unstable."""
@@ -265,7 +247,7 @@ class _Scenarios(UncertainPlant):
         except _NoPlantError:
             return None
 
-    def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
+    def batch(self, number: int, rng: np.random.Generator) -> Batch:
         """Draw a number of plants; draws that give no stable plant are repeated.
 
         Raises:
@@ -283,7 +265,7 @@ class _Scenarios(UncertainPlant):
                     hint="the uncertainty reaches far beyond what is possible: state it more tightly",
                     key=KEY,
                 )
-            theta, drawn = draw(rng), drawn + 1
+            theta, drawn = self.draw(rng), drawn + 1
             try:
                 plants.append(self.at(theta, radius))
             except _NoPlantError as error:

@@ -42,12 +42,9 @@ def build_weight(
             ratio = transfer.continuous
             return ContinuousRational(np.array(ratio.numerator), np.array(ratio.denominator_polynomial))
         case ContinuousTransfer() if transfer.sample is None:
-            raise spec.complain(
-                "not-sampled",
-                f"{key} is in s, but the experiment is in discrete time",
-                hint="write sample: zoh beside continuous, or give the weight in q^-1",
-                key=key,
-            )
+            message = f"{key} is in s, but the experiment is in discrete time"
+            hint = "write sample: zoh beside continuous, or give the weight in q^-1"
+            raise spec.complain("not-sampled", message, hint=hint, key=key)
         case ContinuousTransfer():
             return held(transfer, spec.sample_time)
 
@@ -62,15 +59,13 @@ def check_finite(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], 
     if at is None:
         return
     units = build_units(spec)
-    sampled = spec.plant.sampled
-    mended = "a factor [1, -0.999] in place of [1, -1]" if sampled else "s + 0.001 in place of s"
-    raise spec.complain(
-        code,
-        f"{key} has a pole on the {'unit circle' if sampled else 'imaginary axis'}, at "
-        f"{at / units.frequency:.6g} {units.per_time}: it is infinite there",
-        hint=f"move it inside ({mended}), or keep the band that it is for away from it",
-        key=key,
-    )
+    circle, mended = "imaginary axis", "s + 0.001 in place of s"
+    if spec.plant.sampled:
+        circle, mended = "unit circle", "a factor [1, -0.999] in place of [1, -1]"
+    where = f"{at / units.frequency:.6g} {units.per_time}"
+    message = f"{key} has a pole on the {circle}, at {where}: it is infinite there"
+    hint = f"move it inside ({mended}), or keep the band that it is for away from it"
+    raise spec.complain(code, message, hint=hint, key=key)
 
 
 def on_the_limit(points: ComplexArray, band: tuple[float, float]) -> float | None:

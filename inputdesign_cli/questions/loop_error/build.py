@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Protocol, cast
 
 import numpy as np
 
@@ -32,9 +33,17 @@ from inputdesign_cli.questions.loop_error.signal import LoopErrorSignalSettings
 from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorTask, LossTrial
 from inputdesign_cli.specification import ClosedLoopError, Simulation, Spec
 from inputdesign_cli.specification.models.transfer import Transfer
+from inputdesign_cli.specification.plugins import added
 
 _GRID = 512
 _CANDIDATES = 20
+
+
+class AddedLaw(Protocol):
+    """A section of `control` that another package adds (`specification.plugins`)."""
+
+    def build(self, spec: Spec, plant: MatrixPlant) -> ControlLaw:
+        """Return the control law for a plant."""
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
@@ -85,6 +94,8 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tu
         # The inverse gives the delay and the zeros to be kept, so it must exist first.
         check_invertible(plant, key=key)
         return "internal_model", InternalModel.build(plant, _transfer(spec, control.internal_model))
+    for name in control.stated(*added("control_laws")):
+        return name, cast(AddedLaw, control.at(name)).build(spec, plant)
     target = control.model_reference
     assert target is not None
     if target.kind == "discrete_matrix":

@@ -13,20 +13,16 @@ def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:
     """A design needs a requirement or a criterion; an analysis of a given excitation does not."""
     accuracy = spec.accuracy
     if spec.designs and not accuracy.requirements and not accuracy.goals:
-        yield PathDiagnostic(
-            "nothing-asked",
-            "nothing is asked of the model: accuracy holds neither a requirement nor a criterion",
+        message = "nothing is asked of the model: accuracy holds neither a requirement nor a criterion"
+        hint = (
             "write accuracy: {model_error: {relative: 0.01}}, accuracy: {criterion: D} for the best within "
-            "limits, or give the excitation under spectrum.given",
-            ("accuracy",),
+            "limits, or give the excitation under spectrum.given"
         )
+        yield PathDiagnostic("nothing-asked", message, hint, ("accuracy",))
     if "scale" in accuracy.model_fields_set and accuracy.criterion is None:
-        yield PathDiagnostic(
-            "unsuitable-key",
-            "{key} is the scale of a criterion, and there is none",
-            "add criterion: D (or A, E, T), or remove scale",
-            ("accuracy", "scale"),
-        )
+        message = "{key} is the scale of a criterion, and there is none"
+        hint = "add criterion: D (or A, E, T), or remove scale"
+        yield PathDiagnostic("unsuitable-key", message, hint, ("accuracy", "scale"))
 
 
 def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -77,9 +73,7 @@ def lengths_agree(spec: Spec) -> Iterator[PathDiagnostic]:
     """The experiment is no longer than it may be."""
     most = spec.limits.samples
     if most is not None and spec.goal != "shortest_experiment" and spec.experiment.samples > most:
-        yield PathDiagnostic(
-            "conflicting-keys",
-            f"{{key}} is {spec.experiment.samples}, more than limits.samples ({most})",
-            "shorten the experiment or raise the limit",
-            ("experiment", "samples"),
-        )
+        samples = spec.experiment.samples
+        message = f"{{key}} is {samples}, more than limits.samples ({most})"
+        hint = "shorten the experiment or raise the limit"
+        yield PathDiagnostic("conflicting-keys", message, hint, ("experiment", "samples"))

@@ -68,13 +68,10 @@ def named_channels(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def _wrong_size(key: str, value: tuple, noun: str, size: int) -> PathDiagnostic:
-    return PathDiagnostic(
-        "wrong-shape",
-        f"{{key}} has {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
-        f"the plant's number of {noun}s is {size}",
-        f"write one entry per {noun}" + ("" if depth(value) > 1 else ", or a number"),
-        parse_key(key),
-    )
+    entries = "entry" if len(value) == 1 else "entries"
+    message = f"{{key}} has {len(value)} {entries}; the plant's number of {noun}s is {size}"
+    hint = f"write one entry per {noun}" + ("" if depth(value) > 1 else ", or a number")
+    return PathDiagnostic("wrong-shape", message, hint, parse_key(key))
 
 
 def delays(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -119,20 +116,14 @@ def frequencies(spec: Spec) -> Iterator[PathDiagnostic]:
     low, high = spec.limits.band or (0.0, math.inf)
     for i, w in enumerate(listed):
         if not low * (1 - ROUNDING) <= w <= high * (1 + ROUNDING):
-            yield PathDiagnostic(
-                "bad-band",
-                f"{{key}} is {show(w)}, outside limits.band [{show(low)}, {show(high)}]",
-                "remove the frequency or widen the band",
-                (*path, i),
-            )
+            message = f"{{key}} is {show(w)}, outside limits.band [{show(low)}, {show(high)}]"
+            hint = "remove the frequency or widen the band"
+            yield PathDiagnostic("bad-band", message, hint, (*path, i))
             return
 
 
 def _beyond(spec: Spec, frequency: float, path: Path) -> PathDiagnostic:
-    return PathDiagnostic(
-        "beyond-nyquist",
-        f"{{key}} reaches {show(frequency)}, beyond the Nyquist frequency "
-        f"{show(spec.nyquist)} rad/{spec.time_unit}",
-        f"frequencies are in rad/{spec.time_unit} and end at pi/sample_time",
-        path,
-    )
+    unit, most = f"rad/{spec.time_unit}", show(spec.nyquist)
+    message = f"{{key}} reaches {show(frequency)}, beyond the Nyquist frequency {most} {unit}"
+    hint = f"frequencies are in {unit} and end at pi/sample_time"
+    return PathDiagnostic("beyond-nyquist", message, hint, path)

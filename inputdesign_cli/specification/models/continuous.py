@@ -140,14 +140,20 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 return False
             return self.grid(name)[i][j] != 0.0 if written is None else of(name, i, j).present
 
-        none, above, below, delays = Expression("0.0"), [], [], []
-        for i, row in enumerate(self.grid("gain")):
-            columns = range(len(row))
-            entries = [self._entry(of, i, j) for j in columns]
-            above.append(tuple(entries[j][0] if there("gain", i, j) else (none,) for j in columns))
-            below.append(tuple(bottom for _, bottom in entries))
-            delays.append(tuple(of("dead_time", i, j) if there("dead_time", i, j) else none for j in columns))
+        none, entries = Expression("0.0"), self._entries(of)
+        above = (
+            tuple(entry[0] if there("gain", i, j) else (none,) for j, entry in enumerate(row))
+            for i, row in enumerate(entries)
+        )
+        below = (tuple(entry[1] for entry in row) for row in entries)
+        delays = (
+            tuple(of("dead_time", i, j) if there("dead_time", i, j) else none for j in range(len(row)))
+            for i, row in enumerate(entries)
+        )
         return CoefficientTerms(tuple(above), tuple(below), tuple(delays))
+
+    def _entries(self, of: Callable[[str, int, int], Expression]) -> list[list[tuple[Terms, Terms]]]:
+        return [[self._entry(of, i, j) for j in range(len(row))] for i, row in enumerate(self.grid("gain"))]
 
     def _entry(self, of: Callable[[str, int, int], Expression], i: int, j: int) -> tuple[Terms, Terms]:
         """Numerator and denominator of an entry, descending in s."""
@@ -163,13 +169,10 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         def of(name: str, i: int, j: int) -> Expression:
             return Expression(repr(self.grid(name)[i][j]))
 
-        return tuple(
-            tuple(
-                tuple(term.at((), np.zeros(0))[0] for term in self._entry(of, i, j)[part])
-                for j in range(len(row))
-            )
-            for i, row in enumerate(self.grid("gain"))
-        )
+        def worth(terms: Terms) -> tuple[float, ...]:
+            return tuple(term.at((), np.zeros(0))[0] for term in terms)
+
+        return tuple(tuple(worth(entry[part]) for entry in row) for row in self._entries(of))
 
     @staticmethod
     def _symbol(name: str, i: int, j: int) -> str:

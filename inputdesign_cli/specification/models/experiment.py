@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Strict
+from pydantic import AfterValidator, Field, Strict
 
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
     CovarianceMatrix,
-    FileName,
+    FileOr,
     Flag,
     MonicPerOutput,
     Names,
@@ -30,11 +30,11 @@ from inputdesign_cli.specification.models.fields import (
     depth,
 )
 from inputdesign_cli.specification.models.section import (
-    TAG,
     PathDiagnostic,
     Section,
     Shorthand,
     Wording,
+    by_tag,
     fail,
     optional,
     tag,
@@ -47,10 +47,7 @@ from inputdesign_cli.specification.models.wording import count
 # This factor moves roots on the unit circle inside, whatever the rounding of decimals.
 _INSIDE = 1.0 - 1e-7
 
-InformationSource = Annotated[
-    Annotated[FileName, tag("file")] | Annotated[SemidefiniteMatrix, tag("matrix")],
-    Discriminator(lambda value: TAG + ("file" if isinstance(value, str) else "matrix")),
-]
+InformationSource = FileOr[SemidefiniteMatrix]
 
 Values = Annotated[
     Mapping[str, Number],
@@ -59,7 +56,7 @@ Values = Annotated[
 ]
 PriorParameters = Annotated[
     Annotated[Values, tag("values")] | Annotated[Names, tag("names")],
-    Discriminator(lambda value: TAG + ("values" if isinstance(value, Mapping) else "names")),
+    by_tag(lambda value: "values" if isinstance(value, Mapping) else "names"),
 ]
 
 
@@ -112,11 +109,8 @@ class NoiseShape(Section):
         for (place, polynomial), held in zip(with_paths(self.D), self.held, strict=True):
             shrunk = tuple(c * _INSIDE**k for k, c in enumerate(polynomial)) if held else polynomial
             if found := check_delay_stable(shrunk):
-                circle = (
-                    "" if held else "; noise that integrates is drift: true, and D may have such roots where "
-                )
-                hint = found.hint + (circle and circle + "noise.known lists all its coefficients")
-                yield replace(found, path=("D", *place), hint=hint)
+                instead = "; write drift: true, or list all its coefficients in noise.known"
+                yield replace(found, path=("D", *place), hint=found.hint + ("" if held else instead))
 
 
 class Noise(NoiseShape):
@@ -228,12 +222,9 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
         message = f"{{key}} names {repeated[0]} more than once"
         yield PathDiagnostic("wrong-shape", message, path=("parameters",))
     if len(names) != size:
-        yield PathDiagnostic(
-            "wrong-shape",
-            f"{{key}} holds {count(len(names), 'name')}, but {matrix_key} is {size} x {size}",
-            "write one name per row, in the order of the rows",
-            ("parameters",),
-        )
+        message = f"{{key}} holds {count(len(names), 'name')}, but {matrix_key} is {size} x {size}"
+        hint = "write one name per row, in the order of the rows"
+        yield PathDiagnostic("wrong-shape", message, hint, ("parameters",))
 
 
 _LONGEST = 40

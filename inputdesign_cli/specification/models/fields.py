@@ -11,18 +11,9 @@ from itertools import pairwise
 from typing import Annotated, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    AllowInfNan,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Strict,
-    WithJsonSchema,
-)
+from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict, WithJsonSchema
 
-from inputdesign_cli.specification.models.section import TAG, PathDiagnostic, Wording, carry, fail, tag
+from inputdesign_cli.specification.models.section import PathDiagnostic, Wording, by_tag, carry, fail, tag
 from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
 from inputdesign_cli.specification.models.units import FRACTION, FREQUENCY, SIGNAL, TIME
 from inputdesign_cli.specification.models.wording import show
@@ -64,11 +55,8 @@ def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
     if lead == 1.0:
         return None
     if lead == 0.0:
-        return PathDiagnostic(
-            "not-monic",
-            "{key} must start with 1, not 0",
-            "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0",
-        )
+        hint = "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0"
+        return PathDiagnostic("not-monic", "{key} must start with 1, not 0", hint)
     hint = f"divide all its coefficients by {show(lead)}: {_listed([c / lead for c in polynomial])}"
     if polynomial[-1] == 1.0:
         hint = f"its coefficients ascend in q^-1: did you mean {_listed(polynomial[::-1])}?"
@@ -82,22 +70,18 @@ def _listed(coefficients: Sequence[float]) -> str:
 
 def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
     """In q^-1, ascending: all roots in z lie strictly inside the unit circle."""
-    roots, found = _roots(polynomial)
-    if found or not roots.size:
-        return found
-    worst = roots[np.argmax(np.abs(roots))]
-    radius = float(abs(worst))
-    if radius < 1.0 - _ROUNDING:
-        return None
-    angle = abs(float(np.angle(worst)))
-    where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
-    return PathDiagnostic(
-        "unstable-polynomial",
-        f"{{key}} has a root of radius {where} at {angle:.4g} rad/sample; "
-        "all roots (in z) must lie inside the unit circle",
-        "check the signs, and that the coefficients ascend in q^-1 and begin with 1"
-        + _decimal_comma(polynomial),
-    )
+
+    def refuse(worst: complex) -> PathDiagnostic | None:
+        radius = abs(worst)
+        if radius < 1.0 - _ROUNDING:
+            return None
+        where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
+        place = f"radius {where} at {abs(float(np.angle(worst))):.4g} rad/sample"
+        message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
+        hint = "check the signs, and that the coefficients ascend in q^-1 and begin with 1"
+        return PathDiagnostic("unstable-polynomial", message, hint + _decimal_comma(polynomial))
+
+    return _check_roots(polynomial, np.abs, refuse)
 
 
 def _decimal_comma(polynomial: Polynomial) -> str:
@@ -124,33 +108,34 @@ def check_no_growth_in_s(polynomial: Polynomial) -> PathDiagnostic | None:
 
 def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
     """In s, descending: all roots lie in the open left half plane."""
-    roots, found = _roots(polynomial)
-    if found or not roots.size:
-        return found
-    worst = roots[np.argmax(roots.real)]
-    if worst.real < 0:
-        return None
-    place = f"{worst.real + 0.0:.4g}" + (f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else "")
-    return PathDiagnostic(
-        "unstable-polynomial",
-        f"{{key}} has a root at s = {place}; all poles must lie in the left half plane",
-        "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3",
-    )
+
+    def refuse(worst: complex) -> PathDiagnostic | None:
+        if worst.real < 0:
+            return None
+        pair = f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else ""
+        place = f"s = {worst.real + 0.0:.4g}{pair}"
+        message = f"{{key}} has a root at {place}; all poles must lie in the left half plane"
+        hint = "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3"
+        return PathDiagnostic("unstable-polynomial", message, hint)
+
+    return _check_roots(polynomial, np.real, refuse)
 
 
-def _roots(polynomial: Polynomial) -> tuple[np.ndarray, PathDiagnostic | None]:
+def _check_roots(
+    polynomial: Polynomial,
+    badness: Callable[[np.ndarray], np.ndarray],
+    refuse: Callable[[complex], PathDiagnostic | None],
+) -> PathDiagnostic | None:
+    """What is wrong with the worst root, if there is one."""
     try:
         with np.errstate(all="ignore"):
             roots = np.roots(np.asarray(polynomial, dtype=float))
     except np.linalg.LinAlgError:
         roots = np.full(1, np.nan)
     if not np.all(np.isfinite(roots)):
-        return np.zeros(0), PathDiagnostic(
-            "bad-polynomial",
-            "the roots of {key} cannot be computed: its coefficients differ by too many orders of magnitude",
-            "rescale it, or choose another time unit",
-        )
-    return roots, None
+        message = "the roots of {key} cannot be computed: its coefficients are of too different magnitude"
+        return PathDiagnostic("bad-polynomial", message, "rescale it, or choose another time unit")
+    return refuse(complex(roots[np.argmax(badness(roots))])) if roots.size else None
 
 
 PolynomialList = tuple[Polynomial, ...]
@@ -208,11 +193,9 @@ def same_columns(rows: Nested) -> Nested:
     """The rows of a matrix of polynomials are equally long."""
     if len({len(row) for row in rows}) > 1:
         lengths = ", ".join(str(len(row)) for row in rows)
-        raise fail(
-            "wrong-shape",
-            f"the rows of {{key}} must have the same number of columns (they have {lengths})",
-            "one row per output, one column per input; write [0] where an input has no effect",
-        )
+        message = f"the rows of {{key}} must have the same number of columns (they have {lengths})"
+        hint = "one row per output, one column per input; write [0] where an input has no effect"
+        raise fail("wrong-shape", message, hint)
     return rows
 
 
@@ -236,17 +219,16 @@ def symmetric(rows: Matrix) -> Matrix:
             raise fail("wrong-shape", f"{{key}} must be square: {message}")
     values = np.array(rows)
     for i, j in np.argwhere(np.tril(np.abs(values - values.T)) > 1e-9 * np.max(np.abs(values))):
-        entry, mirrored = (
-            f"({i + 1}, {j + 1}) is {show(rows[i][j])}",
-            f"({j + 1}, {i + 1}) is {show(rows[j][i])}",
-        )
-        raise fail("not-symmetric", f"{{key}} is not symmetric: entry {entry} but {mirrored}")
+        one, other = (f"({a + 1}, {b + 1}) is {show(rows[a][b])}" for a, b in ((i, j), (j, i)))
+        raise fail("not-symmetric", f"{{key}} is not symmetric: entry {one} but {other}")
     return rows
 
 
 def semidefinite(rows: Matrix) -> Matrix:
     """A symmetric matrix has no negative eigenvalue beyond rounding."""
-    if _smallest_eigenvalue(rows) < -1e-9:
+    values = np.array(rows)
+    scale = float(np.max(np.abs(values)))
+    if scale > 0.0 and np.linalg.eigvalsh(values / scale)[0] < -1e-9:
         message = "{key} must be positive semidefinite"
         raise fail("not-positive-definite", message, "check the signs of its entries")
     return rows
@@ -255,27 +237,15 @@ def semidefinite(rows: Matrix) -> Matrix:
 def positive_definite(rows: Matrix) -> Matrix:
     """A covariance matrix is positive definite; tested on correlations, so that units do not matter."""
     values = np.array(rows)
-    variances = np.diag(values)
-    if np.any(variances <= 0.0) or not _has_positive_correlations(values, np.sqrt(variances)):
-        raise fail(
-            "not-positive-definite",
-            "{key} is not a covariance matrix: it must be positive definite",
-            "each variance must be positive, and each covariance below the geometric mean of its variances",
-        )
-    return rows
-
-
-def _has_positive_correlations(values: NDArray[np.float64], deviations: NDArray[np.float64]) -> bool:
-    with np.errstate(over="ignore"):
+    with np.errstate(all="ignore"):
+        deviations = np.sqrt(np.diag(values))
         correlations = values / deviations / deviations[:, None]
-    return bool(np.all(np.isfinite(correlations)) and np.linalg.eigvalsh(correlations)[0] > 0.0)
-
-
-def _smallest_eigenvalue(rows: Matrix) -> float:
-    """The smallest eigenvalue of a symmetric matrix, relative to its largest entry (0 for a zero matrix)."""
-    values = np.array(rows)
-    scale = float(np.max(np.abs(values)))
-    return float(np.linalg.eigvalsh(values / scale)[0]) if scale > 0 else 0.0
+    # A variance of zero, or below, makes entries that are not finite.
+    if not np.all(np.isfinite(correlations)) or np.linalg.eigvalsh(correlations)[0] <= 0.0:
+        message = "{key} is not a covariance matrix: it must be positive definite"
+        hint = "each variance must be positive, and each covariance below the geometric mean of its variances"
+        raise fail("not-positive-definite", message, hint)
+    return rows
 
 
 T = TypeVar("T")
@@ -304,8 +274,8 @@ def nested(levels: int, what: str, hint: str) -> BeforeValidator:
 
 
 _WHOLE = BeforeValidator(as_whole)
-_DEPTH = Discriminator(lambda value: f"{TAG}{depth(value)}")
-_LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if depth(value) else "one"))
+_DEPTH = by_tag(lambda value: str(depth(value)))
+_LIST_OR_NOT = by_tag(lambda value: "list" if depth(value) else "one")
 
 # Single values
 Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
@@ -333,6 +303,11 @@ FileName = Annotated[
     Field(pattern=r"\S", json_schema_extra={"format": FILE_FORMAT}),
     Wording("the name of a file"),
 ]
+FileOr = Annotated[
+    Annotated[FileName, tag("file")] | Annotated[T, tag("matrix")],
+    by_tag(lambda value: "file" if isinstance(value, str) else "matrix"),
+]
+"""The name of a file, or a matrix."""
 Name = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("a parameter name")]
 
 # Lists
@@ -351,9 +326,7 @@ Harmonics = Annotated[
     Annotated[Count, tag("count")]
     | Annotated[Literal["odd"], Wording("odd", "write odd, a number of harmonics, or a list"), tag("word")]
     | Annotated[Several[Index], AfterValidator(rising), tag("list")],
-    Discriminator(
-        lambda value: TAG + ("list" if depth(value) else "word" if isinstance(value, str) else "count")
-    ),
+    by_tag(lambda value: "list" if depth(value) else "word" if isinstance(value, str) else "count"),
 ]
 """How many harmonics of a period, "odd", or which."""
 

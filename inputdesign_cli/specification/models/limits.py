@@ -58,9 +58,12 @@ def _kind(value: dict[str, Plain]) -> str:
     return TableFile.phrase if "table" in value else transfer_kind(value)
 
 
+_PICK = pick(_kind, plain="number")
 Curve = Annotated[
-    Annotated[NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer,
-    pick(_kind, plain="number"),
+    Annotated[NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
+]
+UpperCurve = Annotated[
+    Annotated[Cap, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
 ]
 """A level, a tabulated curve, or |numerator/denominator|^2."""
 
@@ -68,17 +71,14 @@ Curve = Annotated[
 class SpectrumLimit(Section):
     """Bounds on the spectrum of the excitation at every frequency."""
 
-    max: Curve | None = optional("Largest density: a number, {table: file}, or a filter W for |W|^2.")
+    max: UpperCurve | None = optional("Largest density: a number, {table: file}, or a filter W for |W|^2.")
     min: Curve | None = optional("Smallest density, in the same forms.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A bound is given, the lower one is below the upper one, and the upper one is positive."""
+        """A bound is given, and the lower one is below the upper one."""
         yield from _some(self, "max", "min", "{max: 1}")
-        if self.max == 0.0:
-            message = "{key} must be greater than 0, not 0"
-            yield PathDiagnostic("out-of-range", message, "to have no limit, remove the key", ("max",))
         if isinstance(self.max, float) and isinstance(self.min, float):
-            yield from _ordered(0 < self.max < self.min)
+            yield from _ordered(self.max < self.min)
 
 
 Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
@@ -121,10 +121,8 @@ class Limits(Section):
     def bounds_power(self) -> bool:
         """Whether some limit bounds the power of the excitation, so that the best experiment exists."""
         powers = (self.input_power, self.output_power, self.excitation_power, self.spectrum)
-        return (
-            self.amplitude is not None
-            or self.energy is not None
-            or any(p is not None and p.max is not None for p in powers)
+        return bool(self.stated("amplitude", "energy")) or any(
+            p is not None and p.max is not None for p in powers
         )
 
 

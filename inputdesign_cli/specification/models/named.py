@@ -86,13 +86,9 @@ def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
     """Names of parameters can stand in expressions."""
     for name in parameters:
         if not is_name(name):
-            yield PathDiagnostic(
-                "bad-name",
-                f"{clip(name)} is no name of a parameter",
-                "a name is a letter (a to z), then letters, digits, _; functions, pi and lambda are taken",
-                ("parameters", name),
-                at_key=True,
-            )
+            message = f"{clip(name)} is no name of a parameter"
+            hint = "a name is a letter (a to z), then letters, digits, _; functions, pi and lambda are taken"
+            yield PathDiagnostic("bad-name", message, hint, ("parameters", name), at_key=True)
 
 
 def check_used(parameters: Mapping[str, float], texts: Iterable[str]) -> Iterator[PathDiagnostic]:
@@ -100,13 +96,9 @@ def check_used(parameters: Mapping[str, float], texts: Iterable[str]) -> Iterato
     used = frozenset[str]().union(*(Expression(text).names for text in texts))
     for name in parameters:
         if name not in used:
-            yield PathDiagnostic(
-                "unused-parameter",
-                f"nothing depends on the parameter {name}",
-                "write it into a coefficient, or remove it",
-                ("parameters", name),
-                at_key=True,
-            )
+            message = f"nothing depends on the parameter {name}"
+            hint = "write it into a coefficient, or remove it"
+            yield PathDiagnostic("unused-parameter", message, hint, ("parameters", name), at_key=True)
 
 
 def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list[PathDiagnostic]) -> Plain:
@@ -123,36 +115,26 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
     try:
         expression = Expression.of(value)
     except ExpressionError as error:
-        found.append(
-            PathDiagnostic(
-                "bad-expression",
-                f"{{key}} {error.message}: {clip(value)}",
-                without_unit(value, None, None) or error.hint,
-                path,
-            )
+        message, hint = (
+            f"{{key}} {error.message}: {clip(value)}",
+            without_unit(value, None, None) or error.hint,
         )
+        found.append(PathDiagnostic("bad-expression", message, hint, path))
         return 1.0
     unknown = sorted(expression.names - parameters.keys())
     for name in unknown:
         near = nearest(name, parameters)
         hint = f'did you mean "{near}"?' if near else f"add {name} and its value to plant.parameters"
-        found.append(
-            PathDiagnostic("unknown-name", f"{{key}} names {name}, which is no parameter", hint, path)
-        )
+        message = f"{{key}} names {name}, which is no parameter"
+        found.append(PathDiagnostic("unknown-name", message, hint, path))
     if unknown:
         return 1.0
     number, slope = expression.at(list(parameters), np.array(list(parameters.values()), dtype=float))
     if math.isfinite(number) and np.all(np.isfinite(slope)):
         return number
-    what = "has no derivative" if math.isfinite(number) else "has no value or no derivative"
-    found.append(
-        PathDiagnostic(
-            "undefined-expression",
-            f"{{key}} {what} at the nominal parameters: {clip(value)}",
-            "look for a division by zero, or a root or logarithm of a number that is not positive",
-            path,
-        )
-    )
+    message = f"{{key}} has no value or no derivative at the nominal parameters: {clip(value)}"
+    hint = "look for a division by zero, or a root or logarithm of a number that is not positive"
+    found.append(PathDiagnostic("undefined-expression", message, hint, path))
     return 1.0
 
 

@@ -111,6 +111,21 @@ class NamedPlant(Section):
         return self._written
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of outputs and inputs."""
+        raise NotImplementedError
+
+    @property
+    def outputs(self) -> int:
+        """The number of outputs."""
+        return self.shape[0]
+
+    @property
+    def inputs(self) -> int:
+        """The number of inputs."""
+        return self.shape[1]
+
+    @property
     def named_parameters(self) -> tuple[NamedParameter, ...]:
         """The named parameters; empty if the coefficients are the parameters."""
         stated = self.parameters or {}
@@ -154,16 +169,16 @@ class StateSpace(Section):
     def check(self) -> Iterator[PathDiagnostic]:
         """The matrices fit each other."""
         n, r, p = len(self.A), len(self.B[0]), len(self.C)
-        sizes: tuple[tuple[str, Matrix | None, int, int, str], ...] = (
-            ("A", self.A, n, n, "states by states"),
-            ("B", self.B, n, r, "states by inputs"),
-            ("C", self.C, p, n, "outputs by states"),
-            ("D", self.D, p, r, "outputs by inputs"),
-            ("K", self.K, n, p, "states by outputs"),
+        sizes: tuple[tuple[str, Matrix | None, tuple[int, int], str], ...] = (
+            ("A", self.A, (n, n), "states by states"),
+            ("B", self.B, (n, r), "states by inputs"),
+            ("C", self.C, (p, n), "outputs by states"),
+            ("D", self.D, (p, r), "outputs by inputs"),
+            ("K", self.K, (n, p), "states by outputs"),
         )
-        for key, entries, rows, columns, words in sizes:
-            if entries is not None and (len(entries), len(entries[0])) != (rows, columns):
-                message = f"{{key}} is {len(entries)} x {len(entries[0])}, and must be {rows} x {columns}"
+        for key, entries, wanted, words in sizes:
+            if entries is not None and (found := (len(entries), len(entries[0]))) != wanted:
+                message = f"{{key}} is {found[0]} x {found[1]}, and must be {wanted[0]} x {wanted[1]}"
                 yield PathDiagnostic("wrong-shape", message, f"it has {words}", (key,))
 
 
@@ -193,12 +208,8 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         """A and F have the shape of B."""
         yield from check_per_output(self.A, self.outputs, "A")
         if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
-            yield PathDiagnostic(
-                "wrong-shape",
-                "{key} must have the shape of B: " + shape_words(self.B),
-                "write [1] where an entry has no poles",
-                ("F",),
-            )
+            message = "{key} must have the shape of B: " + shape_words(self.B)
+            yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
 
     def check_written(self) -> Iterator[PathDiagnostic]:
         """Some coefficient of B is present."""
@@ -212,14 +223,9 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         )
 
     @property
-    def outputs(self) -> int:
-        """The number of outputs."""
-        return len(self.B_matrix)
-
-    @property
-    def inputs(self) -> int:
-        """The number of inputs."""
-        return len(self.B_matrix[0])
+    def shape(self) -> tuple[int, int]:
+        """The numbers of outputs and inputs."""
+        return size_of(self.B)
 
     def coefficients(self, letter: str, output: int, input: int) -> Terms:
         """A, B or F of an entry as expressions in the named parameters."""
@@ -254,14 +260,9 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     )
 
     @property
-    def outputs(self) -> int:
-        """The number of outputs."""
-        return len(self.continuous.numerator_matrix)
-
-    @property
-    def inputs(self) -> int:
-        """The number of inputs."""
-        return len(self.continuous.numerator_matrix[0])
+    def shape(self) -> tuple[int, int]:
+        """The numbers of outputs and inputs."""
+        return size_of(self.continuous.numerator_matrix)
 
     @property
     def sampled(self) -> bool:
@@ -319,14 +320,9 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
             yield PathDiagnostic("unsuitable-key", message, "remove it", ("sample",), at_key=True)
 
     @property
-    def outputs(self) -> int:
-        """The number of outputs."""
-        return len(self.state_space.C)
-
-    @property
-    def inputs(self) -> int:
-        """The number of inputs."""
-        return len(self.state_space.B[0])
+    def shape(self) -> tuple[int, int]:
+        """The numbers of outputs and inputs."""
+        return len(self.state_space.C), len(self.state_space.B[0])
 
     def check_written(self) -> Iterator[PathDiagnostic]:
         """Matrices in discrete time have no dead time, whatever its value."""
@@ -334,11 +330,6 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
             message = "{key} is in continuous time, but time is discrete here"
             path = ("state_space", "delay")
             yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
-
-    @property
-    def stated_matrices(self) -> tuple[str, ...]:
-        """The letters of the stated matrices."""
-        return self.state_space.stated("A", "B", "C", "D", "K")
 
     def term(self, letter: str, row: int, column: int) -> Expression:
         """An entry of a matrix, or the dead time, as an expression in the named parameters."""

@@ -31,10 +31,14 @@ from inputdesign_cli.specification.yaml.scalars import clip, why_not_number
 
 @dataclass(frozen=True)
 class Declared:
-    """A type without its annotations, and the annotations; the outermost one stands last."""
+    """A type without its annotations, and the annotations; the outermost one stands last.
+
+    `measure` is the unit of numbers inside: the innermost annotation within its section.
+    """
 
     type: Any
     metadata: tuple[object, ...] = ()
+    measure: Measure | None = None
 
     @property
     def wording(self) -> Wording:
@@ -90,18 +94,10 @@ def declared_at(root: type[Section], location: Sequence[str | int]) -> Declared:
     """Return the type at the location of a pydantic error, tags included."""
     found = Declared(root)
     for step in location:
-        found = found.at(step)
+        inner = found.at(step)
+        own = next((m for m in reversed(inner.metadata) if isinstance(m, Measure)), None)
+        found = replace(inner, measure=own or (None if inner.section else found.measure))
     return found
-
-
-def measure_at(root: type[Section], location: Sequence[str | int]) -> Measure | None:
-    """Return the unit of a number at the location: the innermost annotation within its section."""
-    found, latest = Declared(root), None
-    for step in location:
-        found = found.at(step)
-        own = next((m for m in reversed(found.metadata) if isinstance(m, Measure)), None)
-        latest = own or (None if found.section else latest)
-    return latest
 
 
 def sections_in(annotation: Any) -> set[type[Section]]:
@@ -186,7 +182,7 @@ def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> li
     code, message, hint = _wrong_value(kind, error["input"], context, declared)
     if kind in ("float_type", "int_type") and isinstance(error["input"], str):
         known = time_unit if isinstance(time_unit, str) else None
-        hint = without_unit(error["input"], measure_at(root, location), known) or hint
+        hint = without_unit(error["input"], declared.measure, known) or hint
     return [PathDiagnostic(code, message, hint, path)]
 
 
@@ -268,36 +264,25 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
     siblings = FAMILIES.get(model.family, []) if model else []
     others = [sibling.phrase for sibling in siblings if key in sibling.model_fields]
     if others and model:
-        return PathDiagnostic(
-            "unsuitable-key",
-            f"{format_key(path)} does not go with {model.phrase}",
-            f'"{key}" belongs to {choices(list(dict.fromkeys(others)))}; remove it, or change to that',
-            path,
-            at_key=True,
-        )
+        message = f"{format_key(path)} does not go with {model.phrase}"
+        hint = f'"{key}" belongs to {choices(list(dict.fromkeys(others)))}; remove it, or change to that'
+        return PathDiagnostic("unsuitable-key", message, hint, path, at_key=True)
     near, homes = nearest(key, known), _homes(root).get(key, [])
+    inside = [f"under {name}" for name in known if model and key in _keys_below(model, name)]
     hint = f"the keys of {owner} are {', '.join(known)}" if known else "remove it"
-    if 0 < len(homes) <= 3 and not (near and near.lower() == key.lower()):
-        hint = f"{key} belongs {choices(homes)}"
-    elif near:
-        hint = f'did you mean "{near}"?'
-    inside = _holding(model, key)
-    if inside:
-        hint = f"{key} belongs under {choices(inside)}"
     if model is not None and key in model.ELSEWHERE:
         hint = model.ELSEWHERE[key]
+    elif inside or (0 < len(homes) <= 3 and not (near and near.lower() == key.lower())):
+        hint = f"{key} belongs {choices(inside or homes)}"
+    elif near:
+        hint = f'did you mean "{near}"?'
     message = f"{clip(key)} is not a key of {owner}"
     return PathDiagnostic("unknown-key", message, hint, path, at_key=True, meant=near or "")
 
 
-def _holding(model: type[Section] | None, key: str) -> list[str]:
-    """The keys of a section under which a key belongs that was written one level too high."""
-    fields = model.model_fields.items() if model is not None else ()
-    return [
-        name
-        for name, field in fields
-        if any(key in part.model_fields for part in sections_in(field.annotation))
-    ]
+def _keys_below(model: type[Section], name: str) -> set[str]:
+    """The keys of the sections at a key."""
+    return {key for part in sections_in(model.model_fields[name].annotation) for key in part.model_fields}
 
 
 @cache

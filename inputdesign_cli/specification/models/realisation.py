@@ -97,13 +97,9 @@ class Signal(Section):
         for key in self.stated(*_ONLY_FOR):
             types = _ONLY_FOR[key]
             if self.type is not None and self.type not in types:
-                yield PathDiagnostic(
-                    "unsuitable-key",
-                    f"{{key}} does not go with type: {self.type}",
-                    f"it belongs to type: {types[0]}; remove it, or change the type",
-                    (key,),
-                    at_key=True,
-                )
+                message = f"{{key}} does not go with type: {self.type}"
+                hint = f"it belongs to type: {types[0]}; remove it, or change the type"
+                yield PathDiagnostic("unsuitable-key", message, hint, (key,), at_key=True)
 
 
 class Solver(Section):
@@ -152,11 +148,9 @@ class Simulation(Section):
 
 def _pair(value: object) -> object:
     if isinstance(value, list | tuple) and (len(value) != 2 or value[0] == value[1]):
-        raise fail(
-            "wrong-shape",
-            "{key} must hold two different parameters, which span the plane of the ellipse",
-            'write a pair: ["b1", "f1"], or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
-        )
+        message = "{key} must hold two different parameters, which span the plane of the ellipse"
+        hint = 'write a pair: ["b1", "f1"], or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)'
+        raise fail("wrong-shape", message, hint)
     return value
 
 

@@ -117,6 +117,8 @@ class Section(BaseModel):
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {}
     """Common keys that this section does not have -> a hint on its own keys."""
+    CODES: ClassVar[Mapping[str, Mapping[str, str]]] = {}
+    """Of a section from another package: the codes of its errors, with title, text and remedy."""
 
     def stated(self, *keys: str) -> tuple[str, ...]:
         """Return the keys that have a value."""
@@ -155,6 +157,11 @@ def tag(word: str) -> Tag:
     return Tag(TAG + word)
 
 
+def by_tag(choose: Callable[[Plain], str]) -> Discriminator:
+    """Return the discriminator of a union whose alternatives have a `tag`."""
+    return Discriminator(lambda value: TAG + choose(value))
+
+
 def pick(choose: Callable[[dict[str, Plain]], str], plain: str = "") -> Discriminator:
     """Return the discriminator of a union of sections.
 
@@ -163,12 +170,12 @@ def pick(choose: Callable[[dict[str, Plain]], str], plain: str = "") -> Discrimi
         plain: The tag of the alternative that is no mapping, if there is one.
     """
 
-    def chosen(value: object) -> str:
+    def chosen(value: Plain) -> str:
         if isinstance(value, Section):
-            return TAG + value.phrase
-        return TAG + (choose(value) if isinstance(value, dict) else plain)
+            return value.phrase
+        return choose(value) if isinstance(value, dict) else plain
 
-    return Discriminator(chosen)
+    return by_tag(chosen)
 
 
 class Shorthand:

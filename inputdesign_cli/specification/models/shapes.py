@@ -19,12 +19,9 @@ def as_matrix(value: tuple) -> PolynomialMatrix:
 def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
     """Denominators for each entry have the shape of the numerator."""
     if depth(denominator) == 3 and size_of(denominator) != size_of(as_matrix(numerator)):
-        yield PathDiagnostic(
-            "wrong-shape",
-            "{key} must have the shape of the numerator: " + shape_words(numerator),
-            "or write one polynomial, a denominator common to all entries",
-            ("denominator",),
-        )
+        message = "{key} must have the shape of the numerator: " + shape_words(numerator)
+        hint = "or write one polynomial, a denominator common to all entries"
+        yield PathDiagnostic("wrong-shape", message, hint, ("denominator",))
 
 
 def check_each(
@@ -84,10 +81,6 @@ def check_proper(numerator: Terms, degree: int, *path: str | int) -> Iterator[Pa
     """In s, descending: the degree of the numerator is at most that of the denominator, `degree`."""
     above = len(numerator) - leading(numerator) - 1
     if above > degree:
-        yield PathDiagnostic(
-            "improper-transfer",
-            f"{{key}} has degree {above} in s, more than its denominator ({degree}): the system is "
-            "not proper",
-            "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other",
-            path,
-        )
+        message = f"{{key}} has degree {above} in s, more than its denominator ({degree}): it is not proper"
+        hint = "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other"
+        yield PathDiagnostic("improper-transfer", message, hint, path)

@@ -88,7 +88,7 @@ class Spec(Section):
         default=Cost(input_power=1.0),
         description="Weights of the powers. Default: input_power 1; in closed loop also output_power 1.",
     )
-    accuracy: Accuracy = Field(default=Accuracy(), description="What the model must reach.")
+    accuracy: Accuracy = Field(default_factory=Accuracy, description="What the model must reach.")
     objective: Objective | None = optional(
         "least_cost, best_accuracy or shortest_experiment; default: from the rest."
     )
@@ -141,15 +141,12 @@ class Spec(Section):
     def revised(
         self, changes: Mapping[str, object], *, file: str = "<spec>", design: bool | None = None
     ) -> Spec:
-        """Return the spec with other values at some dotted keys, checked as a whole.
+        """Return the spec with other values at dotted keys, as `with_`.
 
         Args:
             changes: values by key; None removes a key.
             file: what diagnostics about the new values name as their file.
             design: as for `from_dict` (default: as this spec).
-
-        Raises:
-            SpecError: everything that is wrong with the new one.
         """
         for key in changes:
             if "=" in key:

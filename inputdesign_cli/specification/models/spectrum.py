@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal, cast
 
-from pydantic import Discriminator, Field
+from pydantic import Field
 
 from inputdesign_cli.specification.models.fields import (
     Band,
@@ -20,10 +20,10 @@ from inputdesign_cli.specification.models.fields import (
     depth,
 )
 from inputdesign_cli.specification.models.section import (
-    TAG,
     PathDiagnostic,
     Section,
     Wording,
+    by_tag,
     optional,
     pick,
     tag,
@@ -121,7 +121,7 @@ class GivenWhite(Section, family="given", phrase="type: white"):
 Amplitudes = Annotated[
     Annotated[Several[Number], Wording("a list of amplitudes, one per frequency"), tag("1")]
     | Annotated[Several[Several[Number]], tag("2")],
-    Discriminator(lambda value: f"{TAG}{depth(value)}"),
+    by_tag(lambda value: str(depth(value))),
     Wording("a list of amplitudes, one per frequency, or one such list per input"),
 ]
 
@@ -147,12 +147,10 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
         """Every frequency has an amplitude."""
         wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
         if wrong is not None:
-            held, wanted = count(len(wrong), "amplitude"), len(self.frequencies)
-            message = f"{{key}} holds {held}, and the number of frequencies is {wanted}"
-            lists = "list per input, with one " if depth(self.amplitudes) == 2 else ""
-            yield PathDiagnostic(
-                "wrong-shape", message, f"write one {lists}amplitude per frequency", ("amplitudes",)
-            )
+            held, lists = count(len(wrong), "amplitude"), depth(self.amplitudes) == 2
+            message = f"{{key}} holds {held}, and the number of frequencies is {len(self.frequencies)}"
+            hint = f"write one {'list per input, with one ' if lists else ''}amplitude per frequency"
+            yield PathDiagnostic("wrong-shape", message, hint, ("amplitudes",))
 
 
 class GivenTable(Section, family="given", phrase="type: table"):

@@ -119,8 +119,10 @@ def check_each_proper(above: TermMatrix, below: PolynomialMatrix, levels: int) -
             yield from check_proper(entry, len(below[i][j]) - 1, "numerator", *where)
 
 
-class ContinuousMatrix(TransferMatrix):
-    """A stable transfer matrix in s, coefficients in descending powers."""
+class ContinuousTarget(TransferMatrix):
+    """A stable transfer matrix in s that is written as one, coefficients in descending powers."""
+
+    numerator: RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Numerator and denominator have one shape, the poles lie on the left, every entry is proper."""
@@ -128,15 +130,7 @@ class ContinuousMatrix(TransferMatrix):
             yield from shapes
             return
         yield from check_each(self.denominator, check_left_half_plane, "denominator")
-        yield from check_each_proper(
-            expressed(self.numerator_matrix), self.denominator_matrix, depth(self.numerator)
-        )
-
-
-class ContinuousTarget(ContinuousMatrix):
-    """A transfer matrix in s that is written as one."""
-
-    numerator: RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
+        yield from check_each_proper(expressed(self.numerator_matrix), self.denominator_matrix, 3)
 
 
 class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Discriminator, Field
+from pydantic import AfterValidator, Field
 
 from inputdesign_cli.specification.models.experiment import InformationSource, Values, check_names
 from inputdesign_cli.specification.models.fields import (
     Count,
     CovarianceMatrix,
-    FileName,
+    FileOr,
     Fraction,
     Index,
     Names,
@@ -20,10 +20,10 @@ from inputdesign_cli.specification.models.fields import (
     Several,
 )
 from inputdesign_cli.specification.models.section import (
-    TAG,
     PathDiagnostic,
     Section,
     Wording,
+    by_tag,
     fail,
     optional,
     tag,
@@ -31,10 +31,6 @@ from inputdesign_cli.specification.models.section import (
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.wording import show
 
-CovarianceSource = Annotated[
-    Annotated[FileName, tag("file")] | Annotated[CovarianceMatrix, tag("matrix")],
-    Discriminator(lambda value: TAG + ("file" if isinstance(value, str) else "matrix")),
-]
 SOURCES = ("covariance", "information", "intervals")
 _OF_DRAWS = ("risk", "discard", "seed", "stable_within", "worst_case")
 
@@ -54,14 +50,14 @@ Intervals = Annotated[
 Scenarios = Annotated[
     Annotated[Count, SIZES["uncertainty.scenarios"], tag("number")]
     | Annotated[Several[Values], SIZES["uncertainty.scenarios"], tag("list")],
-    Discriminator(lambda value: TAG + ("list" if isinstance(value, list | tuple) else "number")),
+    by_tag(lambda value: "list" if isinstance(value, list | tuple) else "number"),
 ]
 
 
 class Uncertainty(Section):
     """How well the plant is known, and how the design takes this into account."""
 
-    covariance: CovarianceSource | None = optional(
+    covariance: FileOr[CovarianceMatrix] | None = optional(
         "Covariance of the parameters around the nominal ones: a matrix, or a model that "
         "identify wrote (.yaml)."
     )
@@ -112,29 +108,21 @@ class Uncertainty(Section):
     def check(self) -> Iterator[PathDiagnostic]:
         """The uncertainty is stated once, with names for the rows of a matrix."""
         listed = isinstance(self.scenarios, tuple)
-        if listed:
-            for extra in self.stated(*SOURCES):
-                message = "{key} stands beside a list of scenarios, which is complete"
-                hint = "write scenarios: 200 for plants that are drawn, or remove the one"
-                yield PathDiagnostic("conflicting-keys", message, hint, (extra,), at_key=True)
-            for extra in (key for key in _OF_DRAWS if key in self.model_fields_set):
-                message = "{key} is for plants that are drawn, and these are listed one by one"
-                yield PathDiagnostic("conflicting-keys", message, f"remove {extra}", (extra,), at_key=True)
-        elif not self.stated(*SOURCES):
+        drawn = [key for key in (*SOURCES, *_OF_DRAWS) if key in self.model_fields_set]
+        for extra in drawn if listed else ():
+            message = "{key} is for plants that are drawn, and these are listed one by one"
+            yield PathDiagnostic("conflicting-keys", message, f"remove {extra}", (extra,), at_key=True)
+        if not listed and not self.stated(*SOURCES):
             hint = "add one of them, or list the plants: scenarios: [{b1: 3.2}, {b1: 4.0}]"
             keys = (*SOURCES, "scenarios")
             yield PathDiagnostic("missing-key", "{key} does not say how the plant may vary", hint, keys=keys)
         yield from self.at_most_one(*SOURCES)
         if not listed:
             yield from self.at_most_one("scenarios", "risk")
-        if self.worst_case is not None and self.discard:
-            message = "{key} leaves plants out, and worst_case adds the worst ones"
-            yield PathDiagnostic("conflicting-keys", message, "remove one of the two", ("discard",))
-        if self.risk is not None and self.discard:
-            message = "{key} leaves plants out, and risk draws as many as it takes where none is"
-            hint = "state scenarios: 200 in place of risk; the fresh plants then show how many are missed"
+        for other in self.stated("worst_case", "risk") if self.discard else ():
+            message = f"{{key}} leaves plants out, which does not go with {other}"
+            hint = "remove one of the two, or state scenarios: 200: fresh plants show how many are missed"
             yield PathDiagnostic("conflicting-keys", message, hint, ("discard",))
-        for key in ("covariance", "information"):
-            matrix = self.covariance if key == "covariance" else self.information
+        for key, matrix in (("covariance", self.covariance), ("information", self.information)):
             if isinstance(matrix, tuple):
                 yield from check_names(self.parameters, len(matrix), key)

@@ -46,14 +46,14 @@ def without_unit(text: str, measure: Measure | None, time_unit: str | None) -> s
     of = None if measure is None else measure.of
     if unit == "%":
         return _percent(number, of)
-    value, seconds = float(number), "s" if of == "seconds" else time_unit
     # A named parameter may be of any quantity; its unit shows which.
-    if of in ("time", "seconds") or (of is None and _seconds(unit)):
-        return _time(number, _seconds(unit), seconds)
-    if of == "frequency" or (of is None and (unit in _RADIANS or unit.startswith("rad/"))):
-        return _frequency(number, value, unit, seconds)
+    for quantity in ("time", "frequency"):
+        if of == quantity or (of is None and _size(unit, quantity)):
+            return _converted(number, unit, quantity, time_unit)
+    if of == "seconds":
+        return _converted(number, unit, "time", "s")
     moved, _, per = unit.rpartition("/")
-    if of == "move" and moved and _seconds(per):
+    if of == "move" and moved and _size(per, "time"):
         return f"write the change in a sample, in the unit of the signal: {number} {unit} times sample_time"
     if of in ("signal", "move"):
         return f"write {number}, in the unit of the signal"
@@ -66,36 +66,26 @@ def _percent(number: str, of: str | None) -> str:
         return f"write it as a fraction: {share}"
     if of in ("signal", "move"):
         return f"write {number}, in the unit of the signal"
-    if of is not None:
-        return f"this is no fraction of anything; write a {of if of == 'frequency' else 'time'}"
     return f"write {share} where a fraction is meant, and {number} where the unit is percent"
 
 
-def _seconds(unit: str) -> str | None:
-    """The `time_unit` that a text names."""
-    return unit if unit in SECONDS else synonym(unit.lower(), SECONDS)
+def _size(unit: str, quantity: str) -> float | None:
+    """A unit in seconds, or in rad/s; None if it is not known."""
+    if quantity == "frequency":
+        long = _size(unit.removeprefix("rad/"), "time") if unit.startswith("rad/") else None
+        return 1.0 / long if long else _RADIANS.get(unit)
+    return SECONDS.get(unit) or SECONDS.get(synonym(unit.lower(), SECONDS) or "")
 
 
-def _time(number: str, unit: str | None, wanted: str | None) -> str:
-    if wanted is None:
-        return "write the number alone, in time_unit" + (f": {number} if that is {unit}" if unit else "")
-    if wanted not in SECONDS:
-        return f"write {number} and time_unit: {unit}" if unit else f"write the number alone: {number}"
-    if unit is None:
-        return f"write the number alone, in {wanted}"
-    if unit == wanted:
+def _converted(number: str, unit: str, quantity: str, time_unit: str | None) -> str:
+    """The hint for a time or a frequency; a `time_unit` that is not known is named."""
+    size, rate = _size(unit, quantity), quantity == "frequency"
+    named = f"{'rad/' if rate else ''}{time_unit or 'time_unit'}"
+    if time_unit not in SECONDS or size is None:
+        same = f": {number} if that is {unit}" if size is not None and not rate else ""
+        return f"write the number alone, in {named}{same}"
+    wanted = 1.0 / SECONDS[time_unit] if rate else SECONDS[time_unit]
+    if size == wanted:
         return f"write the number without a unit: {number}"
-    return f"write {float(number) * SECONDS[unit] / SECONDS[wanted]:.10g}: times are in {wanted} here"
-
-
-def _frequency(number: str, value: float, unit: str, wanted: str | None) -> str:
-    if wanted is None or wanted not in SECONDS:
-        return "write the number alone, in rad per time_unit"
-    per, _, base = unit.partition("/")
-    known = _seconds(base) if per == "rad" else None
-    rate = 1.0 / SECONDS[known] if known else _RADIANS.get(unit)
-    if rate is None:
-        return f"write the number alone, in rad/{wanted}"
-    if known == wanted:
-        return f"write the number without a unit: {number}"
-    return f"write {value * rate * SECONDS[wanted]:.10g}: frequencies are in rad/{wanted} here"
+    many = "frequencies" if rate else "times"
+    return f"write {float(number) * size / wanted:.10g}: {many} are in {named} here"

@@ -24,26 +24,6 @@ _SYNONYMS = {
     "filtered_noise": ("gaussian",),
 }
 
-# Methods of sampling in other programs.
-_OTHER_SAMPLING = {
-    *(
-        "foh",
-        "first_order_hold",
-        "linear",
-        "tustin",
-        "bilinear",
-        "trapezoidal",
-        "prewarp",
-        "matched",
-        "impulse",
-    ),
-    *("euler", "forward", "backward", "backward_diff"),
-}
-_IN_SAMPLES = (
-    " (an input that is held between samples, as converters do), or write what is sampled otherwise as "
-    "polynomials in q^-1"
-)
-
 
 def describe(value: object) -> str:
     """Return a value in words: "the number 5", "a list"."""
@@ -97,9 +77,6 @@ def unknown_word(value: object, known: Sequence[str]) -> tuple[str, str]:
     """Return message and hint for a value that is no known word."""
     message = f"{{key}} must be {choices(known)}, not {describe(value)}"
     word = value if isinstance(value, str) else ""
-    if "zoh" in known and word.lower() in _OTHER_SAMPLING:
-        supported = choices([f"sample: {method}" for method in known])
-        return message, f"{word} is not supported: write {supported}{_IN_SAMPLES if len(known) == 1 else ''}"
     near = nearest(word, known)
     if near is None and len(known) == 1:
         return message, f"write {known[0]}"

@@ -72,11 +72,10 @@ def decode(raw: bytes, file: str) -> str:
         # Everything before the bad byte decodes, so the place can be counted in characters.
         before = error.object[: error.start].decode("utf-8", errors="replace")
         rows = (before + "|").splitlines()
-        byte = error.object[error.start]
         text = error.object.decode("utf-8", errors="replace").splitlines()[len(rows) - 1]
         place = Location(file, len(rows), len(rows[-1]), text)
         hint = "save the file as UTF-8 (an editor may have used Latin-1 or Windows-1252)"
-        message = f"the byte 0x{byte:02X} is not UTF-8"
+        message = f"the byte 0x{error.object[error.start]:02X} is not UTF-8"
         raise SpecError.because("file-encoding", message, hint, location=place) from None
 
 

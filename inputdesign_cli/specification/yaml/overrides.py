@@ -39,13 +39,15 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
             location = tree.places.location(tree.places.mark(path, at_key=True))
             raise SpecError(outside(name, confine, format_key(path), location))
         included = _read(tree, path, folder, name)
-        if not isinstance(included.data, dict) or KEY in included.data:
-            what = "includes others itself" if isinstance(included.data, dict) else "holds no blocks"
+        what = ""
+        if not isinstance(included.data, dict):
+            what = "holds no blocks"
+        elif KEY in included.data:
+            what = "includes others itself"
+        elif not known & included.data.keys():
+            what = "holds no block of a spec"
+        if what:
             raise _refused(tree, path, f"{name} {what}", "name a file with plant: and noise:")
-        if not known & included.data.keys():
-            raise _refused(
-                tree, path, f"{name} holds no block of a spec", "name a file with plant: and noise:"
-            )
         tree.included.append(name)
         tree.places.sources.append(included.places.sources[0])
         tree.diagnostics.extend(included.diagnostics)
@@ -90,10 +92,7 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
         hint = "remove one of them: the spec and what it includes are put together"
         if key in _CLOCK:
             message = f"{{key}} is {holder[key]} here and {value} in {place}"
-            hint = (
-                f"remove {key} here: what a file includes holds at the sample time of its data; to sample "
-                "otherwise, write plant and noise here"
-            )
+            hint = f"remove {key} here, or write plant and noise here to sample them otherwise"
         tree.diagnostics.extend(_refused(tree, path, message, hint).diagnostics)
         tree.broken.add(path)
 
@@ -112,11 +111,10 @@ def compose(
     known: Collection[str],
     confine: FilePath | None = None,
 ) -> None:
-    """Join included files to the spec, then apply overrides; `--set include=..` comes first.
+    """Join included files to the spec as it is written, then apply overrides (`--set include=..` first).
 
     Args:
-        tree: the spec as it is written.
-        folder: what names of files are relative to.
+        tree, folder: the spec, and what names of files are relative to.
         overrides: `key.path=value` texts.
         known: the names of blocks.
         confine: the folder outside of which nothing may be included.
@@ -142,8 +140,7 @@ def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
 
 def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError:
     """What is wrong with an override, at a column of its text."""
-    first = override.splitlines()[0] if override else ""
-    location = Location(f"--set {override}", 1, column, first)
+    location = Location(f"--set {override}", 1, column, override.partition("\n")[0])
     return SpecError.because("bad-override", message, hint, location=location)
 
 
@@ -195,20 +192,19 @@ def _resolve(data: Plain, key: str, override: str) -> Path:
     for step in path:
         above = format_key(found)
         if isinstance(data, list):
-            index = int(step) if isinstance(step, int) or (step.isascii() and step.isdecimal()) else None
-            if index is None or index >= len(data):
+            index = int(step) if str(step).isascii() and str(step).isdecimal() else len(data)
+            if index >= len(data):
                 has = f"entries 0 to {len(data) - 1}" if data else "no entries"
                 message = f"{above} is a list with {has}; there is no entry {step}"
                 raise _error(override, message, f"give the whole list: --set {above}=[..]")
             found.append(index)
             data = data[index]
-            continue
-        if data is not None and not isinstance(data, dict):
+        elif data is None or isinstance(data, dict):
+            found.append(str(step))
+            data = data.get(str(step)) if data else None
+        else:
             message = f"{above} is a single value, so it has no part {step}"
             raise _error(override, message, f"give the whole value: --set {above}=..")
-        step = str(step)
-        found.append(step)
-        data = data.get(step) if isinstance(data, dict) else None
     return tuple(found)
 
 
@@ -218,20 +214,15 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
     places = tree.places
     node: Plain = tree.data
     for depth, step in enumerate(path[:-1], start=1):
-        here = path[:depth]
-        if _child(node, step) is None:
-            node[step] = {}
-            places.keys[here] = places.values[here] = mark
-        node = _child(node, step)
+        child = node.get(step) if isinstance(node, dict) else node[step]
+        if child is None:
+            child = node[step] = {}
+            places.keys[path[:depth]] = places.values[path[:depth]] = mark
+        node = child
     places.forget(path)
-    last = path[-1]
     if value.data is None and isinstance(node, dict):
-        node.pop(last, None)
+        node.pop(path[-1], None)
         return
-    node[last] = value.data
+    node[path[-1]] = value.data
     places.keys[path] = places.values[path] = mark
     places.adopt(value.places, path)
-
-
-def _child(node: Plain, step: str | int) -> Plain:
-    return node.get(step) if isinstance(node, dict) else node[step]

@@ -1,4 +1,4 @@
-"""A weighted sum of variances of parameters stays below a limit."""
+"""A variance integrated over frequency stays below a limit."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from inputdesign_cli.arrays import Array
 
 
 @dataclass(frozen=True)
-class TotalVariance(OneCondition):
+class IntegratedVariance(OneCondition):
     """tr(V^T P V) <= 1, V = `directions` (k, q), in the coordinates of the experiment."""
 
     directions: Array
 
     @property
     def name(self) -> str:
-        return "total_variance"
+        return "integrated_variance"
 
     def ratio(self, information: Array) -> float:
         """The root of tr(V^T M^-1 V)."""
