@@ -188,12 +188,6 @@ def test_a_true_plant_in_s_of_one_channel():
     assert truth["b1"] == pytest.approx(5.0 * (1.0 - np.exp(-0.4)))
 
 
-def test_filtered_noise_of_a_plant_that_is_not_sampled_is_refused():
-    with pytest.raises(SpecError) as caught:
-        simulate(parse_spec(IN_SECONDS, overrides=["noise.C=[1, 0.5]"]))
-    assert [(c.code, c.key) for c in caught.value.diagnostics] == [("unsuitable-key", "noise.C")]
-
-
 def test_prior_information_narrows_the_estimates():
     prior = "experiment.prior={information: [[1.0e+5]], parameters: ['a1[1]']}"
     given = ["spectrum={given: {type: white, power: 5}}", "simulation={runs: 150}", prior]

@@ -8,8 +8,8 @@ import pytest
 import scipy.io
 import scipy.io.wavfile
 
-from inputdesign_cli import load_spec, solve, validate
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli import load_spec, solve
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
 
@@ -87,30 +87,3 @@ def test_what_is_applied_to_several_inputs(tmp_path):
         assert np.all(entry.r_u_record <= entry.r_adm * (1 + 1e-9))
     names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
     assert {"signal.mat", "signal.wav", "signal.png", "spectrum.png", "bound.png"} <= names
-
-
-BAD = [
-    (["signal.periods=3"], "conflicting-keys", "signal.periods"),
-    (["signal.periods=50"], "conflicting-keys", "signal.periods"),
-    (["signal.hold=7"], "conflicting-keys", "signal.hold"),
-    (["signal.bits=3", "signal.type=prbs"], "out-of-range", "signal.bits"),
-    (["signal.lines=[1, 200]"], "out-of-range", "signal.lines"),
-    (["signal.ramp=10", "signal.type=binary"], "unsuitable-key", "signal.ramp"),
-    (["signal.amplitudes=[1, 9]", "limits.amplitude=[2, 8]"], "conflicting-keys", "signal.amplitudes"),
-    (["signal.quantisation={bits: 4, range: [9, 9, 9]}"], "wrong-shape", "signal.quantisation.range"),
-    (
-        ["signal.quantisation={bits: 4, range: 9}", "signal.offset=[0, 9]"],
-        "coarse-converter",
-        "signal.offset",
-    ),
-    (["signal.quantisation={bits: 4, range: 9}", "limits.rate=[2, 1]"], "coarse-converter", "limits.rate"),
-]
-
-
-@pytest.mark.parametrize(("changes", "code", "key"), BAD, ids=[" ".join(changes) for changes, _, _ in BAD])
-def test_bad_settings_name_the_key(changes, code, key):
-    with pytest.raises(SpecError) as error:
-        validate(load_spec(SPEC, changes))
-    (diagnostic,) = error.value.diagnostics
-    assert (diagnostic.code, diagnostic.key) == (code, key)
-    assert diagnostic.hint
