@@ -358,12 +358,65 @@ not-supported signal.phases | signal.phases=schroeder
 """),
     "first_order": (None, """
 unknown-parameter report.ellipses[0][1] | report.ellipses=[[b1, f2]]
+out-of-range accuracy.model_error.confidence.exact | accuracy={model_error: {absolute: 0.1, confidence:
+  {exact: 1.2}}}
+out-of-range accuracy.model_error.confidence.draws | accuracy={model_error: {absolute: 0.1, confidence:
+  {exact: 0.99, draws: 100}}}
+out-of-range accuracy.model_error.confidence.runs | accuracy={model_error: {absolute: 0.1, confidence: {exact:
+  0.99, runs: 100}}}
+out-of-range accuracy.model_error.confidence.runs | accuracy={model_error: {absolute: 0.1, confidence: {exact:
+  0.99, runs: -1}}}
+too-large accuracy.model_error.confidence.draws | accuracy={model_error: {absolute: 0.1, confidence: {exact:
+  0.9, draws: 1.0e9}}}
+missing-key accuracy.model_error.confidence | accuracy={model_error: {absolute: 0.1, confidence: {draws: 10}}}
+conflicting-keys accuracy.model_error.confidence.exact | accuracy={model_error: {absolute: 0.1, confidence:
+  {exact: 0.9, ellipsoid: 0.9}}}
+conflicting-keys accuracy.model_error.region | accuracy={model_error: {absolute: 0.1, confidence: {exact:
+  0.9}, region: ellipsoid}}
 """),
     "regression": (None, """
 not-supported report.ellipses | report.ellipses=[[b1, b2]]
 """),
     "distillation_column": (None, """
 not-supported report.ellipses | report.ellipses=[[b1, b2]]
+not-square accuracy.closed_loop_error.control | plant.B=[[[0,1],[0,0.2],[0,0.3]],[[0,0.5],[0,1],[0,1]]]
+not-square accuracy.closed_loop_error.control.model_reference.numerator |
+  accuracy.closed_loop_error.control.model_reference={numerator: [[[0, 1], [0, 0.2]]]}
+non-minimum-phase accuracy.closed_loop_error.control.model_reference | plant.B=[[[0, 1, 2], [0, 0.2]], [[0,
+  0.5], [0, 1]]]
+non-minimum-phase accuracy.closed_loop_error.control.minimum_variance | plant.B=[[[0, 1, 2], [0, 0.2]], [[0,
+  0.5], [0, 1]]] | CONTROL={minimum_variance: true}
+delay-too-short accuracy.closed_loop_error.control.model_reference |
+  accuracy.closed_loop_error.control.model_reference={numerator: [0.5], denominator: [1, -0.5]}
+delay-too-short accuracy.closed_loop_error.control.model_reference |
+  accuracy.closed_loop_error.control.model_reference={continuous: {numerator: [1, 1], denominator: [75, 1]}}
+delay-too-short accuracy.closed_loop_error.control.model_reference | plant.B=[[[0, 0, 1], [0]], [[0], [0, 0,
+  1]]]
+infinite-criterion accuracy.closed_loop_error.control.model_reference | plant.B=[[[0, 1, -1], [0, 0]], [[0,
+  0], [0, 1]]]
+infinite-criterion accuracy.closed_loop_error.control.internal_model | plant.B=[[[0, 1, 1], [0, 0]], [[0, 0],
+  [0, 1]]] | CONTROL={internal_model: {numerator: [0.5], denominator: [1, -0.5]}}
+singular-plant plant.B | plant.B=[[[0, 1], [0, 1]], [[0, 2], [0, 2]]]
+unstable-polynomial accuracy.closed_loop_error.reference.filter.denominator |
+  accuracy.closed_loop_error.reference={filter: {numerator: [1], denominator: [1, -1]}}
+unstable-polynomial accuracy.closed_loop_error.control.model_reference.denominator |
+  accuracy.closed_loop_error.control.model_reference={numerator: [[[0, 1], [0]], [[0], [0, 1]]], denominator:
+  [1, -1.1]}
+wrong-shape accuracy.closed_loop_error.control.model_reference.denominator |
+  accuracy.closed_loop_error.control.model_reference={numerator: [[[0, 1], [0]], [[0], [0, 1]]], denominator:
+  [[[1]]]}
+no-feedback accuracy.closed_loop_error.control.minimum_variance | noise.C=[1, -0.9736857494] |
+  CONTROL={minimum_variance: true}
+needs-limits accuracy.closed_loop_error | limits=null
+not-supported limits.amplitude.output | limits.amplitude={output: 3}
+not-supported limits.input_power.min | limits.input_power={max: 2, min: 1}
+not-supported spectrum.type | spectrum={type: fir, order: 3}
+not-supported accuracy.model_error | accuracy.model_error={relative: 0.1}
+not-supported accuracy.closed_loop_error.control.minimum_variance | plant.B=[[[0, 1], [0, 0]], [[0, 0], [0, 0,
+  1]]] | CONTROL={minimum_variance: true}
+conflicting-keys signal.periods | signal.periods=3
+unsuitable-key signal.order | signal={type: multisine, order: 4}
+not-supported signal.type | signal={type: filtered_noise} | accuracy.closed_loop_error.covariance=parametric
 """),
     "first_order_given": (None, """
 not-supported limits.spectrum | limits={spectrum: 5}
@@ -412,7 +465,12 @@ ROWS = [
     for name, (_, table) in TABLES.items()
     for row in re.split(r"\n(?! )", table.strip())
 ]
-NAMES = {"=ONE": f"={ONE}", "=TWO": f"={' '.join(TWO.split())}", "COVARIANCE": COVARIANCE}
+NAMES = {
+    "CONTROL": "accuracy.closed_loop_error.control",
+    "=ONE": f"={ONE}",
+    "=TWO": f"={' '.join(TWO.split())}",
+    "COVARIANCE": COVARIANCE,
+}
 # Complaints of the schema, which say all in their message.
 PLAIN = ("not-a-number", "out-of-range", "unknown-word", "zero-polynomial")
 

@@ -9,7 +9,6 @@ import scipy.io
 import scipy.io.wavfile
 
 from inputdesign_cli import load_spec, solve
-from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
 
@@ -31,26 +30,6 @@ def test_limits_on_each_channel():
     record = outcome.tables["signal"].columns
     np.testing.assert_allclose(np.abs(record["u1"] - 1).max(), signal["peak"][0])
     assert outcome.curves["signal"].limits["u2"] == (-33, 37)
-
-
-def test_a_record_that_is_too_short_names_one_that_is_not():
-    changes = [
-        "spectrum.order=4",
-        "limits.amplitude=[7.65, 20.8]",
-        "signal.type=binary",
-        "signal.candidates=1",
-    ]
-    with pytest.raises(InfeasibleError) as error:
-        solve(load_spec(SPEC, changes))
-    (diagnostic,) = error.value.diagnostics
-    assert diagnostic.code == "limits-too-tight"
-    assert diagnostic.key == "limits.amplitude"
-    length = int(diagnostic.hint.split()[0])
-    assert 500 < length < 1000
-    longer = [f"experiment.samples={length}", f"signal.samples={length}"]
-    signal = solve(load_spec(SPEC, [*changes, *longer, "signal.candidates=4"])).result["signal"]
-    assert signal["worst_ratio"] <= 1 + 1e-9
-    assert np.all(np.array(signal["peak"]) <= [7.65, 20.8])
 
 
 def test_what_is_applied_to_several_inputs(tmp_path):
