@@ -54,7 +54,7 @@ def first_order():
 
 @pytest.fixture(scope="session")
 def campaigns(tmp_path_factory):
-    """A folder with a campaign as it has `begun`, and as it is after the record `r1.csv`: `once`; `r2.csv`."""
+    """A folder with a campaign as it has `begun`, and as it is after `r1.csv`: `once`; and `r2.csv`."""
     folder = tmp_path_factory.mktemp("campaigns")
     (folder / "s.yaml").write_text(SPEC)
     with pytest.MonkeyPatch.context() as patch:
