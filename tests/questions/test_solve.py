@@ -136,13 +136,6 @@ def test_the_bound_over_every_spectrum_can_be_left_out(kind):
     assert any("--fast" in note for note in fast.get("notes", [])) is not free
 
 
-def test_prior_that_suffices():
-    prior = "{information: [[1.0e+9, 0, 0], [0, 1.0e+9, 0], [0, 0, 1.0e+9]]}"
-    outcome = solve(spec_of(SMALL, experiment__prior=prior))
-    assert outcome.result["cost"] == 0.0
-    assert "signal" not in outcome.tables
-
-
 TABLES = [
     ("frequency_rad_per_s,r_adm\n0.1,1\n1,1\n", "bad-table", "covers 0.1 to 1"),
     ("frequency,r_adm\n0,1\n3.2,-1\n", "bad-table", "row 3"),
