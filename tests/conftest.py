@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import signal
 from pathlib import Path
 
@@ -13,6 +14,8 @@ os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before n
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.questions.building.system import build_experiment
+from tests.support.campaigns import SPEC, applied
+from tests.support.commands import caller
 
 SPECS = Path(__file__).parent.parent / "specs"
 # New objects before the collector of cycles looks at them: by itself it does so every 700.
@@ -47,3 +50,19 @@ def flexible():
 def first_order():
     """The first-order Box-Jenkins system, N = 500."""
     return build_experiment(load_spec(SPECS / "first_order.yaml"))
+
+
+@pytest.fixture(scope="session")
+def campaigns(tmp_path_factory):
+    """A folder with a campaign as it has `begun`, and as it is after `r1.csv`: `once`; and `r2.csv`."""
+    folder = tmp_path_factory.mktemp("campaigns")
+    (folder / "s.yaml").write_text(SPEC)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        run = caller(patch)
+        assert run("campaign", "s.yaml", "-o", "begun", "--no-figures", "--quiet")[0] == 0
+        shutil.copytree("begun", "once")
+        record = applied(folder / "begun", folder / "r1.csv")
+        assert run("next", "once", record, "--no-figures", "--quiet")[0] == 0
+    applied(folder / "once", folder / "r2.csv")
+    return folder

@@ -14,10 +14,10 @@ from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from inputdesign_cli.sweeps.layout import at_work
 from inputdesign_cli.sweeps.running import run_sweep
-from tests.support.campaigns import SPEC, applied
+from tests.support.campaigns import SPEC
 from tests.support.commands import caller
 from tests.support.outcomes import typed
-from tests.test_architecture import FILES, ROOT
+from tests.test_architecture import FILES, ROOT, tree_of
 
 OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loadtxt", "genfromtxt", "cmp"}
 # Where a file is opened otherwise than by `read_regular`, how often, and why nothing waits there.
@@ -40,7 +40,7 @@ OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.records.tex
 
 def opened(path: Path) -> int:
     """How often a file of the package opens another one."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     ours = {
         alias.name
         for node in ast.walk(tree)
@@ -87,32 +87,13 @@ KEPT = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    """A campaign with one record, and the record of its next part."""
-    folder = tmp_path_factory.mktemp("campaign")
-    (folder / "s.yaml").write_text(SPEC)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-
-        class Captured:
-            def readouterr(self):
-                return "", ""
-
-        run = caller(patch, Captured())
-        assert run("campaign", "s.yaml", "-o", "c", "--no-figures", "--quiet")[0] == 0
-        assert run("next", "c", applied(folder / "c", folder / "r1.csv"), "--no-figures", "--quiet")[0] == 0
-    applied(folder / "c", folder / "r2.csv")
-    return folder
-
-
 @pytest.mark.parametrize("name", KEPT)
-def test_a_pipe_in_a_campaign_is_not_waited_for(campaign, tmp_path, monkeypatch, capsys, name):
-    shutil.copytree(campaign / "c", tmp_path / "c")
+def test_a_pipe_in_a_campaign_is_not_waited_for(campaigns, tmp_path, monkeypatch, capsys, name):
+    shutil.copytree(campaigns / "once", tmp_path / "c")
     piped(tmp_path / "c" / name)
     monkeypatch.chdir(tmp_path)
     run = caller(monkeypatch, capsys)
-    for command in (["next", "c", campaign / "r2.csv", "--no-figures"], ["status", "c"], ["report", "c"]):
+    for command in (["next", "c", campaigns / "r2.csv", "--no-figures"], ["status", "c"], ["report", "c"]):
         with in_time():
             code, _, err = run(*command)
         assert code in (0, 2), err

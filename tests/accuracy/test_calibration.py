@@ -7,12 +7,10 @@ import pytest
 import scipy.optimize
 import scipy.signal
 import scipy.stats
-from typer.testing import CliRunner
 
 from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.accuracy.calibration import Calibration
-from inputdesign_cli.cli import app
-from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
+from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.questions.common.confidence import settled_alpha
 from inputdesign_cli.questions.task import build_task
 
@@ -103,31 +101,6 @@ def test_it_says_when_there_is_none():
     with pytest.raises(InaccurateError, match="no alpha was found") as caught:
         settled_alpha(lambda alpha: 2.0 * alpha, 1.0)
     assert caught.value.diagnostics[0].code == "confidence-not-settled"
-
-
-@pytest.mark.parametrize(
-    ("confidence", "code"),
-    [
-        ("{exact: 1.2}", "out-of-range"),
-        ("{exact: 0.99, draws: 100}", "out-of-range"),
-        ("{exact: 0.99, runs: 100}", "out-of-range"),
-        ("{exact: 0.99, runs: -1}", "out-of-range"),
-        ("{exact: 0.9, draws: 1.0e9}", "too-large"),
-        ("{draws: 10}", "missing-key"),
-        ("{exact: 0.9, ellipsoid: 0.9}", "conflicting-keys"),
-    ],
-)
-def test_what_cannot_be_calibrated_is_refused(confidence, code):
-    with pytest.raises(SpecError) as caught:
-        spec(FIR, confidence)
-    assert code in {d.code for d in caught.value.diagnostics}
-
-
-def test_an_ellipsoid_has_no_exact_confidence(tmp_path):
-    (tmp_path / "a.yaml").write_text(FIR.replace("CONFIDENCE}", "{exact: 0.9}, region: ellipsoid}"))
-    done = CliRunner().invoke(app, ["validate", str(tmp_path / "a.yaml")])
-    assert done.exit_code == 2
-    assert "remove region" in done.stderr
 
 
 GAIN = """

@@ -11,7 +11,7 @@ from inputdesign_cli.identification.periodic_response import Periods
 PERIOD = 100
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     degree=st.integers(0, 3),

@@ -9,7 +9,7 @@ from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.identification.spikes import period_spikes
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     scale=st.floats(-100, 100),
@@ -42,7 +42,7 @@ def test_what_is_frequent_or_without_spread_is_no_spike():
     assert spikes(np.zeros((50, 1))) == []
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(
     seed=st.integers(0, 2**32 - 1),
     blocks=st.integers(1, 2),

@@ -98,13 +98,6 @@ def test_parameters_that_the_band_cannot_tell_apart_are_named():
     assert caught.value.diagnostics[0].code == "not-identifiable"
 
 
-def test_noise_only_information_of_an_autoregression():
-    """AR(1) without input: M = N / (1 - a^2), whatever the variance."""
-    model = PolynomialModel.single([0.0, 1.0], A=[1.0, -0.8], variance=3.0)
-    M0 = Experiment(model, 200).baseline_information
-    np.testing.assert_allclose(M0, [[200 / (1 - 0.64), 0], [0, 0]], rtol=1e-11, atol=1e-8)
-
-
 def test_information_of_an_arx_model_with_white_input():
     """y + a y(t-1) = b u(t-1) + e: E y^2 = (b^2 P + sigma^2) / (1 - a^2), E y u(t-.) at lag one of phi: 0."""
     a, b, variance, power, N = -0.7, 2.0, 0.5, 1.3, 100

@@ -54,26 +54,6 @@ def test_closed_form_of_one_cosine():
     np.testing.assert_allclose([sd["b1"], sd["f1"]], np.sqrt(np.diag(np.linalg.inv(expected))), rtol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["{type: multisine, lines: 30}", "{type: free}"])
-def test_designed_sinusoids_given_back_as_a_table(tmp_path, kind):
-    """The powers in spectrum.csv buy what the same sinusoids buy as amplitudes."""
-    design = solve(parse_spec(BASE.replace("{given: GIVEN}", kind)))
-    columns = design.tables["spectrum"].columns
-    w, powers = columns["frequency_rad_per_s"], columns["power"]
-    table = tmp_path / "spectrum.csv"
-    rows = "\n".join(f"{a:.17g},{b:.17g}" for a, b in zip(w, powers, strict=True))
-    table.write_text("frequency_rad_per_s,power\n" + rows + "\n", encoding="utf-8")
-    outcome = analyse(spec_of(f"{{type: table, file: {table}}}"))
-    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-4)
-    assert outcome.result["power"]["input"] == pytest.approx(powers.sum())
-    amplitudes = [float(v) for v in np.sqrt(2.0 * powers)]
-    written = f"{{type: multisine, frequencies: {[float(v) for v in w]}, amplitudes: {amplitudes}}}"
-    by_amplitude = analyse(spec_of(written))
-    np.testing.assert_allclose(
-        outcome.result["information"]["matrix"], by_amplitude.result["information"]["matrix"], rtol=1e-9
-    )
-
-
 def test_a_table_of_sinusoids_has_nonnegative_powers(tmp_path):
     table = tmp_path / "spectrum.csv"
     table.write_text("frequency,power\n0.3,1\n0.9,-0.2\n", encoding="utf-8")
@@ -91,23 +71,6 @@ def test_a_flat_table_is_white_noise(tmp_path):
         tabulated.result["information"]["matrix"], white.result["information"]["matrix"], rtol=1e-9
     )
     assert tabulated.result["power"]["output"] == pytest.approx(white.result["power"]["output"])
-
-
-def test_a_designed_spectrum_analysed_keeps_its_promise(tmp_path):
-    """spectrum.csv of a run, given back as a table, meets the accuracy with ratio one."""
-    design = solve(parse_spec(BASE.replace("{given: GIVEN}", "{type: fir, order: 6}")))
-    columns = design.tables["spectrum"].columns
-    table = tmp_path / "phi.csv"
-    w = np.linspace(0.0, np.pi, 6001)
-    c = np.asarray(design.result["spectrum"]["coefficients"])
-    phi = c[0] + 2 * np.cos(np.outer(w, np.arange(1, 7))) @ c[1:]
-    assert np.interp(0.4, w, phi) == pytest.approx(
-        np.interp(0.4, columns["frequency_rad_per_s"], columns["phi"]), rel=1e-3
-    )
-    rows = "\n".join(f"{a:.17g},{max(b, 0.0):.17g}" for a, b in zip(w, phi, strict=True))
-    table.write_text("frequency,phi\n" + rows + "\n", encoding="utf-8")
-    outcome = analyse(spec_of(f"{{type: table, file: {table}}}"))
-    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-4)
 
 
 def test_a_signal_is_judged_by_its_own_samples(tmp_path):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.common.spectrum import axis, distinct
 
 SPECS = Path(__file__).parents[2] / "specs"
@@ -47,22 +46,6 @@ def test_an_axis_ends_where_the_band_does():
 def test_a_cluster_is_one_frequency_in_any_unit(unit):
     w = unit * np.array([0.0, 1e-9, 0.2, 0.20001, 3.0])
     assert distinct(w, 3.0 * unit) == pytest.approx(unit * np.array([0.0, 0.2, 3.0]))
-
-
-def test_the_hint_for_one_channel_speaks_of_one_channel():
-    with pytest.raises(SpecError) as caught:
-        solve(
-            parse_spec(
-                "plant: {A: [1, -0.9], B: [0, 1]}\nnoise: {variance: 1}\n"
-                "experiment: {samples: 100, controller: {numerator: [3], denominator: [1]}}\n"
-                "cost: {input_power: 1}\naccuracy: {model_error: {relative: 0.1}}\n"
-                "spectrum: {type: fir, order: 2}\n"
-            )
-        )
-    (found,) = caught.value.diagnostics
-    assert found.code == "unstable-loop"
-    assert "ascending" in found.hint
-    assert "column" not in found.hint
 
 
 def test_a_record_stands_beside_a_design_per_sample():

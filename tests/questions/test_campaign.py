@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, simulate, solve
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.identification import identify, information_of_data
 from inputdesign_cli.outcome.units import Units
@@ -65,24 +64,6 @@ def test_a_schedule_ends_at_its_longest():
         done += take
     assert done == 33
     assert schedule.looks == 5  # 5, 10, 5 and, beyond the 20 samples, 10 and 3
-
-
-@pytest.mark.parametrize(
-    ("overrides", "code"),
-    [
-        (["campaign.stages=[100, 50]", "campaign.block=null"], "conflicting-keys"),
-        (["campaign.block=300"], "conflicting-keys"),
-        (["campaign.max_samples=100"], "conflicting-keys"),
-        (["campaign.stages=[100, 100]"], "conflicting-keys"),
-        (["spectrum={given: {type: white, power: 1}}"], "not-supported"),
-        (["objective=best_accuracy", "limits.input_power=1"], "not-supported"),
-        (["campaign.blok=3"], "unknown-key"),
-    ],
-)
-def test_what_cannot_be_done_in_parts_is_told(overrides, code):
-    with pytest.raises(SpecError) as refused:
-        build_campaign(parse_spec(SPEC, overrides=overrides))
-    assert refused.value.diagnostics[0].code == code
 
 
 def test_information_is_that_of_the_samples_at_any_model():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import analyse, parse_spec, simulate, solve
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.system import build_model
 
@@ -81,36 +80,3 @@ def test_a_study_on_a_system_that_drifts():
     rest = REST.replace("samples: 100", "samples: 300") + "simulation: {runs: 60, seed: 2}\n"
     found = simulate(spec_of(IN_S, NOISES[1], rest)).result["simulation"]["inputs"]["design"]
     assert found["within_r_u"] > 0.85
-
-
-@pytest.mark.parametrize(
-    ("noise", "code", "key", "words"),
-    [
-        ("{D: [1, -1], variance: 1}", "unstable-polynomial", "noise.D", "drift: true"),
-        ("{D: [1, -1.1], known: [d1], variance: 1}", "unstable-polynomial", "noise.D", "check the signs"),
-        ("{drift: [true, false], variance: 1}", "wrong-shape", "noise.drift", "one for each output"),
-        ("{drift: 3, variance: 1}", "unknown-word", "noise.drift", "true"),
-    ],
-)
-def test_what_is_wrong_with_noise_is_told(noise, code, key, words):
-    with pytest.raises(SpecError) as caught:
-        spec_of(IN_S, noise)
-    (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == (code, key)
-    assert words in found.hint + found.message
-
-
-def test_the_loop_error_refuses_drift():
-    text = """
-plant: {B: [0, 0.2], F: [1, -0.9]}
-noise: {drift: true, variance: 0.1}
-experiment: {samples: 100}
-accuracy: {closed_loop_error: {control: {minimum_variance: true}, reference: {variance: 1}}}
-limits: {input_power: 1}
-"""
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(text))
-    assert (caught.value.diagnostics[0].code, caught.value.diagnostics[0].key) == (
-        "not-supported",
-        "noise.drift",
-    )

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.building.system import build_experiment
 
 REST = """
@@ -61,47 +60,3 @@ def test_loops_are_a_matrix():
     gradients = [experiment.excitation_gradient(w) for experiment in made]
     np.testing.assert_allclose(gradients[0], gradients[1], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(made[0].noise_information, made[1].noise_information, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("controller", "plant", "code", "key"),
-    [
-        ("{pid: {Kp: 0}}", ONE, "out-of-range", "experiment.controller.pid.Kp"),
-        ("{pid: {Kp: 1, Ti: 0}}", ONE, "out-of-range", "experiment.controller.pid.Ti"),
-        ("{pid: {Kp: 1, Td: 1, Tf: 0}}", ONE, "improper-transfer", "experiment.controller.pid.Tf"),
-        ("{pid: {Kp: 1, Ki: 3}}", ONE, "unknown-key", "experiment.controller.pid.Ki"),
-        ("{pid: {Kp: 1, sample: forward}}", ONE, "unknown-word", "experiment.controller.pid.sample"),
-        ("{pid: {Kp: 1}, delay: -1}", ONE, "out-of-range", "experiment.controller.delay"),
-        ("{pid: {Kp: -3, Ti: 1}}", ONE, "unstable-loop", "experiment.controller"),
-        (
-            "{continuous: {numerator: [1], denominator: [1, 0]}}",
-            ONE,
-            "missing-key",
-            "experiment.controller.sample",
-        ),
-        (
-            "{continuous: {numerator: [1, 0], denominator: [1]}, sample: zoh}",
-            ONE,
-            "improper-transfer",
-            "experiment.controller.continuous.numerator",
-        ),
-        ("{pid: {Kp: 1}}", TWO, "wrong-shape", "experiment.controller"),
-        (
-            "{loops: [{output: 3, input: 1, controller: {pid: {Kp: 1}}}]}",
-            TWO,
-            "wrong-shape",
-            "experiment.controller.loops[0].output",
-        ),
-        (
-            "{loops: [{output: 1, input: 1, controller: {pid: {Kp: 1}}}, "
-            "{output: 1, input: 1, controller: {pid: {Kp: 2}}}]}",
-            TWO,
-            "conflicting-keys",
-            "experiment.controller.loops[1]",
-        ),
-    ],
-)
-def test_what_is_wrong_with_a_controller_is_told(controller, plant, code, key):
-    with pytest.raises(SpecError) as caught:
-        build_experiment(spec_of(controller, plant))
-    assert (code, key) in [(found.code, found.key) for found in caught.value.diagnostics]

@@ -6,7 +6,7 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.spectrum import FirBasis, PolynomialBasis
@@ -108,10 +108,3 @@ def test_a_directed_functional_is_the_density_along_that_direction(basis):
     v = v / np.linalg.norm(v) if r > 1 else np.ones(1)
     phi = np.asarray(basis.density(x, np.array([0.7]))).reshape(1, r, r)[0]
     assert basis.directed(0.7, v) @ x == pytest.approx((v.conj() @ phi @ v).real, rel=1e-12)
-
-
-def test_sinusoids_have_no_density():
-    spec = parse_spec(FIR, overrides=["spectrum={type: free}"])
-    with pytest.raises(SpecError) as caught:
-        build_convex(spec)
-    assert caught.value.diagnostics[0].code == "bad-limit"

@@ -28,7 +28,7 @@ def static_gain(theta):
     return theta.get("K", b / (1.0 + below))
 
 
-@pytest.mark.parametrize("integral", [0.0, 0.1], ids=["P", "PI"])
+@pytest.mark.parametrize("integral", [0.0, pytest.param(0.1, marks=pytest.mark.slow)], ids=["P", "PI"])
 def test_the_inverse_of_a_controller_is_no_plant(integral, tmp_path):
     """Control without a reference: u = -C y + dither, and y moves by its own noise."""
     rng = np.random.default_rng(1)
@@ -71,6 +71,7 @@ def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
     assert theta["b1"] == pytest.approx(0.2, abs=4.0 * deviation["b1"])
 
 
+@pytest.mark.slow
 def test_inputs_that_move_together_are_told_apart_by_nothing(tmp_path):
     rng = np.random.default_rng(2)
     u = np.repeat(rng.choice([-1.0, 1.0], 30), 5)
@@ -136,9 +137,8 @@ def test_a_model_far_from_what_the_data_say_without_one_earns_no_trust():
         assert len(contradicted(told)) == far
 
 
-@pytest.mark.parametrize(
-    ("delay", "held", "samples"), [pytest.param(150, 4, 500, marks=pytest.mark.slow), (120, 20, 600)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("delay", "held", "samples"), [(150, 4, 500), (120, 20, 600)])
 def test_a_dead_time_of_a_good_part_of_the_record_is_found(delay, held, samples):
     """Longer than delays are looked for where nothing says that one is there; also by few jumps."""
     rng = np.random.default_rng(3)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve
+from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.task import build_task
-from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS, complaint
+from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS
 
 
 @pytest.mark.parametrize(
@@ -81,84 +81,3 @@ def test_unstable_loops_are_drawn_again_and_counted():
     assert batch.rejected > 0
     for plant in batch.plants:
         assert np.abs(plant.experiment.loop.closed_poles).max() < 0.9981
-
-
-@pytest.mark.parametrize(
-    ("text", "stated", "code", "key"),
-    [
-        (FIRST, "scenarios: [{f1: -0.6}, {a1: 0.3}]", "unknown-parameter", "uncertainty.scenarios[1]"),
-        (FIRST, "scenarios: [{f1: -1.6}]", "no-stable-plant", "uncertainty.scenarios[0]"),
-        (FIRST, "scenarios: [{f1: -1.0}]", "no-stable-plant", "uncertainty.scenarios[0]"),
-        (FIRST, "scenarios: [{c1: 1.0}]", "no-stable-plant", "uncertainty.scenarios[0]"),
-        (PROCESS, "scenarios: [{time_constant: 1.0e-3, dead_time: 2.0}]", "without-effect", "uncertainty"),
-        (FIRST, "scenarios: [{b1: 3}, {b1: 0}]", "not-a-plant", "uncertainty.scenarios[1]"),
-        (PROCESS, "scenarios: [{gain: 0}]", "not-a-plant", "uncertainty.scenarios[0]"),
-        (PROCESS, "scenarios: [{time_constant: 0}]", "not-a-plant", "uncertainty.scenarios[0]"),
-        (PROCESS, "scenarios: [{dead_time: -1.0e-3}]", "not-a-plant", "uncertainty.scenarios[0]"),
-        (PHYSICAL, "scenarios: [{K: -1}]", "not-a-plant", "uncertainty.scenarios[0]"),
-        (PHYSICAL, "scenarios: [{T: 5}]", "not-a-plant", "uncertainty.scenarios[0]"),
-        (FIRST, "covariance: [[1, 0], [0, 1]]", "wrong-shape", "uncertainty.covariance"),
-        (FIRST, "covariance: [[1, 0], [0, 1]], parameters: [b1, b9]", "unknown-parameter",
-         "uncertainty.covariance"),
-        (FIRST, "information: [[1, 0, 0], [0, 0, 0], [0, 0, 1]]", "not-positive-definite",
-         "uncertainty.information"),
-        (LOOP, "intervals: {b1: [-90, -30], f1: [-0.9, -0.7]}", "bad-interval", "uncertainty.intervals.b1"),
-        (LOOP, "covariance: [[1.0e+4, 0], [0, 1]]", "no-stable-plant", "uncertainty"),
-        (LOOP, "covariance: [[1, 0], [0, 1]], stable_within: 0.5", "no-stable-plant",
-         "uncertainty.stable_within"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_drawn_is_said(text, stated, code, key):
-    found = complaint(text, f"uncertainty={{{stated}}}")
-    assert (found.code, found.key) == (code, key)
-    assert found.hint
-
-
-@pytest.mark.parametrize(
-    ("stated", "code"),
-    [
-        ("seed: 3", "missing-key"),
-        (f"covariance: {COVARIANCE}, intervals: {{b1: [1, 5]}}", "conflicting-keys"),
-        (f"covariance: {COVARIANCE}, scenarios: [{{b1: 3}}]", "conflicting-keys"),
-        ("scenarios: [{b1: 3}], risk: 0.1", "conflicting-keys"),
-        (f"covariance: {COVARIANCE}, scenarios: 10, risk: 0.1", "conflicting-keys"),
-        ("covariance: [[1, 2], [2, 1]]", "not-positive-definite"),
-        ("covariance: [[1, 1], [1, 1]]", "not-positive-definite"),
-        ("scenarios: [{F: [1, -0.5, 0.2]}]", "not-a-number"),
-        ("intervals: {b1: [4, 3]}", "bad-interval"),
-        (f"covariance: {COVARIANCE}, scenarios: 5000", "too-large"),
-        (f"covariance: {COVARIANCE}, discard: 0.7", "out-of-range"),
-        (f"covariance: {COVARIANCE}, discard: 0.1, risk: 0.1", "conflicting-keys"),
-    ],
-)
-def test_what_contradicts_itself_is_said(stated, code):
-    with pytest.raises(SpecError) as caught:
-        parse_spec(FIRST, overrides=[f"uncertainty={{{stated}}}"])
-    assert code in {found.code for found in caught.value.diagnostics}
-
-
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        ["solver.method=lmi"],
-        ["accuracy={criterion: D}", "limits={input_power: 1}",
-         "spectrum={type: polynomial, order: 4, band: [0, 3], factor_columns: 1}"],
-        ["accuracy={model_error: {relative: 0.1, region: ellipsoid}}", "uncertainty.r_adm=fixed"],
-        ["accuracy={model_error: {relative: 0.1, confidence: {exact: 0.95}}}"],
-    ],
-)  # fmt: skip
-def test_what_is_not_made_robust_is_said(overrides):
-    found = complaint(FIRST, "uncertainty={scenarios: [{b1: 3}]}", *overrides)
-    assert (found.code, found.key) == ("not-supported", "uncertainty")
-
-
-@pytest.mark.parametrize("listed", ["scenarios: [{dead_time: 900}]", "intervals: {dead_time: [1, 5000]}"])
-def test_a_dead_time_beyond_the_record_is_refused_at_every_plant(listed):
-    text = (
-        "sample_time: 1\nplant: {continuous: {gain: 2, time_constant: 10, dead_time: 2}, sample: zoh}\n"
-        "noise: {variance: 0.04}\nexperiment: {samples: 500}\naccuracy: {model_error: {relative: 0.1}}\n"
-        f"spectrum: {{type: fir, order: 6}}\nuncertainty: {{{listed}}}\n"
-    )
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(text))
-    assert caught.value.diagnostics[0].code == "delay-beyond-record"

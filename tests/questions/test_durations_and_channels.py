@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import identify, parse_spec, solve
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import figure
 from inputdesign_cli.outcome.units import Units
 
@@ -32,27 +32,6 @@ def test_a_duration_is_as_many_samples_as_fit():
         for length in ("duration: 3600", "samples: 756")
     ]
     assert costs[0] == costs[1]
-
-
-@pytest.mark.parametrize(
-    ("extra", "code", "key"),
-    [
-        ("experiment: {duration: 3600, samples: 700}", "conflicting-keys", "experiment.duration"),
-        ("experiment: {duration: 3}", "out-of-range", "experiment.duration"),
-        ("experiment: {duration: -3}", "out-of-range", "experiment.duration"),
-        ("experiment: {duration: long}", "not-a-number", "experiment.duration"),
-        ("limits: {duration: 1}", "out-of-range", "limits.duration"),
-        ("channels: {u2: {unit: V}}", "unknown-name", "channels.u2"),
-        ("channels: {u1: {unit: 3}}", "not-a-text", "channels.u1.unit"),
-        ("channels: {u1: {unit: 'a, b'}}", "bad-name", "channels.u1.unit"),
-        ("channels: {u1: {units: V}}", "unknown-key", "channels.u1.units"),
-    ],
-)
-def test_what_is_wrong_is_told(extra, code, key):
-    with pytest.raises(SpecError) as caught:
-        parse_spec(f"{HEATER}{extra}\n")
-    (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == (code, key)
 
 
 def test_names_and_units_are_shown(tmp_path):

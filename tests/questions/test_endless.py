@@ -70,8 +70,7 @@ LINES = np.column_stack([RNG.uniform(0.2, 3.1, 60), 10.0 ** RNG.uniform(-4, 0, 6
 FAMILIES = ["{type: fir, order: 4}", "{type: white}", "{type: multisine, lines: 12}"]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("criterion", "DAET")
+@pytest.mark.parametrize(("seed", "criterion"), [(1, "D"), (2, "A"), (3, "E"), (1, "T")])
 @pytest.mark.parametrize("spectrum", FAMILIES)
 def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spectrum):
     plant = Plant(seed)
@@ -87,8 +86,7 @@ def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spe
     assert endless == any("no bound over every spectrum" in note for note in result.get("notes", []))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("criterion", "DT")
+@pytest.mark.parametrize(("seed", "criterion"), [(1, "D"), (2, "T")])
 def test_a_free_spectrum_without_an_end_is_refused(seed, criterion):
     with pytest.raises(SpecError) as caught:
         solve(parse_spec(Plant(seed).text(criterion, "limits: {input_power: 1}\nspectrum: {type: free}")))
@@ -117,8 +115,7 @@ def test_the_remedies_give_a_bound(criterion, limits):
         assert best <= found["objective"]["any_spectrum_bound"] * (1 + np.sign(best) * 1e-6)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("criterion", "AE")
+@pytest.mark.parametrize(("seed", "criterion"), [(2, "A"), (3, "E")])
 def test_a_best_that_is_only_approached_is_told_as_such(seed, criterion):
     plant = Plant(seed)
     text = plant.text(criterion, "limits: {input_power: 1}\nspectrum: {type: free}")

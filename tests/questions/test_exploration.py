@@ -137,6 +137,7 @@ def test_an_integrator_earns_no_trust_until_somebody_says_that_it_is_one(integra
     assert design.outcome.status == "optimal"
 
 
+@pytest.mark.slow
 def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):
     path = lag_log(tmp_path / "log.csv")
     _, *rows = path.read_text().splitlines()
@@ -147,6 +148,7 @@ def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path
     assert not any("persistently exciting" in note for note in notes)
 
 
+@pytest.mark.slow
 def test_a_loop_whose_input_is_a_share_of_the_output_is_told_as_one(tmp_path):
     """u = -0.6 y explains y to the last digit: not for want of noise."""
     rng = np.random.default_rng(0)
@@ -287,7 +289,8 @@ def test_the_page_is_among_the_files_that_are_named(run):
     assert "report.html" in there
 
 
-@pytest.mark.parametrize("inputs", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("inputs", [1, 2])
 def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
     rng = np.random.default_rng(3)
     u = 1e5 + np.repeat(rng.choice([0.0, 1.0, 5.0], (60, inputs), p=[0.6, 0.3, 0.1]), 5, axis=0)

@@ -141,7 +141,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("override", OTHERS.values(), ids=OTHERS.keys())
+@pytest.mark.parametrize("override", OTHERS.values(), ids=OTHERS)
 def test_all_kinds_of_experiments_are_foreseen(override):
     assert "rivals" in solved(override)[0]["foreseen"]
 

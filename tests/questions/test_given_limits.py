@@ -3,7 +3,6 @@
 import pytest
 
 from inputdesign_cli import analyse, load_spec
-from inputdesign_cli.errors import SpecError
 
 ONE = "specs/first_order_given.yaml"  # a cosine of amplitude 0.75: power 0.28125
 TWO = "specs/two_by_two_given.yaml"
@@ -53,18 +52,3 @@ def test_a_record_longer_than_allowed_is_found(tmp_path):
     (found,) = limits_not_kept(spec)
     assert found.where == "limits.samples"
     assert dict(found.figures) == {"value": 120, "limit": 100}
-
-
-@pytest.mark.parametrize("spec", [ONE, TWO])
-@pytest.mark.parametrize("limits", ["{spectrum: 5}", "{energy: 5}"])
-def test_what_cannot_be_compared_is_refused(spec, limits):
-    with pytest.raises(SpecError) as caught:
-        analyse(load_spec(spec, [f"limits={limits}"]))
-    assert caught.value.diagnostics[0].code == "not-supported"
-    assert caught.value.diagnostics[0].key.startswith("limits.")
-
-
-def test_phases_of_a_given_excitation_of_several_inputs():
-    with pytest.raises(SpecError) as caught:
-        analyse(load_spec(TWO, ["signal.phases=schroeder"]))
-    assert caught.value.diagnostics[0].key == "signal.phases"

@@ -125,24 +125,6 @@ def test_several_channels():
     assert found["worst_share"] == pytest.approx(max(nominal, expected), rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("text", "overrides", "key"),
-    [
-        (FIRST, ["accuracy={criterion: D}"], "uncertainty"),
-        (FIRST, ["accuracy=null"], "uncertainty"),
-        (FIRST, ["limits={amplitude: {output: 9}}"], "limits"),
-        (LOOP, ["limits={input_power: 9}"], "limits"),
-        (FIRST, ["uncertainty.cost=worst"], "uncertainty.cost"),
-        (FIRST, ["accuracy={model_error: {relative: 0.1, confidence: {exact: 0.95}}}"], "uncertainty"),
-    ],
-)
-def test_what_is_not_looked_at_at_several_plants_is_refused(text, overrides, key):
-    with pytest.raises(SpecError) as caught:
-        analysed(text, "uncertainty={scenarios: [{b1: 0.45}]}", *overrides)
-    (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == ("not-supported", key)
-
-
 def test_a_plant_whose_parameters_are_not_told_is_an_error():
     """Two sinusoids of which one is at the zero of the other plant."""
     zero = "plant={B: [0, 1, 1.0, 0.5]}"

@@ -122,7 +122,7 @@ solver: {any_spectrum: false}
 """
 
 
-@pytest.mark.parametrize("late", [20, 45, 52, 55, 56, 57, 57.5, 58, 59, 59.9])
+@pytest.mark.parametrize("late", [20, 52, 56, 57, 57.5, 59.9])
 @pytest.mark.parametrize("held", [True, False], ids=["held", "in q^-1"])
 def test_no_record_is_handed_over_that_costs_a_thousand_times_the_design(late, held):
     """Few samples lie behind the dead time, down to one, which tells two or three parameters at no power."""

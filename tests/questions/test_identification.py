@@ -42,12 +42,6 @@ def test_the_blocks_can_be_pasted(data):
     np.testing.assert_allclose(np.linalg.inv(covariance), outcome.result["information"]["matrix"], rtol=1e-9)
 
 
-def test_data_that_suffice_meet_the_target(data):
-    assessment = assess(load_spec(SPEC, ["accuracy.model_error={relative: 0.1, alpha: 2.45}"]), data)
-    assert assessment.met
-    assert assessment.results.result["status"] == "met"
-
-
 SPIKED = """
 plant: {B: [0, 0.5], F: [1, -0.7]}
 noise: {variance: 0.01}

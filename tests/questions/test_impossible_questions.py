@@ -59,35 +59,6 @@ def test_too_long():
     assert (diagnostic.code, diagnostic.key) == ("too-long", "limits.samples")
 
 
-TWO = "{frequencies: [0.1], type: multisine}"
-
-
-BAD = [
-    ("accuracy: {standard_deviation: {b7: 1}}\n" + FIR, "unknown-parameter", "accuracy.standard_deviation"),
-    ("accuracy: {application: {parameters: [b1, x], hessian: [[1, 0], [0, 1]], gamma: 1}}\n" + FIR,
-     "unknown-parameter", "accuracy.application"),
-    ("accuracy: {information: [[1, 0], [0, 1]]}\n" + FIR, "wrong-shape", "accuracy.information"),
-    (ERROR + FIR + "limits: {band: [0, 1]}\n", "bad-limit", "limits.band"),
-    (ERROR + "spectrum: {type: free}\nlimits: {spectrum: 3}\n", "bad-limit", "limits.spectrum"),
-    (ERROR + "spectrum: {type: multisine, lines: 3}\nlimits: {band: [0.1, 0.2]}\n", "too-few-lines",
-     "spectrum.lines"),
-    (ERROR + FIR + "limits: {spectrum: {max: 1, min: {numerator: [1.5]}}}\n", "bad-limit", "limits.spectrum"),
-    ("accuracy: {weighted_variance: {weight: {continuous: {numerator: [1], denominator: [1, 1]}}, max: 1}}\n"
-     + FIR, "not-sampled", "accuracy.weighted_variance.weight"),
-    ("accuracy: {weighted_variance: {max: 1, relative: perhaps}}\n" + FIR, "unknown-word",
-     "accuracy.weighted_variance.relative"),
-    (ERROR + FIR + "objective: best_accuracy\n", "needs-limits", "accuracy.model_error"),
-    (ERROR + FIR + "solver: {method: lmi}\nlimits: {input_power: 1}\n", "not-supported", "solver.method"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("text", "code", "key"), BAD, ids=[f"{c}-{k}" for _, c, k in BAD])
-def test_bad_specs_name_the_key(text, code, key):
-    diagnostic = complaint_of(text, verb=validate)
-    assert (diagnostic.code, diagnostic.key) == (code, key)
-    assert diagnostic.location is not None
-
-
 def test_a_table_of_levels_must_be_in_order(tmp_path):
     table = tmp_path / "level.csv"
     table.write_text("frequency,phi\n1,1\n0,1\n", encoding="utf-8")

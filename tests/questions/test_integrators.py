@@ -264,17 +264,6 @@ accuracy: {{standard_deviation: {{"b1[1,1]": 0.01}}}}
     validate(parse_spec(text, overrides=["noise.drift=true"]))
 
 
-def test_a_criterion_of_the_loop_error_refuses_integrators():
-    text = """
-plant: {B: [0, 0.2], F: [1, -1]}
-noise: {variance: 0.1}
-experiment: {samples: 100}
-accuracy: {closed_loop_error: {control: {minimum_variance: true}, reference: {variance: 1}}}
-limits: {input_power: 1}
-"""
-    assert refused(text).code == "not-supported"
-
-
 # Three ways to write k q^-1 / (1 - q^-1).
 SUMS = [
     "{parameters: {k: 0.2}, B: [0, k], F: [1, -1]}",

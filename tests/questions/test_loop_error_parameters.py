@@ -127,32 +127,6 @@ def refused(plant: str, *overrides: str, task=validate) -> Diagnostic:
     return found
 
 
-ALL_KNOWN = f"{{{PARAMETERS}, known: [K, T, L], {IN_S}}}"
-GAIN = "parameters: {a: 0.5}, state_space: {time: discrete, A: [[a, 0], [0, 0.3]], B: [[1, 0], [0, 1]], "
-
-
-@pytest.mark.parametrize(
-    ("plant", "change", "code", "key"),
-    [
-        (ALL_KNOWN, "noise.variance=0.04", "nothing-to-estimate", "plant.known"),
-        (ALL_KNOWN, "noise.C=[1, 0.3]", "nothing-to-estimate", "plant.known"),
-        (WORDS[0], "noise.drift=true", "not-supported", "noise.drift"),
-        (WORDS[0], "noise={variance: 1, D: [1, -1], known: [d1]}", "not-supported", "noise.D"),
-        (WORDS[0].replace("[T, 1]", "[T, 0]"), "title=x", "not-supported", "plant"),
-        (WORDS[0].replace(", sample: zoh", ""), "title=x", "not-supported", "plant"),
-        (
-            f"{{{GAIN} C: [[1, 0], [0.2, 1]], K: [[0.1, 0], [0, 0.1]]}}}}",
-            "title=x",
-            "not-supported",
-            "plant.state_space.K",
-        ),
-    ],
-)
-def test_what_the_theory_has_no_answer_for(plant, change, code, key):
-    found = refused(plant, change)
-    assert (found.code, found.key) == (code, key)
-
-
 def test_least_squares_estimates_no_named_parameters():
     found = refused("{parameters: {b: 0.5}, A: [1, -0.3], B: [0, 0, 0, b]}", task=simulate)
     assert found.code == "not-supported"

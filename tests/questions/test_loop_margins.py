@@ -167,42 +167,6 @@ def test_margins_are_told_as_the_peak_that_keeps_them(margin, expected):
     assert LoopMargin(**{key: float(value)}).peak == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("change", "code", "key"),
-    [
-        ("accuracy.loop.max_sensitivity_db=3", "admissible-not-positive", "accuracy.loop"),
-        ("accuracy={loop: {max_sensitivity_db: 6}}", "needs-controller", "accuracy.loop"),
-        ("accuracy={loop: {tuning: {simc: {}}}}", "missing-key", "accuracy.loop"),
-        ("accuracy.loop.max_sensitivity_db=100.1", "out-of-range", "accuracy.loop.max_sensitivity_db"),
-        ("accuracy.loop.max_sensitivity_db=1e9", "out-of-range", "accuracy.loop.max_sensitivity_db"),
-        ("accuracy.loop.gain_margin=2", "conflicting-keys", "accuracy.loop.gain_margin"),
-        (
-            "accuracy={loop: {gain_margin: 1, tuning: {simc: {}}}}",
-            "out-of-range",
-            "accuracy.loop.gain_margin",
-        ),
-        (
-            "accuracy={loop: {phase_margin: 60, tuning: {simc: {}}}}",
-            "out-of-range",
-            "accuracy.loop.phase_margin",
-        ),
-        ("accuracy.model_error={relative: 0.1}", "conflicting-keys", "accuracy.loop"),
-        ("plant={B: [0, 1], F: [1, -0.5]}", "not-supported", "accuracy.loop.tuning"),
-        (
-            "plant={continuous: {gain: 2, damping: 0.5, natural_frequency: 0.1}, sample: zoh}",
-            "not-supported",
-            "accuracy.loop.tuning",
-        ),
-    ],
-)
-def test_what_cannot_be_kept_or_tuned_is_said(change, code, key):
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(TEXT, overrides=[change]))
-    found = caught.value.diagnostics[0]
-    assert (found.code, found.key) == (code, key)
-    assert found.hint
-
-
 def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
     rng = np.random.default_rng(2)
     u = 2.0 * np.sign(rng.standard_normal(72)).repeat(10)

@@ -9,10 +9,8 @@ import pytest
 import scipy.integrate
 
 from inputdesign_cli import load_spec, solve
-from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
 from tests.support.matrix_specs import CONTINUOUS, changed
-from tests.support.plants import arx
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -67,11 +65,6 @@ def test_record_has_two_channels_and_keeps_the_smallest_eigenvalue(design):
         )
     )
     assert random.result["signal"]["efficiency"] < signal["efficiency"]
-
-
-def test_plots_are_there(design):
-    assert {"spectrum", "signal", "optimality", "ellipses"} <= set(design.curves)
-    assert design.curves["spectrum"].spectrum.shape[1:] == (2, 2)
 
 
 @pytest.mark.slow
@@ -213,8 +206,3 @@ spectrum: {{type: polynomial, order: 8, band: [0, 2.0]}}
     assert outcome.result["objective"]["relative_gap"] <= 1e-6
     assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
     assert outcome.result["signal"]["efficiency"] > 0.9
-
-
-def test_the_spec_of_the_example_is_that_of_the_tests():
-    task = build_convex(load_spec(SPECS / "two_by_two_arx.yaml"))
-    assert task.simulation.nominal.model.names == Experiment(arx(), 1).model.names

@@ -169,15 +169,6 @@ def test_the_files_hold_what_they_say(data):
     assert {"r_u_12", "r_adm_12", "G_abs_21"} < set(outcome.tables["bound"].columns)
 
 
-def test_data_that_suffice_meet_the_target(data):
-    spec = load_spec(SPEC, ["accuracy.model_error={absolute: 4}"])
-    assessment = assess(spec, data)
-    assert assessment.met
-    assert [r["entry"] for r in assessment.results.result["assessment"]["requirements"]] == [
-        "[1,1]", "[1,2]", "[2,1]", "[2,2]"
-    ]  # fmt: skip
-
-
 def test_a_top_up_makes_up_for_what_is_missing(data, tmp_path):
     call = ["assess", SPEC, str(data), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
     run = CliRunner().invoke(app, [*call, *(part for o in SHORT for part in ("--set", o))])
@@ -190,32 +181,6 @@ def test_a_top_up_makes_up_for_what_is_missing(data, tmp_path):
     after = result["information"]["standard_deviation"]
     before = result["identification"]["standard_deviation"]
     assert all(after[name] < before[name] for name in before)
-
-
-def test_the_command_tells_what_it_found(data, tmp_path):
-    run = CliRunner().invoke(app, ["identify", str(data), "--spec", SPEC, "-o", str(tmp_path / "id")])
-    assert run.exit_code == 0
-    assert "covariance [" in run.stdout
-    assert "% of the outputs" in run.stdout
-    for name in ("fit.png", "residuals.png", "bound.png", "model.yaml"):
-        assert (tmp_path / "id" / name).stat().st_size > 500
-
-
-def test_data_of_another_structure_are_told(data):
-    outcome = identify(load_spec(SPEC, ["plant={A: [1], B: [[[0, 1], [0, 1]], [[0, 1], [0, 1]]]}"]), data)
-    notes = " ".join(outcome.result["notes"])
-    assert "residuals are not white" in notes
-    assert "past inputs explain residuals" in notes
-
-
-def test_offsets_and_outliers_name_the_channel(write):
-    columns = record(load_spec(SPEC))
-    columns["y2"] = columns["y2"] + 100.0
-    columns["u2"][40] = 60.0
-    path = write(columns)
-    notes = " ".join(identify(load_spec(SPEC), path).result["notes"])
-    assert "u2 has 1 outlying value (row 42)" in notes
-    assert "does not begin at rest about zero" in notes
 
 
 @pytest.mark.parametrize(
@@ -248,14 +213,3 @@ def test_bad_records_are_refused(change, code, named, write):
         identify(load_spec(SPEC), path)
     assert caught.value.diagnostics[0].code == code
     assert named in caught.value.diagnostics[0].message
-
-
-def test_text_is_refused_with_its_line_and_channel(data):
-    lines = data.read_text().splitlines()
-    lines[7] = "6,1,fast,1,2"
-    data.write_text("\n".join(lines))
-    with pytest.raises(DataError) as caught:
-        identify(load_spec(SPEC), data)
-    assert caught.value.diagnostics[0].code == "data-not-a-number"
-    assert caught.value.diagnostics[0].location.line == 8
-    assert "u2" in caught.value.diagnostics[0].message

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import solve
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.questions.building.system import build_experiment
 from inputdesign_cli.questions.least_cost.build import build_convex
@@ -97,29 +96,6 @@ def test_limits_bind_what_r_causes():
     assert held["power"]["input"][1] == pytest.approx(most, rel=1e-6)
     assert held["cost"] > free["cost"]
     assert held["objective"]["relative_gap"] < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("override", "code"),
-    [
-        ("experiment.controller.numerator=[[[0.3], [0]]]", "wrong-shape"),
-        ("experiment.controller={numerator: [1]}", "wrong-shape"),
-        ("experiment.controller.numerator=[[[-0.3], [0]], [[0], [0.3]]]", "unstable-loop"),
-    ],
-)
-def test_bad_loops_are_explained(override, code):
-    with pytest.raises(SpecError) as caught:
-        build_convex(changed(override))
-    assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]
-
-
-def test_a_matrix_around_one_channel_is_refused():
-    with pytest.raises(SpecError) as caught:
-        parse_spec(
-            "plant: {B: [0, 1]}\nnoise: {variance: 1}\naccuracy: {standard_deviation: {b1: 0.1}}\n"
-            "experiment: {controller: {numerator: [[[0.1]]]}}\n"
-        )
-    assert [diagnostic.code for diagnostic in caught.value.diagnostics] == ["wrong-shape"]
 
 
 def test_the_units_of_the_loop_do_not_make_it_algebraic():

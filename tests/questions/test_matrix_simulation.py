@@ -8,7 +8,6 @@ from inputdesign_cli.compute.executor import Finished
 from inputdesign_cli.errors import SpecError
 
 SPEC = "specs/two_by_two_arx.yaml"
-FIRST = "specs/first_order.yaml"
 LOOP = "specs/two_by_two_loop.yaml"
 JENKINS = """
 plant:
@@ -178,20 +177,6 @@ def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
     if not loop:  # y is noise of mean square 0.5 (1 + 0.8^2) about what the input causes
         added = np.subtract(found[0]["total_power"]["output"], found[0]["power"]["output"])
         np.testing.assert_allclose(added, 0.82, rtol=0.3)
-
-
-def test_a_true_plant_in_s_of_one_channel():
-    plant = "{continuous: {numerator: [2], denominator: [1, 0.4]}, sample: zoh}"
-    spec = load_spec(FIRST, ["spectrum.order=3", f"simulation={{runs: 5, plant: {plant}}}"])
-    truth = simulate(spec).result["simulation"]["true_parameters"]
-    assert truth["f1"] == pytest.approx(-np.exp(-0.4))
-    assert truth["b1"] == pytest.approx(5.0 * (1.0 - np.exp(-0.4)))
-
-
-def test_filtered_noise_of_a_plant_that_is_not_sampled_is_refused():
-    with pytest.raises(SpecError) as caught:
-        simulate(parse_spec(IN_SECONDS, overrides=["noise.C=[1, 0.5]"]))
-    assert [(c.code, c.key) for c in caught.value.diagnostics] == [("unsuitable-key", "noise.C")]
 
 
 def test_prior_information_narrows_the_estimates():

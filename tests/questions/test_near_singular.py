@@ -117,9 +117,9 @@ signal: {{samples: 100}}
 @pytest.mark.parametrize(
     "dynamics",
     [
-        *[f"time_constant: {T:.1e}" for T in np.geomspace(1e-4, 1e3, 15)],
-        *[f"time_constant: {T:.1e}, dead_time: 2.5" for T in np.geomspace(1e-4, 1e3, 15)],
-        *[f"damping: 0.5, natural_frequency: {w:.1e}" for w in np.geomspace(1e-2, 1e3, 11)],
+        *[f"time_constant: {T:.1e}" for T in np.geomspace(1e-4, 1e3, 8)],
+        *[f"time_constant: {T:.1e}, dead_time: 2.5" for T in np.geomspace(1e-3, 1e2, 6)],
+        *[f"damping: 0.5, natural_frequency: {w:.1e}" for w in np.geomspace(1e-2, 1e3, 6)],
     ],
 )
 def test_dynamics_that_samples_do_not_show_are_not_taken_for_poles_on_the_circle(dynamics):

@@ -7,13 +7,12 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli import identify as estimated, parse_spec, simulate, solve
-from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import identify
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions import assess
 from inputdesign_cli.questions.building.system import build_model
-from inputdesign_cli.questions.task import build_task
 from inputdesign_cli.specification import Spec
 from tests.support.words import largest_errors
 
@@ -145,52 +144,10 @@ def test_a_study_estimates_the_named_parameters():
     assert 0.2 < low < high < 4.0
 
 
-BAD = [
-    ("unknown-name", "{parameters: {K: 1, T: 2}, continuous: {numerator: [Kp], denominator: [T, 1]}}"),
-    ("unused-parameter", "{parameters: {K: 1, T: 2}, continuous: {numerator: [K], denominator: [3, 1]}}"),
-    (
-        "unused-parameter",
-        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*(1 + z**2)], denominator: [3, 1]}}",
-    ),
-    ("undefined-expression", "{parameters: {K: 0}, continuous: {numerator: [1/K], denominator: [3, 1]}}"),
-    ("bad-expression", "{parameters: {K: 1}, continuous: {numerator: ['K^2'], denominator: [3, 1]}}"),
-    ("bad-name", "{parameters: {exp: 1}, continuous: {numerator: [exp], denominator: [3, 1]}}"),
-    ("out-of-range", "{parameters: {L: -1}, continuous: {numerator: [1], denominator: [3, 1], delay: L}}"),
-    ("delay-beyond-record", "{continuous: {gain: 1, time_constant: 1, dead_time: 151}}"),
-    ("wrong-shape", "{continuous: {gain: 1, time_constant: [[1, 2]]}}"),
-    ("conflicting-keys", "{continuous: {gain: 1, time_constant: 1, damping: 0.1, natural_frequency: 1}}"),
-    ("missing-key", "{continuous: {gain: 1, damping: 0.1}}"),
-    ("unknown-parameter", "{continuous: {gain: 1, time_constant: 1}, known: [K]}"),
-    ("nothing-to-estimate", "{continuous: {gain: 1, time_constant: 1}, known: [gain, time_constant]}"),
-]
-
-
-@pytest.mark.parametrize(("code", "plant"), BAD)
-def test_bad_plants_are_refused_once_with_their_key(code, plant):
-    with pytest.raises(SpecError) as caught:
-        build_task(spec_of(plant[:-1] + ", sample: zoh}"))
-    assert {one.code for one in caught.value.diagnostics} == {code}
-    assert all(one.key.startswith("plant") for one in caught.value.diagnostics)
-
-
-def test_accuracy_of_what_is_known_is_refused():
-    rest = REST.replace("model_error: {relative: 0.1, band: [0.05, 1.5]}", "standard_deviation: {gain: 0.1}")
-    with pytest.raises(SpecError, match="gain is known"):
-        build_task(spec_of("{continuous: {gain: 1, time_constant: 1}, sample: zoh, known: [gain]}", rest))
-
-
 COLOURED = (
     "{noise: {C: [1, 0.5], D: [1, -0.3], variance: 0.04, known: %s}, experiment: {samples: 300}, plant: "
     "{parameters: {%s: 2.1, T: 18}, continuous: {gain: %s, time_constant: T}, sample: zoh, known: %s}}"
 )
-
-
-@pytest.mark.parametrize("name", ["c1", "d1"])
-def test_a_parameter_is_not_called_as_a_coefficient_of_the_noise(name):
-    with pytest.raises(SpecError) as caught:
-        parse_spec((COLOURED % ("[]", name, name, "[]")).replace(", known: []", ""), design=False)
-    (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == ("bad-name", f"plant.parameters.{name}")
 
 
 @pytest.mark.parametrize("name", ["c2", "d0", "noise_0", "noise_1", "b0", "delay", "a1", "e0", "p0", "gain"])

@@ -142,14 +142,3 @@ def test_the_samples_of_a_prior_do_not_count_for_an_estimate_and_are_told(heater
     found, plain = identify(spec, path).result, identify(parse_spec(HEATER), path).result
     assert found["identification"]["theta"] == plain["identification"]["theta"]
     assert "experiment.prior does not count for this" in " ".join(found["notes"])
-
-
-@pytest.mark.parametrize("name", ["earlier.csv", "model.yaml"])
-@pytest.mark.parametrize("parameters", ["[b1]", "{b1: 3.6}"])
-def test_parameters_beside_a_file_are_refused(name, parameters):
-    """They name the rows of a matrix, which a file of samples has not and a model names itself."""
-    stated = f"experiment.prior={{information: {name}, parameters: {parameters}}}"
-    with pytest.raises(SpecError) as caught:
-        parse_spec(HEATER, overrides=[stated])
-    (found,) = caught.value.diagnostics
-    assert (found.code, found.key) == ("conflicting-keys", "experiment.prior.parameters")

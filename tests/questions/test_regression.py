@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputdesign_cli import load_spec, parse_spec, simulate, solve, validate
+from inputdesign_cli import load_spec, simulate, solve
 from inputdesign_cli.cli import main
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
@@ -187,41 +187,6 @@ def test_a_run_has_its_files(path, tmp_path):
 
 # Bad input ---------------------------------------------------------------------------------------
 
-BAD = [
-    ([f"{E}.estimated=[1, 2]"], "wrong-shape", "2 weights, but 1"),
-    ([f"{E}.neglected=[1, 2]"], "wrong-shape", "2 weights, but 1"),
-    ([f"{E}.target=-1"], "out-of-range", "greater than 0"),
-    ([f"{E}.target=0"], "out-of-range", "greater than 0"),
-    ([f"{E}.neglected_norm=-0.1"], "out-of-range", "at least 0"),
-    (["noise.variance=-1"], "out-of-range", "greater than 0"),
-    (["noise.variance=0"], "out-of-range", "greater than 0"),
-    ([f"{E}.target=null", "limits.energy=0"], "out-of-range", "greater than 0"),
-    ([f"{E}.target=null", "limits.energy=-3"], "out-of-range", "greater than 0"),
-    ([f"{E}.target=null"], "needs-limits", "nothing limits"),
-    (["limits.energy=3"], "not-supported", "beside a target"),
-    ([f"{E}.estimated=[0]"], "zero-weights", "all weights"),
-    (["simulation.plant.parameters=[1]"], "wrong-shape", "1 number"),
-    (["noise.C=[1, 0.5]"], "unsuitable-key", "noise.C"),
-    (["experiment.prior={information: [[1]]}"], "not-supported", "prior"),
-    (["objective=shortest_experiment"], None, ""),
-    (["limits.amplitude=1"], "not-supported", "limits.amplitude"),
-    (["solver.method=lmi"], "not-supported", "solver.method"),
-    (["signal.type=multisine"], "not-supported", "signal.type"),
-    (["cost={input_power: 2}"], "not-supported", "weigh powers"),
-]
-
-
-@pytest.mark.parametrize(("overrides", "code", "part"), BAD, ids=lambda x: str(x)[:40])
-def test_bad_specs(overrides, code, part):
-    with pytest.raises(SpecError) as error:
-        validate(load_spec(FIR, overrides))
-    diagnostic = error.value.diagnostics[0]
-    assert diagnostic.hint
-    assert diagnostic.location is not None
-    if code is not None:
-        assert diagnostic.code == code
-        assert part in diagnostic.message
-
 
 def test_periods_must_divide_the_record():
     with pytest.raises(SpecError, match="7 equal periods") as error:
@@ -289,14 +254,3 @@ def test_json_of_a_study(capsys, monkeypatch, tmp_path):
         main()
     assert (ended.value.code or 0) == 0
     assert json.loads(capsys.readouterr().out)["simulation"]["runs"] == 10
-
-
-def test_a_given_excitation_is_not_designed():
-    text = """
-plant: {regression: {estimated: 1, neglected: 1}}
-noise: {variance: 1}
-accuracy: {mean_squared_error: {target: 1.0, estimated: [1], neglected_norm: 1.0}}
-spectrum: {given: {type: white, power: 1}}
-"""
-    with pytest.raises(SpecError):
-        solve(parse_spec(text))

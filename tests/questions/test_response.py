@@ -194,43 +194,6 @@ def test_lines_that_tell_nonlinearity_stay_silent():
     assert power[silent].max() < 1e-20 * power.max()
 
 
-@pytest.mark.parametrize(
-    ("changes", "code", "key"),
-    [
-        ({"experiment.controller": {"numerator": [0.1], "denominator": [1]}}, "not-supported", "controller"),
-        ({"noise.drift": True}, "not-supported", "drift"),
-        ({"spectrum": {"type": "fir"}}, "not-supported", "spectrum"),
-        ({"limits.energy": 1.0}, "not-supported", "energy"),
-        ({"signal.hold": 2}, "not-supported", "hold"),
-        ({"accuracy.model_error": {"relative": 0.1}}, "not-supported", "model_error"),
-        ({"accuracy.frequency_response.lines": 500}, "too-few-lines", "lines"),
-        ({"accuracy.frequency_response.transient": 5}, "bad-period", "samples"),
-        ({"accuracy.frequency_response.relative": None}, "missing-key", "frequency_response"),
-        ({"objective": "best_accuracy"}, "needs-limits", "frequency_response"),
-        ({"experiment.samples": 10**8}, "too-large", "samples"),
-        ({"uncertainty": {"intervals": {"b1": [0.3, 0.5]}}}, "not-supported", "uncertainty"),
-    ],
-)  # fmt: skip
-def test_what_is_not_done_is_refused_at_its_key(changes, code, key):
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(SINGLE).with_(**changes))
-    found = caught.value.diagnostics[0]
-    assert found.code == code
-    assert key in found.key
-    assert found.hint
-
-
-@pytest.mark.parametrize(
-    ("frequencies", "code"),
-    [([0.1, 0.101], "too-few-lines"), ([0.001], "out-of-range"), ([3.14], "out-of-range")],
-)
-def test_lines_that_the_period_does_not_have_are_told(frequencies, code):
-    text = SINGLE.replace("band: [0.1, 2], lines: 12", f"frequencies: {frequencies}")
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(text))
-    assert caught.value.diagnostics[0].code == code
-
-
 def test_limits_that_are_too_tight_say_what_would_do():
     need = solve(spec()).result["cost"]
     with pytest.raises(InfeasibleError) as caught:

@@ -16,8 +16,6 @@ from inputdesign_cli.questions.common.robust import Batch, tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
 from inputdesign_cli.report.facts import facts
-from inputdesign_cli.report.question import read_question
-from inputdesign_cli.report.sources import assumptions, citations
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
 
 
@@ -210,19 +208,6 @@ def test_the_fan_shows_every_plant_and_names_those_that_bind():
     names = {f"plant {item['scenario']}" for item in found.result["robust"]["active"] if item["scenario"]}
     assert set(curves.active) == names
     assert draw_all(found)["fan.png"].startswith(b"\x89PNG")
-
-
-def test_what_is_said_is_said_under_the_prior():
-    found = solve(
-        parse_spec(FIRST, overrides=[f"uncertainty={{covariance: {COVARIANCE}, fresh: 20, scenarios: 9}}"])
-    )
-    lines = {name: (text, note) for name, text, note in facts(found.outcome, "s")}
-    assert lines["plants"][0] == "what is asked holds at the plant of the spec and 9 drawn"
-    assert "not of the true plant" in lines["fresh plants"][1]
-    question = read_question(found.resolved_spec)
-    assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
-    assert "true plant" in assumptions(question, found.outcome)[0]
-    assert sum("Campi" in str(source) for source in citations(question, found.outcome)) == 2
 
 
 def test_limits_on_powers_bind_the_record_at_every_plant():

@@ -27,8 +27,8 @@ accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
 @pytest.mark.parametrize("spectrum", ["{type: free}", "{type: multisine, lines: 40}"])
 @pytest.mark.parametrize("text", [INTEGRAL_ACTION, OPEN_LOOP], ids=["integral action", "open loop"])
 def test_the_listed_sinusoids_meet_what_the_design_promises(text, spectrum):
-    designed = solve(parse_spec(f"{text}spectrum: {spectrum}\n")).result
-    table = solve(parse_spec(f"{text}spectrum: {spectrum}\n")).tables["spectrum"].columns
+    solved = solve(parse_spec(f"{text}spectrum: {spectrum}\n"))
+    designed, table = solved.result, solved.tables["spectrum"].columns
     frequency = table["frequency_rad_per_s"]
     np.testing.assert_array_equal(frequency, designed["spectrum"]["frequencies"])
     inside = (frequency > 0) & (frequency < np.pi)

@@ -178,38 +178,6 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
     assert all(after[name] < found["standard_deviation"][name] for name in model.names)
 
 
-@pytest.mark.parametrize(
-    ("override", "code"),
-    [
-        ("experiment.controller.numerator=[-40, 36.2]", "unstable-loop"),
-        ("plant.continuous={numerator: [1, 9], denominator: [1, 2]}", "algebraic-loop"),
-        ("plant.sample=null", "unsuitable-key"),
-        ("experiment.controller={numerator: [[[40]]]}", "wrong-shape"),
-        ("plant.continuous.denominator=[1, 12, 0]", "infinite-information"),
-        ("accuracy.model_error.sensitivity.max_db=4", "admissible-not-positive"),
-        (
-            "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [-11], denominator: [1]}}",
-            "unstable-loop",
-        ),
-        ("accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [[[9]]]}}", "wrong-shape"),
-    ],
-)
-def test_what_cannot_be_asked_is_explained(override, code):
-    with pytest.raises(SpecError) as caught:
-        build_convex(load_spec(MOTOR, [override]))
-    assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]
-
-
-def test_a_loop_to_be_kept_is_of_a_sampled_plant():
-    kept = "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [9], denominator: [1]}}"
-    build_convex(load_spec(MOTOR, ["experiment.controller=null", kept]))
-    with pytest.raises(SpecError) as caught:
-        load_spec(MOTOR, ["plant.sample=null", "experiment.controller=null", kept])
-    (diagnostic,) = [c for c in caught.value.diagnostics if c.key.startswith("accuracy")]
-    assert diagnostic.code == "unsuitable-key"
-    assert "sample: zoh" in diagnostic.hint
-
-
 def test_frequencies_of_complaints_are_in_the_unit_of_the_spec():
     """The nominal loop peaks at 4.35 dB, at 9.54 rad/s."""
     with pytest.raises(SpecError, match=r"9\.54\d* rad/s"):

@@ -8,7 +8,6 @@ import pytest
 
 from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Absolute, Sensitivity
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix
 from inputdesign_cli.questions.least_cost.build import build_convex
 from inputdesign_cli.specification import parse_spec
@@ -161,22 +160,3 @@ def test_the_norm_costs_more_than_the_entries_and_is_reported():
     requirement = designed(OPEN).problem.requirements[0]
     assert requirement.of_the_norm
     assert isinstance(requirement.admissible, Absolute)
-
-
-@pytest.mark.parametrize(
-    ("override", "code"),
-    [
-        ("accuracy.model_error.norm=entry", "conflicting-keys"),
-        ("accuracy.model_error.region=ellipsoid", "not-supported"),
-        ("accuracy.model_error.sensitivity={max_db: 1}", "admissible-not-positive"),
-        ("accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [1]}}", "wrong-shape"),
-        (
-            "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [[[2], [0]], [[0], [2]]]}}",
-            "unstable-loop",
-        ),
-    ],
-)
-def test_what_cannot_be_asked_is_explained(override, code):
-    with pytest.raises(SpecError) as caught:
-        build_convex(parse_spec(SPEC, overrides=[override]))
-    assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]

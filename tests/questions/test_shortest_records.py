@@ -120,7 +120,7 @@ class Ways:
         return None if made is None or made.record is None else len(made.record.samples)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=25)
 @given(
     enough=st.lists(st.integers(20, 20_000), min_size=1, max_size=4),
     start=st.integers(2, 19),
@@ -141,7 +141,7 @@ def test_the_length_is_that_of_the_best_way_to_one_per_cent(enough, start, block
     assert len(ways.tried) <= len(lengths) * len(enough)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=25)
 @given(
     enough=st.lists(st.integers(3_000, 300_000), min_size=2, max_size=6),
     share=st.floats(0.3, 0.99),

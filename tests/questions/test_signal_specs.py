@@ -7,8 +7,8 @@ import pytest
 import scipy.io
 import scipy.io.wavfile
 
-from inputdesign_cli import load_spec, parse_spec, solve, validate
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.report.facts import facts
@@ -161,59 +161,6 @@ def test_a_missed_accuracy_is_noted():
     assert outcome.result["signal"]["peak"] == [pytest.approx(0.4)]
     assert outcome.result["signal"]["worst_ratio"] > 1
     assert any("misses the accuracy" in note for note in outcome.result["notes"])
-
-
-BAD = [
-    ("signal: {periods: 3}", "conflicting-keys", "signal.periods"),
-    ("signal: {hold: 7}", "conflicting-keys", "signal.hold"),
-    ("signal: {periods: 500}", "conflicting-keys", "signal.periods"),
-    ("signal: {ramp: 10, bits: 5}", "unsuitable-key", "signal.ramp"),
-    ("signal: {ramp: 251}", "out-of-range", "signal.ramp"),
-    ("signal: {lines: [1, 251]}", "out-of-range", "signal.lines"),
-    ("limits: {amplitude: 1}\nsignal: {amplitudes: 2}", "conflicting-keys", "signal.amplitudes"),
-    ("limits: {rate: 0.1}\nsignal: {quantisation: {bits: 4, range: 5}}", "coarse-converter", "limits.rate"),
-    ("signal: {offset: 9, quantisation: {bits: 4, range: 5}}", "coarse-converter", "signal.offset"),
-    ("sample_time: 0.3\nsignal: {also: [wav]}", "no-sample-rate", "signal.also"),
-    ("signal: {order: 3}", "not-supported", "signal.order"),
-    ("signal: {type: slewed}", "unsuitable-key", "signal.type"),
-    ("limits: {rate: 1}\nsignal: {type: slewed, ramp: 9}", "unsuitable-key", "signal.ramp"),
-]
-BAD_WORDS = [
-    ("signal: {lines: even}", "unknown-word"),
-    ("signal: {lines: [3, 2]}", "not-increasing"),
-    ("signal: {lines: 0}", "out-of-range"),
-    ("signal: {type: prbs, bits: 1}", "out-of-range"),
-    ("signal: {quantisation: {bits: 8}}", "missing-key"),
-    ("signal: {also: [ogg]}", "unknown-word"),
-    ("signal: {scale: full}", "unknown-word"),
-    ("limits: {amplitude: {}}", "missing-key"),
-    ("limits: {amplitude: {output: [1, 2]}}", "wrong-shape"),
-    ("limits: {amplitude: -1}", "out-of-range"),
-]
-
-
-@pytest.mark.parametrize(("text", "code", "key"), BAD, ids=[text for text, _, _ in BAD])
-def test_bad_settings_name_the_key_and_the_line(text, code, key):
-    with pytest.raises(SpecError) as error:
-        validate(parse_spec(BASE + text + "\n"))
-    (diagnostic,) = error.value.diagnostics
-    assert (diagnostic.code, diagnostic.key) == (code, key)
-    assert diagnostic.hint
-    assert diagnostic.location is not None
-
-
-@pytest.mark.parametrize(("text", "code"), BAD_WORDS, ids=[text for text, _ in BAD_WORDS])
-def test_bad_words(text, code):
-    with pytest.raises(SpecError) as error:
-        parse_spec(BASE + text + "\n")
-    assert code in [diagnostic.code for diagnostic in error.value.diagnostics]
-
-
-def test_the_example():
-    spec = load_spec("specs/limited_signal.yaml")
-    validate(spec)
-    assert spec.limits.amplitude is not None
-    assert spec.limits.amplitude.input == 0.75
 
 
 @pytest.mark.parametrize("offset", [0.3, 0.37, -0.1])

@@ -8,8 +8,7 @@ import pytest
 import scipy.io
 import scipy.io.wavfile
 
-from inputdesign_cli import load_spec, solve, validate
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli import load_spec, solve
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.outcome.run_directory import write_run
 
@@ -31,26 +30,6 @@ def test_limits_on_each_channel():
     record = outcome.tables["signal"].columns
     np.testing.assert_allclose(np.abs(record["u1"] - 1).max(), signal["peak"][0])
     assert outcome.curves["signal"].limits["u2"] == (-33, 37)
-
-
-def test_a_record_that_is_too_short_names_one_that_is_not():
-    changes = [
-        "spectrum.order=4",
-        "limits.amplitude=[7.65, 20.8]",
-        "signal.type=binary",
-        "signal.candidates=1",
-    ]
-    with pytest.raises(InfeasibleError) as error:
-        solve(load_spec(SPEC, changes))
-    (diagnostic,) = error.value.diagnostics
-    assert diagnostic.code == "limits-too-tight"
-    assert diagnostic.key == "limits.amplitude"
-    length = int(diagnostic.hint.split()[0])
-    assert 500 < length < 1000
-    longer = [f"experiment.samples={length}", f"signal.samples={length}"]
-    signal = solve(load_spec(SPEC, [*changes, *longer, "signal.candidates=4"])).result["signal"]
-    assert signal["worst_ratio"] <= 1 + 1e-9
-    assert np.all(np.array(signal["peak"]) <= [7.65, 20.8])
 
 
 def test_what_is_applied_to_several_inputs(tmp_path):
@@ -87,30 +66,3 @@ def test_what_is_applied_to_several_inputs(tmp_path):
         assert np.all(entry.r_u_record <= entry.r_adm * (1 + 1e-9))
     names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
     assert {"signal.mat", "signal.wav", "signal.png", "spectrum.png", "bound.png"} <= names
-
-
-BAD = [
-    (["signal.periods=3"], "conflicting-keys", "signal.periods"),
-    (["signal.periods=50"], "conflicting-keys", "signal.periods"),
-    (["signal.hold=7"], "conflicting-keys", "signal.hold"),
-    (["signal.bits=3", "signal.type=prbs"], "out-of-range", "signal.bits"),
-    (["signal.lines=[1, 200]"], "out-of-range", "signal.lines"),
-    (["signal.ramp=10", "signal.type=binary"], "unsuitable-key", "signal.ramp"),
-    (["signal.amplitudes=[1, 9]", "limits.amplitude=[2, 8]"], "conflicting-keys", "signal.amplitudes"),
-    (["signal.quantisation={bits: 4, range: [9, 9, 9]}"], "wrong-shape", "signal.quantisation.range"),
-    (
-        ["signal.quantisation={bits: 4, range: 9}", "signal.offset=[0, 9]"],
-        "coarse-converter",
-        "signal.offset",
-    ),
-    (["signal.quantisation={bits: 4, range: 9}", "limits.rate=[2, 1]"], "coarse-converter", "limits.rate"),
-]
-
-
-@pytest.mark.parametrize(("changes", "code", "key"), BAD, ids=[" ".join(changes) for changes, _, _ in BAD])
-def test_bad_settings_name_the_key(changes, code, key):
-    with pytest.raises(SpecError) as error:
-        validate(load_spec(SPEC, changes))
-    (diagnostic,) = error.value.diagnostics
-    assert (diagnostic.code, diagnostic.key) == (code, key)
-    assert diagnostic.hint

@@ -50,21 +50,6 @@ def test_covariances_lie_in_the_range_of_the_wishart_distribution():
     assert "on_design_model" not in result["simulation"]["inputs"]["design"]
 
 
-def test_the_delivered_record_can_be_tried():
-    overrides = ["simulation={runs: 50, excitation: record}", "spectrum.order=5"]
-    result = simulate(load_spec(FIRST, overrides)).result
-    power = result["simulation"]["inputs"]["design"]["power"]["excitation"][0]
-    assert power == pytest.approx(result["signal"]["power"][0], rel=1e-12)
-
-
-def test_prior_information_narrows_the_estimates():
-    base = ["simulation={runs: 200}", "spectrum={given: {type: white, power: 1}}"]
-    prior = "experiment.prior={information: [[1.0e+4, 0, 0], [0, 1, 0], [0, 0, 1]]}"
-    for overrides in (base, [*base, prior]):
-        entry = simulate(load_spec(FIRST, overrides)).result["simulation"]["inputs"]["design"]
-        assert all(0.8 < ratio < 1.2 for ratio in entry["rms_over_theory"].values())
-
-
 def test_seeds_repeat():
     overrides = ["simulation={runs: 20, seed: 5}", "spectrum.order=3"]
     first, second = (simulate(load_spec(FIRST, overrides)).result["simulation"] for _ in range(2))

@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.cli.summary import summary
-from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.questions.least_cost.methods import GridMethod
 from inputdesign_cli.questions.verbs import execute
@@ -133,39 +133,6 @@ def test_the_bound_over_every_spectrum_can_be_left_out(kind):
     free = kind == "free"  # itself every spectrum
     assert ("any_spectrum_bound" in fast["objective"]) is free
     assert any("--fast" in note for note in fast.get("notes", [])) is not free
-
-
-def test_prior_that_suffices():
-    prior = "{information: [[1.0e+9, 0, 0], [0, 1.0e+9, 0], [0, 0, 1.0e+9]]}"
-    outcome = solve(spec_of(SMALL, experiment__prior=prior))
-    assert outcome.result["cost"] == 0.0
-    assert "signal" not in outcome.tables
-
-
-CLOSED = SMALL.replace("{samples: 500}", "{samples: 500, controller: {numerator: [CNUM], denominator: [1]}}")
-BAD = [
-    (CLOSED.replace("CNUM", "-2"), "unstable-loop", "experiment.controller"),
-    (SMALL.replace("B: [0, 3.6]", "B: [0, 1, 1]"), "admissible-not-positive", "accuracy.model_error"),
-    (
-        SMALL.replace("B: [0, 3.6], F: [1, -0.7]", "B: [0, 1, -0.7], F: [1, -0.7]"),
-        "not-identifiable",
-        "plant",
-    ),
-    (SMALL + "limits: {energy: 1}\n", "not-supported", "limits.energy"),
-    (SMALL.replace("{seed: 1}", "{order: 4}"), "not-supported", "signal.order"),
-]
-
-
-@pytest.mark.parametrize(
-    ("text", "code", "key"), BAD, ids=[f"{code}-{i}" for i, (_, code, _) in enumerate(BAD)]
-)
-def test_bad_specs_name_the_key_and_the_line(text, code, key):
-    with pytest.raises(SpecError) as error:
-        validate(parse_spec(text, file="plant.yaml"))
-    diagnostic = error.value.diagnostics[0]
-    assert (diagnostic.code, diagnostic.key) == (code, key)
-    assert diagnostic.location is not None
-    assert diagnostic.hint
 
 
 TABLES = [

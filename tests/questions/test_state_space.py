@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import analyse, parse_spec, simulate, solve
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.system import build_experiment, build_model
 from tests.support.words import largest_errors
@@ -85,75 +84,6 @@ def test_an_unstable_plant_under_a_controller():
     plant = f"{{parameters: {{a: 1.1, b: 0.5}}, state_space: {states}}}"
     rest = REST.replace("{samples: 300}", "{samples: 300, controller: {numerator: [0.8]}}")
     assert solve(spec_of(plant, rest)).result["status"] == "optimal"
-
-
-STATES = "A: [[a]], B: [[1]], C: [[1]]"
-
-
-@pytest.mark.parametrize(
-    ("plant", "code", "key"),
-    [
-        (f"{{state_space: {{{STATES}}}}}", "not-a-number", "plant.state_space.A[0][0]"),
-        ("{state_space: {A: [[-1]], B: [[1]], C: [[1]]}, sample: zoh}", "missing-key", "plant"),
-        (f"{{parameters: {{a: -1}}, state_space: {{{STATES}}}}}", "missing-key", "plant"),
-        (
-            f"{{parameters: {{a: 0.5}}, state_space: {{{STATES}, time: discrete}}, sample: zoh}}",
-            "unsuitable-key",
-            "plant.sample",
-        ),
-        (
-            f"{{parameters: {{a: 0.5}}, state_space: {{{STATES}, time: discrete, delay: 1}}}}",
-            "unsuitable-key",
-            "plant.state_space.delay",
-        ),
-        (
-            f"{{parameters: {{a: 0.5, L: 0}}, state_space: {{{STATES}, time: discrete, delay: L}}}}",
-            "unsuitable-key",
-            "plant.state_space.delay",
-        ),
-        (
-            "{parameters: {a: -1}, state_space: {A: [[a, 0]], B: [[1]], C: [[1]]}, sample: zoh}",
-            "wrong-shape",
-            "plant.state_space.A",
-        ),
-        (
-            "{parameters: {a: -1}, state_space: {A: [[a]], B: [[1], [2]], C: [[1]]}, sample: zoh}",
-            "wrong-shape",
-            "plant.state_space.B",
-        ),
-        (
-            "{parameters: {a: 1}, state_space: {A: [[a]], B: [[1]], C: [[1]]}, sample: zoh}",
-            "unstable-polynomial",
-            "plant.state_space.A",
-        ),
-        (
-            "{parameters: {a: -1}, state_space: {A: [[a]], B: [[1]], C: [[1]], delay: 400}, sample: zoh}",
-            "delay-beyond-record",
-            "plant.state_space.delay",
-        ),
-        (
-            "{parameters: {a: -1}, state_space: {A: [[a]], B: [[1]], C: [[1]], time: digital}, sample: zoh}",
-            "unknown-word",
-            "plant.state_space.time",
-        ),
-        (
-            "{parameters: {a: -1, b: 2}, state_space: {A: [[a]], B: [[1]], C: [[1]]}, sample: zoh}",
-            "unused-parameter",
-            "plant.parameters.b",
-        ),
-    ],
-)
-def test_what_is_wrong_with_the_words_is_told(plant, code, key):
-    with pytest.raises(SpecError) as caught:
-        build_experiment(spec_of(plant))
-    assert (code, key) in [(found.code, found.key) for found in caught.value.diagnostics]
-
-
-def test_a_gain_beside_coloured_noise_is_refused():
-    plant = "{parameters: {a: 0.5}, state_space: {A: [[a]], B: [[1]], C: [[1]], K: [[0.1]], time: discrete}}"
-    with pytest.raises(SpecError) as caught:
-        build_experiment(spec_of(plant, REST.replace("{variance: 0.1}", "{C: [1, 0.2], variance: 0.1}")))
-    assert caught.value.diagnostics[0].code == "conflicting-keys"
 
 
 @pytest.mark.parametrize("given", [True, False])

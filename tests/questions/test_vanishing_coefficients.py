@@ -99,25 +99,3 @@ def test_what_may_act_at_once_is_no_delay_of_a_loop(name):
     for value in (2.0, 2.0 + 1e-6):
         with pytest.raises(SpecError, match="act without delay"):
             build_experiment(spec_at(name, value, loop))
-
-
-@pytest.mark.parametrize(
-    ("plant", "code"),
-    [
-        (
-            "parameters: {q: 0, T: 5}, continuous: {numerator: [q, 1, 1], denominator: [T, 1]}",
-            "improper-transfer",
-        ),
-        ("parameters: {K: 0, T: 5}, continuous: {gain: K, time_constant: T}", "without-effect"),
-        ("parameters: {K: 0, f: 0.5}, B: [0, K], F: [1, -f]", "without-effect"),
-        ("parameters: {T: 5}, continuous: {gain: 0, time_constant: T}", "zero-polynomial"),
-        ("parameters: {T: 5}, continuous: {numerator: [2-2], denominator: [T, 1]}", "zero-polynomial"),
-        ("parameters: {f: 0.5}, B: [0, 0], F: [1, -f]", "zero-polynomial"),
-        ("parameters: {k: 0, m: 0}, state_space: {A: [[-1]], B: [[k]], C: [[m]]}", "without-effect"),
-    ],
-)
-def test_plants_of_which_nothing_is_left_are_refused(plant, code):
-    sample = "" if "B: [0" in plant else "sample: zoh, "
-    with pytest.raises(SpecError) as caught:
-        build_experiment(parse_spec(f"plant: {{{sample}{plant}}}\n{REST}"))
-    assert [found.code for found in caught.value.diagnostics] == [code]

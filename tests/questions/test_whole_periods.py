@@ -40,7 +40,7 @@ def most_by_trial(pieces, skip):
     return max(counts)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=40)
 @given(
     gaps=st.sets(st.integers(5, 190), min_size=1, max_size=4),
     skip=st.integers(0, 2),

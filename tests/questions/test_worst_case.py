@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli import parse_spec
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.common.robust import Batch, tried_on
 from inputdesign_cli.questions.least_cost.build import build_convex
@@ -55,13 +54,3 @@ def test_no_plant_of_the_ellipsoid_is_worse_than_the_one_that_is_found(text, cov
     ]
     assert max(shares) <= share * (1 + 1e-3)
     assert max(shares) > 0.8
-
-
-def test_it_goes_with_draws_alone():
-    for asked in (
-        "{scenarios: [{f1: -0.5}], worst_case: 0.9}",
-        f"{{covariance: {COVARIANCE}, discard: 0.1, worst_case: 0.9}}",
-    ):
-        with pytest.raises(SpecError) as refused:
-            solve(parse_spec(FIRST, overrides=[f"uncertainty={asked}"]))
-        assert refused.value.diagnostics[0].code == "conflicting-keys"

@@ -193,7 +193,7 @@ PIECES = st.one_of(
 
 
 @pytest.mark.parametrize("ending", ["csv", "npz", "mat", "xlsx", "parquet"])
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(pieces=st.lists(PIECES, max_size=40), form=st.sampled_from([None, "%d.%m.%Y", "%Y"]))
 def test_no_bytes_lead_to_another_error(ending, pieces, form, tmp_path):
     (tmp_path / f"log.{ending}").write_bytes(b"".join(pieces))
@@ -201,7 +201,7 @@ def test_no_bytes_lead_to_another_error(ending, pieces, form, tmp_path):
         read_log(tmp_path / f"log.{ending}", Preparation(columns={"u1": "1", "y1": "2"}, time_format=form))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     cells=st.lists(st.lists(CELLS, min_size=2, max_size=3), min_size=1, max_size=30),
     mark=st.sampled_from(",;\t"),

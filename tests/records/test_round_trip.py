@@ -180,7 +180,7 @@ def test_counts_since_1970(unit, scale, tmp_path):
     check(tmp_path / "log.npz", Preparation())
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     values=st.lists(st.floats(-1e17, 1e17, allow_subnormal=False), min_size=2, max_size=20),
     mark=st.sampled_from(";\t|"),

@@ -158,7 +158,7 @@ def test_a_record_of_zeros_has_a_crest_factor():
     assert crest_factor(np.array([1.0, -1.0])) == 1.0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=12)
 @given(repeats=st.integers(4, 90), times=st.integers(2, 300), data=st.data())
 def test_phases_of_lines_that_repeat_are_chosen_over_one_repetition(repeats, times, data):
     """The harmonics of a short period give the same signal again and again."""

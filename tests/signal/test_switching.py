@@ -37,7 +37,7 @@ def test_far_switches_make_a_trapezoid(rate):
     np.testing.assert_allclose(ramped(values, rate), expected, atol=1e-12)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 5.0))
 def test_slow_records_are_followed_as_they_are_and_others_at_full_speed(seed, rate):
     values = np.random.default_rng(seed).normal(size=60)

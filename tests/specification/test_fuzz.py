@@ -25,7 +25,7 @@ RAW = (
 )  # fmt: skip
 
 quick = settings(
-    max_examples=150, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+    max_examples=60, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -139,13 +139,13 @@ def mutated(draw):
     return data
 
 
-@settings(quick, max_examples=500)
+@settings(quick, max_examples=150)
 @given(mutated())
 def test_examples_with_parts_replaced(data):
     read_or_complain(yaml.safe_dump(data, allow_unicode=True, default_flow_style=None))
 
 
-@settings(quick, max_examples=50)
+@settings(quick, max_examples=25)
 @given(
     st.sampled_from(TEXTS),
     st.lists(st.sampled_from(sorted({".".join(map(str, p)) for d in DATA for p in paths(d)})), max_size=3),

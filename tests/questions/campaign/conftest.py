@@ -1,5 +1,7 @@
 """A folder with a spec, and a campaign that has begun in it."""
 
+import shutil
+
 import pytest
 
 from tests.support.campaigns import SPEC
@@ -15,7 +17,12 @@ def run(monkeypatch, capsys, tmp_path):
 
 
 @pytest.fixture
-def begun(run, tmp_path):
+def begun(run, campaigns, tmp_path):
     """A campaign with its first plan."""
-    assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
-    return tmp_path / "c"
+    return shutil.copytree(campaigns / "begun", tmp_path / "c")
+
+
+@pytest.fixture
+def once(run, campaigns, tmp_path):
+    """A campaign with its first record."""
+    return shutil.copytree(campaigns / "once", tmp_path / "c")

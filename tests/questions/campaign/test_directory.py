@@ -12,6 +12,8 @@ from inputdesign_cli.outcome.run_directory import read_run
 from inputdesign_cli.questions.campaign.memory import held
 from tests.support.campaigns import answered, applied, found, planned, written
 
+APPLIED = ("--as-applied", "--json", "--no-figures")
+
 
 def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
     assert len(planned(begun)) == 20  # a pilot of a tenth
@@ -92,10 +94,9 @@ def test_a_record_at_another_scale_is_refused(run, begun, tmp_path, scale):
 
 
 @pytest.mark.parametrize("missing", [0, 4])
-def test_a_record_of_an_earlier_plan_is_refused(run, begun, tmp_path, missing):
+def test_a_record_of_an_earlier_plan_is_refused(run, once, tmp_path, missing):
     """The input of the pilot, applied again with other noise, where the second plan is due."""
-    run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")
-    times, u = np.loadtxt(begun / "plan_01.csv", delimiter=",", skiprows=1).T[:, missing:]
+    times, u = np.loadtxt(once / "plan_01.csv", delimiter=",", skiprows=1).T[:, missing:]
     record = written(tmp_path / "again.csv", times, u, answered(u, seed=11))
     code, _, err = run("next", "c", record)
     assert code == 2
@@ -106,7 +107,7 @@ def test_a_record_of_an_earlier_plan_is_refused(run, begun, tmp_path, missing):
     assert repeated["where"] == "again.csv"
     assert (repeated["figures"]["plan"], repeated["figures"]["other"]) == ("plan_02.csv", "plan_01.csv")
     # What is due is never taken for something else, with rows missing or not.
-    assert run("next", "c", applied(begun, tmp_path / "r3.csv"), "--no-figures")[0] == 0
+    assert run("next", "c", applied(once, tmp_path / "r3.csv"), "--no-figures")[0] == 0
 
 
 def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_path):
@@ -169,9 +170,7 @@ def test_whatever_a_record_says_the_next_part_keeps_the_cap(run, begun, tmp_path
     for number in (1, 2):
         times, u = np.loadtxt(begun / "signal.csv", delimiter=",", skiprows=1).T
         y = 0.01 * np.random.default_rng(number).standard_normal(len(u))
-        code, out, _ = run(
-            "next", "c", written(tmp_path / f"r{number}.csv", times, 20 * u, y), "--as-applied", "--json"
-        )
+        code, out, _ = run("next", "c", written(tmp_path / f"r{number}.csv", times, 20 * u, y), *APPLIED)
         campaign = json.loads(out)["campaign"]
         if campaign["state"] != "running":
             break
@@ -200,13 +199,12 @@ def test_the_same_record_does_not_count_twice(run, begun, tmp_path):
     assert "data-repeated" in err
 
 
-def test_records_are_not_lost_to_another_run(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r.csv"), "--no-figures")[0] == 0
+def test_records_are_not_lost_to_another_run(run, once, tmp_path):
     for verb in ("solve", "campaign"):
         code, _, err = run(verb, "s.yaml", "-o", "c")
         assert code == 2
         assert "campaign-exists" in err
-    assert (begun / "record_01.csv").is_file()
+    assert (once / "record_01.csv").is_file()
 
 
 def test_directories_of_another_kind_and_version_are_refused(run, begun):

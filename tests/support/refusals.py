@@ -1,0 +1,19 @@
+"""What is refused, and how."""
+
+from collections.abc import Callable
+
+import pytest
+
+from inputdesign_cli.errors import Diagnostic, IdesignError, SpecError
+
+
+def refusals(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> tuple[Diagnostic, ...]:
+    """All complaints with which `ask` ends, in an error of this kind."""
+    with pytest.raises(kind) as caught:
+        ask()
+    return caught.value.diagnostics
+
+
+def refusal(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> Diagnostic:
+    """The first of them."""
+    return refusals(ask, kind)[0]
