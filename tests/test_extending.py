@@ -1,5 +1,6 @@
 """The promise of docs/CONTRIBUTING.md: what its examples add from outside is designed and proved."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -8,10 +9,12 @@ import cvxpy as cp
 import numpy as np
 import pydantic
 import pytest
+from typer.testing import CliRunner
 
 from extending.pieces import PiecesBasis
 from extending.total_variance import TotalVariance
-from inputdesign_cli import parse_spec, solve
+from inputdesign_cli import parse_spec, plugins, solve
+from inputdesign_cli.cli import app
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.building import requirements as builders
 from inputdesign_cli.questions.task import build_task
@@ -133,3 +136,54 @@ def test_a_new_family_of_spectra_is_designed_and_proved():
     assert found["cost"] == pytest.approx(plain.value, rel=1e-6)
     assert found["objective"]["relative_gap"] < 1e-6
     assert found["spectrum"]["powers"] == pytest.approx(powers.value, abs=1e-5 * plain.value)
+
+
+@pytest.fixture
+def schroeder_chirp(tmp_path, monkeypatch):
+    """A package is installed whose entry point names the kind of signal of docs/extending."""
+    about = tmp_path / "chirps-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: chirps\nVersion: 1.0\n")
+    point = "schroeder_chirp = extending.schroeder_chirp:KIND"
+    (about / "entry_points.txt").write_text(f"[idesign.signals]\n{point}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    plugins.points.cache_clear()
+    yield
+    monkeypatch.undo()
+    plugins.points.cache_clear()
+
+
+def chirp_spec():
+    text = SPEC.format(accuracy="{model_error: {relative: 0.2, alpha: 2}}")
+    return parse_spec(text.replace("{seed: 1}", "{type: schroeder_chirp, seed: 1}"))
+
+
+@pytest.mark.usefixtures("schroeder_chirp")
+def test_a_new_kind_of_signal_realises_a_design():
+    found = solve(chirp_spec())
+    signal, u = found.result["signal"], found.tables["signal"].columns["u1"]
+    assert signal["type"] == "schroeder_chirp"
+    assert signal["worst_ratio"] <= 1.0 + 1e-9
+    # Its lines have the powers of the design, c_0 + 2 sum c_k cos(k w), and Schroeder's phases a low peak.
+    c, w = found.result["spectrum"]["coefficients"], 2.0 * np.pi * np.arange(SAMPLES // 2 + 1) / SAMPLES
+    density = c[0] + 2.0 * sum(c[k] * np.cos(k * w) for k in range(1, len(c)))
+    lines = np.abs(np.fft.rfft(u))[1:-1] ** 2
+    assert lines / lines.sum() == pytest.approx(density[1:-1] / density[1:-1].sum(), abs=1e-9)
+    assert signal["crest_factor"][0] < 2.0
+
+
+@pytest.mark.usefixtures("schroeder_chirp")
+def test_a_new_kind_of_signal_is_made_without_a_spec():
+    words = ["signal", "--kind", "schroeder_chirp", "--band", "0.1:1", "--samples", "400", "--json"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    signal = json.loads(result.stdout)["signal"]
+    lines = [n for n in range(1, 200) if 0.1 <= 2 * np.pi * n / 400 <= 1]
+    assert signal["channels"]["u1"]["order_of_excitation"] == 2 * len(lines)
+    assert signal["channels"]["u1"]["crest_factor"] < 2.0
+
+
+def test_a_kind_of_signal_that_nobody_added_is_refused():
+    with pytest.raises(SpecError, match="type"):
+        chirp_spec()
+    assert CliRunner().invoke(app, ["signal", "--kind", "schroeder_chirp"]).exit_code == 2

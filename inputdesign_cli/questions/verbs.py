@@ -26,13 +26,9 @@ def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Result
     """
     from inputdesign_cli import questions
 
-    match verb:
-        case "solve":
-            return questions.solve(spec)
-        case "analyse":
-            return questions.analyse(spec)
-        case "simulate":
-            return questions.simulate(spec, executor=executor)
+    if verb == "simulate":
+        return questions.simulate(spec, executor=executor)
+    return questions.solve(spec) if verb == "solve" else questions.analyse(spec)
 
 
 def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:

@@ -10,13 +10,10 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.signal.bounds import Bounds, limiter_of
 from inputdesign_cli.signal.constraints import compressed, peak_ratio
-from inputdesign_cli.signal.evaluation import MET, Evaluator, Target
+from inputdesign_cli.signal.evaluation import MET, Evaluator, Target, first_level, last_level, level_of_power
 from inputdesign_cli.signal.generator import SignalGenerator
-from inputdesign_cli.signal.level_search import first_level, last_level, level_of_power
-from inputdesign_cli.signal.limiter import Limiter
-from inputdesign_cli.signal.settings import FROM_LEVELS, LEVELLED, Method
+from inputdesign_cli.signal.limits import Bounds, Limiter
 from inputdesign_cli.signal.switching import better_switching
 
 # Times the level that fits as it is: how much is clipped of the records that are tried.
@@ -43,7 +40,7 @@ class Record:
     """
 
     samples: Array
-    method: Method
+    method: str
     worst_ratio: float
     factor_residual: float | None = None
     extra_power: float = 0.0
@@ -75,7 +72,7 @@ def best_record(
         OutOfTimeError: the time limit passed before the first was made.
     """
     bounds, settings = bounds or Bounds(), generator.settings
-    limiter = limiter_of(limiting or plant, settings, bounds)
+    limiter = Limiter.of(limiting or plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
     best = candidates.record(_stream(settings.seed, 0))
     missed = [best.worst_ratio]
@@ -129,7 +126,7 @@ class _Candidates:
         drawn = _power(values)
         if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
             values = values * np.sqrt(power / drawn)
-        if self.generator.method == "slewed":
+        if self.generator.kind.slewed:
             values = self._switched(values, self._strongest, rng)
         factor, evaluator = self.generator.factor, self.evaluator
         designed = evaluator.target.designed or power
@@ -160,7 +157,7 @@ class _Candidates:
     @property
     def _strongest(self) -> float:
         """The highest level; where there is none, that of the design."""
-        return 1.0 if any(limits.reach is None for limits in self.limiter.inputs) else _FAR
+        return _FAR if np.isfinite(self.limiter.reach).all() else 1.0
 
     def _switched(self, values: Array, level: float, rng: np.random.Generator) -> Array:
         """The values (m, r) of two levels, switched at better times; what repeats stays so.
@@ -201,9 +198,10 @@ class _Candidates:
         samples = limiter.record(values, level)
         if evaluator.figure(samples) <= 1.0:
             return samples, True
-        if settings.method in LEVELLED and evaluator.ratio(limiter.record(values, _FAR * level)) > MET:
+        kind = self.generator.kind
+        if kind.few_levels and evaluator.ratio(limiter.record(values, _FAR * level)) > MET:
             # More of the same levels is always better, and there is no more.
-            if settings.method == "binary" and switched:
+            if kind.switched and switched:
                 values = self._switched(values, _FAR * level, rng)
             if evaluator.figure(limiter.record(values, _FAR * level)) > 1.0:
                 return self._affordable(values, _FAR * level), False
@@ -220,7 +218,7 @@ class _Candidates:
         What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
         strongest = self._of_designed_power(values)
-        if self.limiter.settings.method in FROM_LEVELS:
+        if self.generator.kind.of_levels:
             return strongest
         fit = self._fitting(values)
         tried = [strongest, *(self._affordable(values, share * fit) for share in _CLIPPED)]
@@ -230,10 +228,7 @@ class _Candidates:
     def _fitting(self, values: Array) -> float:
         """The largest level at which the values need no change."""
         limiter = self.limiter
-        factors = [limits.factor(column) for limits, column in zip(limiter.inputs, values.T, strict=True)]
-        if limiter.constraints:
-            factors.append(1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
-        return min(min(factors), 1.0)
+        return min(limiter.factor(values), 1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
 
     def _of_designed_power(self, values: Array) -> Array:
         """The record of the power of the design, or of the most below that the limits allow."""
@@ -247,10 +242,10 @@ class _Candidates:
 
     def _lowered(self, values: Array, level: float) -> Array:
         """Lower the peak of the values towards what the limits admit, if that keeps their kind."""
-        settings, reach = self.limiter.settings, self.limiter.inputs[0].reach
-        fixed = settings.method in FROM_LEVELS or settings.phases == "optimised" or settings.ramp
+        settings, reach = self.limiter.settings, float(self.limiter.reach[0])
+        fixed = self.generator.kind.of_levels or settings.phases == "optimised" or settings.ramp
         # Phases of several inputs that give way one by one would spoil the cross-spectra.
-        if reach is None or fixed or values.shape[1] > 1:
+        if np.isinf(reach) or fixed or values.shape[1] > 1:
             return values
         return compressed(values[:, 0], reach / level)[:, None]
 

@@ -10,7 +10,7 @@ from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome.golden import compare
 from inputdesign_cli.outcome.golden_file import load_golden
-from inputdesign_cli.questions.least_cost.methods import GridMethod
+from inputdesign_cli.questions.least_cost.sought import GridMethod
 from inputdesign_cli.questions.verbs import execute
 
 ROOT = Path(__file__).parent.parent.parent

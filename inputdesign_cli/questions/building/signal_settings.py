@@ -10,8 +10,10 @@ from inputdesign_cli.questions.building.demand import check_record, longest_reco
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest, least_period
-from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings, blocks_of
-from inputdesign_cli.signal.settings import FROM_LEVELS, Method, Phases
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.signal.limits import Bounds
+from inputdesign_cli.signal.multisine import blocks_of
+from inputdesign_cli.signal.settings import Phases, Quantiser, SignalSettings
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.units import SECONDS
 
@@ -61,7 +63,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     )
 
 
-def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSettings:
+def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettings:
     """Return the settings of the signal; its type and phases, if not stated, follow from other keys.
 
     Args:
@@ -75,7 +77,7 @@ def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSet
     candidates = max(_CANDIDATES // inputs, _FEWEST)
     if method == "multisine" and phases == "optimised":
         candidates = _OPTIMISED
-    elif method == "slewed":
+    elif kind_of(method).slewed:
         candidates = _SEARCHED
     most = _PATIENCE * candidates if method == "filtered_noise" else candidates
     return SignalSettings(
@@ -171,7 +173,7 @@ def sampling_rate(spec: Spec) -> float:
     return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
 
 
-def _method(spec: Spec) -> Method:
+def _method(spec: Spec) -> str:
     """The type of signal: stated, or the one that other keys belong to."""
     signal = spec.signal
     if signal.type is not None:
@@ -183,7 +185,7 @@ def _method(spec: Spec) -> Method:
     return _usual_method(spec)
 
 
-def _usual_method(spec: Spec) -> Method:
+def _usual_method(spec: Spec) -> str:
     """The type if none is stated: filtered noise for one input and output in q^-1, otherwise a multisine."""
     plant, spectrum = spec.plant, spec.spectrum
     if spec.accuracy.frequency_response is not None:
@@ -193,15 +195,15 @@ def _usual_method(spec: Spec) -> Method:
     return "filtered_noise" if single and not banded else "multisine"
 
 
-def _other_methods(spec: Spec) -> tuple[Method, ...]:
+def _other_methods(spec: Spec) -> tuple[str, ...]:
     """Other types that may serve as well; empty if the spec states how the signal is made."""
     signal = spec.signal
     if signal.phases is not None or signal.lines is not None or signal.bits is not None:
         return ()
-    levels: tuple[Method, ...] = ("binary",) if spec.plant.sampled and not signal.ramp else ()
+    levels: tuple[str, ...] = ("binary",) if spec.plant.sampled and not signal.ramp else ()
     if levels and _ramps_needed(spec):
         levels = ("slewed",)
-    others: list[Method] = list(dict.fromkeys((_usual_method(spec), "multisine", *levels)))
+    others: list[str] = list(dict.fromkeys((_usual_method(spec), "multisine", *levels)))
     return tuple(method for method in others if method != _method(spec))
 
 
@@ -252,13 +254,6 @@ def check_signal(spec: Spec) -> None:
             hint="ask for more samples, fewer periods or a shorter hold",
             key="signal.periods" if settings.periods > 1 else "signal.hold",
         )
-    if settings.ramp and settings.method in FROM_LEVELS:
-        raise spec.complain(
-            "unsuitable-key",
-            f"ramp does not go with type: {settings.method}, whose values are of a few levels",
-            hint="remove it, or use filtered_noise or multisine",
-            key="signal.ramp",
-        )
     if 2 * settings.ramp > samples and fixed:
         raise spec.complain(
             "out-of-range",
@@ -266,15 +261,7 @@ def check_signal(spec: Spec) -> None:
             hint=f"write at most {samples // 2}",
             key="signal.ramp",
         )
-    if settings.method == "slewed" and (spec.closed_loop or spec.limits.rate is None):
-        raise spec.complain(
-            "unsuitable-key",
-            "type: slewed is a signal of ramps between two levels, at the speed of limits.rate, which "
-            + ("in a loop does not limit what is applied" if spec.closed_loop else "is not stated"),
-            hint=("" if spec.closed_loop else "state limits.rate, or ")
-            + "use type: binary, which switches at once",
-            key="signal.type",
-        )
+    _check_kind(spec, settings)
     _check_harmonics(spec, settings, samples if fixed else None)
     _check_register(spec, settings)
     _check_files(spec)
@@ -285,6 +272,34 @@ def check_signal(spec: Spec) -> None:
         _check_level(spec, channel, amplitude)
         if bounds.quantisers:
             _check_converter(spec, bounds.quantisers[channel], amplitude, rate)
+
+
+def _check_kind(spec: Spec, settings: SignalSettings) -> None:
+    """Refuse what the kind of signal cannot be."""
+    kind = kind_of(settings.method)
+    if settings.ramp and kind.of_levels:
+        raise spec.complain(
+            "unsuitable-key",
+            f"ramp does not go with type: {settings.method}, whose values are of a few levels",
+            hint="remove it, or use filtered_noise or multisine",
+            key="signal.ramp",
+        )
+    if kind.slewed and (spec.closed_loop or spec.limits.rate is None):
+        raise spec.complain(
+            "unsuitable-key",
+            "type: slewed is a signal of ramps between two levels, at the speed of limits.rate, which "
+            + ("in a loop does not limit what is applied" if spec.closed_loop else "is not stated"),
+            hint=("" if spec.closed_loop else "state limits.rate, or ")
+            + "use type: binary, which switches at once",
+            key="signal.type",
+        )
+    if not kind.several and spec.plant.inputs > 1:
+        raise spec.complain(
+            "not-supported",
+            f"type: {settings.method} is a signal of one input, and the plant has {spec.plant.inputs}",
+            hint="use type: multisine",
+            key="signal.type",
+        )
 
 
 def _check_harmonics(spec: Spec, settings: SignalSettings, samples: int | None) -> None:

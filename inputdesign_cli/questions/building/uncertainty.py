@@ -256,7 +256,7 @@ class _Scenarios(UncertainPlant):
     def worst_region(self, confidence: float) -> Region:
         """Return the region of this confidence in which the worst plant is searched."""
         name, centre, columns, box = self.region(confidence)
-        return Region(name, centre, columns, box, self.possible)
+        return Region(centre, columns, box, name, self.possible)
 
     def possible(self, theta: Array) -> Alternative | None:
         """Return the plant with these parameters; None if there is none, or it is unstable."""

@@ -86,14 +86,11 @@ class Informed:
     def of_length(
         self, experiment: Experiment, pairs: Pairs | None, samples: int, *, flat: bool = True
     ) -> dict[str, Curves]:
-        """Return `bound` and `ellipses` of records of this many samples with the same spectrum."""
-        found: dict[str, Curves] = {}
-        longer = experiment.of_length(self.information, samples)
+        """Return the curves of records of this many samples with the same spectrum."""
         white = experiment.of_length(self.white, samples) if flat and self.white is not None else None
-        with suppress(np.linalg.LinAlgError):
-            found["bound"] = Informed(self.units, self.errors, longer, self.stated).bound()[1]
-        drawn = experiment_ellipses(experiment, longer, white, pairs)
-        return found if drawn is None else found | {"ellipses": drawn}
+        information = experiment.of_length(self.information, samples)
+        longer = Informed(self.units, self.errors, information, self.stated, white=white)
+        return longer.curves(experiment, pairs, flat=flat)[1]
 
     def bound(self) -> tuple[Table, BoundCurves]:
         """Return r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement."""

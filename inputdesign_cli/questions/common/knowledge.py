@@ -32,9 +32,13 @@ class Knowledge:
     columns: Array
     box: bool
 
+    def coordinates(self, theta: Array) -> Array:
+        """Return z (m,) of parameters (k,)."""
+        return np.asarray(np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0], dtype=float)
+
     def admits(self, theta: Array) -> bool:
         """Whether parameters (k,) are possible."""
-        z = np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0]
+        z = self.coordinates(theta)
         size = np.max(np.abs(z), initial=0.0) if self.box else np.linalg.norm(z)
         return bool(size <= _ROOM)
 

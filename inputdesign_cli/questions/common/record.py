@@ -18,18 +18,12 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.signal import (
-    Bounds,
-    DesignedSpectrum,
-    Record,
-    SignalGenerator,
-    SignalSettings,
-    Target,
-    best_record,
-    limited_responses,
-    peak_share,
-)
-from inputdesign_cli.signal.evaluation import MET
+from inputdesign_cli.signal.evaluation import MET, Target
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.limits import Bounds, limited_responses, peak_share
+from inputdesign_cli.signal.lines import DesignedSpectrum
+from inputdesign_cli.signal.selection import Record, best_record
+from inputdesign_cli.signal.settings import SignalSettings
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.

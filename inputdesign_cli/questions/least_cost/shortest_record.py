@@ -11,7 +11,7 @@ import scipy
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.questions.common.record import Made
-from inputdesign_cli.signal import LONG, Record
+from inputdesign_cli.signal.selection import LONG, Record
 
 # Lengths that are looked into: times the one that was asked for, or that many samples.
 _LONGEST, _AT_LEAST = 64, 20_000

@@ -36,8 +36,8 @@ from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
+from inputdesign_cli.questions.common.delivery import proof_status
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
-from inputdesign_cli.questions.common.status import proof_status
 from inputdesign_cli.signal.lines import Lines
 
 # Frequencies of the plots, and what share of the band they reach down to.

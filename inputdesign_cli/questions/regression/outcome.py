@@ -32,7 +32,7 @@ from inputdesign_cli.outcome import (
 from inputdesign_cli.outcome.curves import ErrorCurves
 from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
 from inputdesign_cli.outcome.units import Header
-from inputdesign_cli.questions.common.status import proof_status
+from inputdesign_cli.questions.common.delivery import proof_status
 
 _POINTS = 400
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, time_for_hints
+from inputdesign_cli.design.convex.demands import Asked
 from inputdesign_cli.design.convex.designs import solve_design
-from inputdesign_cli.design.convex.exchange import exchange
+from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
-from inputdesign_cli.outcome.rounding import rounded_up
+from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.within_limits import Bought, StatedBound, named
 from inputdesign_cli.spectrum import LinesBasis
 
 _TOLERANCE, _EXACT = 1e-5, 1e-6
@@ -26,27 +26,165 @@ _ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare
 _STEPS = 30
 _LONGEST_STEP, _MOST = 1e3, 1e9
 _NO_SHARE = 1e-5
+# A limit takes part in the conflict when its share of the proof's weight is above this.
+_TAKES_PART = 1e-4
+_MOST_PLACES = 3
+
+
+@dataclass(frozen=True)
+class StatedBound:
+    """A number of the spec that bounds an error, so that what is bought can be said in its words.
+
+    An error `factor` times as large as asked stands for `value` times factor ** `power`. A `fraction` is
+    shown in per cent.
+    """
+
+    key: str
+    label: str
+    value: float
+    power: int = 1
+    fraction: bool = False
+
+    def loosened(self, factor: float) -> float:
+        """What the spec would have to say for an error `factor` times as large."""
+        return self.value * factor**self.power
+
+    def shown(self, value: float) -> str:
+        """Return a number for a sentence, rounded towards less accuracy: what is printed can be met."""
+        number = 100.0 * value if self.fraction else value
+        return f"{rounded_up(number, 4) if self.power > 0 else rounded_down(number, 4)}" + (
+            " %" if self.fraction else ""
+        )
+
+
+@dataclass(frozen=True)
+class Bought:
+    """The best accuracy within limits: `nearest` solves `problem` (goal "factor"), which was asked.
+
+    Args:
+        stated: the numbers of the spec that are loosened alike; none if that has no words.
+        limits: of the spec; others of the problem are implied by them.
+    """
+
+    units: Units
+    stated: Sequence[StatedBound]
+    limits: Sequence[PowerLimit]
+    problem: Problem
+    nearest: ExchangeResult
+
+    @property
+    def factor(self) -> float:
+        """The least factor on all errors that are asked for with which they are met."""
+        return float(np.sqrt(self.nearest.objective))
+
+    @property
+    def proved(self) -> float:
+        """A proved lower bound on the factor."""
+        return float(np.sqrt(max(self.nearest.certificate.bound, 1.0)))
+
+    @property
+    def sentence(self) -> str:
+        """What the limits buy, and where that is worst."""
+        if self.stated:
+            parts = [
+                f"{one.label} {one.shown(one.loosened(self.factor))} (asked: {one.shown(one.value)})"
+                for one in self.stated
+            ]
+            buys = " and ".join(parts)
+        else:
+            buys = f"standard deviations {rounded_up(self.factor, 4)} times as large as it takes"
+        places = [text for text in map(self._place, self._binding) if text]
+        shown = list(dict.fromkeys(places))
+        more = ", .." if len(shown) > _MOST_PLACES else ""
+        worst = f", worst {' and '.join(shown[:_MOST_PLACES])}{more}" if shown else ""
+        return f"the limits buy {buys}{worst}"
+
+    @property
+    def involved(self) -> list[PowerLimit]:
+        """The limits that take part in the proof."""
+        return [limit for limit, _ in self._shares]
+
+    @property
+    def details(self) -> dict[str, object]:
+        """Return this as data, with frequencies in the user's unit."""
+        return {
+            "factor": self.factor,
+            "factor_bound": self.proved,
+            "bought": [
+                {"key": bound.key, "asked": bound.value, "bought": bound.loosened(self.factor)}
+                for bound in self.stated
+            ],
+            "worst": [self._listed(asked, w) for asked, w in self._binding],
+            "limits": [_entry(limit, share) for limit, share in self._shares],
+        }
+
+    @property
+    def _shares(self) -> list[tuple[PowerLimit, float]]:
+        """Each limit of the spec with its share of the weight of the proof."""
+        listed = self.problem.limits
+        weights = self.nearest.certificate.limits * np.array([limit.bound for limit in listed])
+        least = _TAKES_PART * max(weights.max(initial=0.0), 1e-300)
+        stated = listed[: len(self.limits)]
+        known = [(limit, float(weights[limit.everywhere(listed)].sum())) for limit in stated]
+        return [(limit, share) for limit, share in known if share > least]
+
+    @property
+    def _binding(self) -> list[tuple[Asked, float | None]]:
+        """Where the requirements bind, the place of the largest multiplier first."""
+        return [(self.problem.demands.asked[index], w) for index, w in self.nearest.active]
+
+    def _place(self, place: tuple[Asked, float | None]) -> str:
+        requirement, w = place[0].requirement, place[1]
+        parts = []
+        if requirement.entry is not None and not self.units.single:
+            parts.append(f"in entry {self.units.entry(*requirement.entry)}")
+        if w is not None:
+            parts.append(f"at {self.units.named(w)}")
+        return " ".join(parts)
+
+    def _listed(self, asked: Asked, w: float | None) -> dict[str, object]:
+        requirement = asked.requirement
+        item: dict[str, object] = {"name": requirement.name}
+        if requirement.entry is not None and not self.units.single:
+            item["entry"] = self.units.entry(*requirement.entry)
+        if w is not None:
+            item["frequency"] = w / self.units.frequency
+        at = np.array([0.0 if w is None else w])
+        item["worst_ratio"] = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
+        return item
+
+
+def named(limit: PowerLimit) -> str:
+    """Return the power that a limit bounds, for a sentence: the input power; the power of input 2."""
+    number = "" if limit.channel is None else f" {limit.channel + 1}"
+    if limit.kind == "moves":
+        power = f"the power of the moves of input{number}" if number else "the power of the input's moves"
+    else:
+        power = f"the power of {limit.kind}{number}" if number else f"the {limit.kind} power"
+    if not limit.implied:
+        return power
+    bound = "rate limit" if limit.kind == "moves" else "amplitude limit"
+    return f"{power}, which the {bound} {np.sqrt(limit.bound):.6g} bounds,"
+
+
+def _entry(limit: PowerLimit, share: float) -> dict[str, object]:
+    entry: dict[str, object] = {"name": limit.key.removeprefix("limits.")}
+    if limit.channel is not None:
+        entry["channel"] = limit.channel + 1
+    return entry | {"max" if limit.upper else "min": limit.bound, "share": share}
 
 
 def explain(
-    units: Units,
-    question: Question,
-    unreachable: UnreachableError,
-    stated: Sequence[StatedBound] = (),
-    *,
-    samples_of_record: Callable[[int], int | None] = lambda _: None,
+    units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound] = ()
 ) -> InfeasibleError:
-    """The proof that came with the failure, in the words of the spec.
-
-    Args:
-        stated: the numbers of the spec that can be loosened.
-        samples_of_record: maps the samples that a spectrum takes to what a record takes; None: not known.
-    """
+    """Say the proof that came with the failure, by the numbers of the spec that can be loosened."""
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
     involved = bought.involved
     if unreachable.limits_alone:
-        return _contradiction(involved, nearest.certificate.bound)
+        times = f"{nearest.certificate.bound:.4g} times as large for the lower ones to be reached"
+        why = f"contradict each other: the upper ones would have to be {times}"
+        return contradictory(sorted(involved, key=lambda limit: limit.upper), why)
     missed = (problem.demands.requirement(index) for index, _ in nearest.active)
     names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
     hint = (
@@ -58,8 +196,7 @@ def explain(
     try:  # that it is infeasible is proved, whatever else is found out
         with time_for_hints():
             parts += _what_would_do(unreachable, question, involved)
-            for remedy in _remedies(units, question, nearest.objective, samples_of_record):
-                remedies.append(remedy)
+            remedies += _remedies(question, nearest.objective)
     except OutOfTimeError:
         remedies.append("what else would do was not looked for further")
     message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
@@ -70,27 +207,18 @@ def explain(
     return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
 
 
-def _remedies(
-    units: Units, question: Question, times: float, samples_of_record: Callable[[int], int | None]
-) -> Iterator[str]:
-    """Yield what meets the accuracy within the limits, what takes longest to find out last.
+def _remedies(question: Question, times: float) -> Iterator[str]:
+    """Yield what meets the accuracy within the limits.
 
     Args:
         times: what the information lacks within the limits, as a factor.
-
-    Raises:
-        OutOfTimeError: see `seconds_left`.
     """
-    longer = None
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(times):
         # Within the same limits information grows in proportion to the length.
         longer = int(np.ceil(question.experiment.samples * times))
-        yield f"with {longer} samples a spectrum can"
+        yield f"with {longer} samples a spectrum can, and a record with somewhat more"
     if _within_reach_of_any(question):
         yield "spectrum: {type: free} can meet it"
-    enough = None if longer is None else samples_of_record(longer)
-    if enough is not None:
-        yield f"with {units.length(enough)} (and signal.samples, if stated) a record can"
 
 
 def _what_would_do(
@@ -164,17 +292,12 @@ def _within_reach_of_any(question: Question) -> bool:
     return True
 
 
-def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError:
-    lower = [limit for limit in involved if not limit.upper]
-    upper = [limit for limit in involved if limit.upper]
-    names = ", ".join(dict.fromkeys(limit.key for limit in (*lower, *upper))) or "limits.spectrum"
-    where = [*lower, *upper][0].key if involved else "limits"
+def contradictory(limits: Sequence[PowerLimit], why: str) -> InfeasibleError:
+    """Return the error that no spectrum keeps to these limits, whatever is asked."""
+    names = ", ".join(dict.fromkeys(limit.key for limit in limits)) or "limits.spectrum"
+    key = limits[0].key if limits else "limits"
     return InfeasibleError.because(
-        "contradictory-limits",
-        f"no spectrum of this type keeps to {names}: the upper limits would have to be {proved:.4g} "
-        "times as large for the lower ones to be reached",
-        "lower min, or raise max",
-        where,
+        "contradictory-limits", f"{names} {why}", "lower min of these limits, or raise max", key
     )
 
 
