@@ -10,7 +10,7 @@ _ANNOUNCED = defaultdict[str, set[str]](set)
 
 
 def announce(group: str, name: str) -> None:
-    """Let specs use a name of a group, such as `idesign.signals`."""
+    """Let specs use a name of a group: `idesign.signals`, for example."""
     _ANNOUNCED[group].add(name)
 
 

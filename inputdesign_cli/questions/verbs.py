@@ -16,11 +16,6 @@ Verb = Literal["solve", "analyse", "simulate"]
 def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Results:
     """What `idesign VERB` computes; the numerical libraries are imported now.
 
-    Args:
-        verb: what to do.
-        spec: on what.
-        executor: where to `simulate` (default: in this process); the other verbs need none.
-
     Raises:
         IdesignError: as the verb does.
     """

@@ -87,13 +87,7 @@ def few_levels(
 def _alternate(
     start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
 ) -> Array:
-    """The best signal of few levels that is met on the way between the two things wanted.
-
-    Args:
-        start: the first signal of any values.
-        nearest: the signal of few levels next to one of any values.
-        restored: the signal with the wanted spectrum next to one of few levels, and the misfit of that.
-    """
+    """The best signal of few levels that is met on the way between the two things wanted."""
     levels = nearest(start)
     best, least = levels, np.inf
     for _ in range(_ROUNDS):

@@ -113,9 +113,7 @@ def low_peak_phases(
 
     Args:
         samples: of the whole record, in as many periods as there are inputs.
-        start: (L,), where to begin.
         limited: what is kept low; each input relative to its root mean square when nothing is limited.
-        powers, steps: see `optimise_phases`.
     """
     rms = np.sqrt(lines.mean_squares)
     unit = np.eye(lines.inputs)

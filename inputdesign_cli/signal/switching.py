@@ -30,7 +30,6 @@ def better_switching(
 
     Args:
         figure: of a signal of two levels, to be small.
-        tries: at most.
         enough: ends the search; so does a pace that would not lead there. None: as small as it gets.
     """
     best, least = values, float(figure(values))

@@ -96,6 +96,7 @@ BAD = [
     (["signal.bits=3", "signal.type=prbs"], "out-of-range", "signal.bits"),
     (["signal.lines=[1, 200]"], "out-of-range", "signal.lines"),
     (["signal.ramp=10", "signal.type=binary"], "unsuitable-key", "signal.ramp"),
+    (["signal.type=chirp"], "not-supported", "signal.type"),
     (["signal.amplitudes=[1, 9]", "limits.amplitude=[2, 8]"], "conflicting-keys", "signal.amplitudes"),
     (["signal.quantisation={bits: 4, range: [9, 9, 9]}"], "wrong-shape", "signal.quantisation.range"),
     (

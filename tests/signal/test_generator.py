@@ -16,7 +16,7 @@ from inputdesign_cli.signal.spectral_factor import autocorrelation
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
-KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
+KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "steps"]
 
 
 def rng(seed=0):

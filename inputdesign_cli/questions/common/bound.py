@@ -67,13 +67,7 @@ class Informed:
     def curves(
         self, experiment: Experiment, pairs: Pairs | None, *, flat: bool = True
     ) -> tuple[dict[str, Table], dict[str, Curves]]:
-        """Return the tables and figures of the bound, the loop and the parameters, as far as they exist.
-
-        Args:
-            experiment: in the coordinates of the information.
-            pairs: of parameters that ellipses show.
-            flat: whether ellipses show white excitation as well.
-        """
+        """Return the tables and figures of the bound, the loop and the parameters, as far as they exist."""
         tables, curves = dict[str, Table](), dict[str, Curves]()
         with suppress(np.linalg.LinAlgError):  # a parameter that the design does not excite
             tables["bound"], curves["bound"] = self.bound()
@@ -199,9 +193,6 @@ def experiment_ellipses(
     experiment: Experiment, information: Array, white: Array | None, pairs: Pairs | None
 ) -> EllipseCurves | None:
     """The chosen `pairs`, by default those most correlated where there are several channels.
-
-    Args:
-        information, white: (k, k) in the coordinates of `experiment`, by the design and by flat excitation.
 
     Returns:
         None when there is no pair to show, or some parameter has no finite variance.

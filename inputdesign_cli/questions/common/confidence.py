@@ -120,11 +120,7 @@ class Confidence:
         usual: float,
         simulated: SimulatedEstimates | None = None,
     ) -> Confidence:
-        """The alpha of an experiment of this information (k, k), in the coordinates of the requirements.
-
-        Args:
-            simulated: estimates of such experiments; None for asymptotic theory alone.
-        """
+        """The alpha of an experiment of this information (k, k), in the coordinates of the requirements."""
         errors = bounded_errors(requirements)
         if calibration is None or not errors:
             return cls(usual, usual)

@@ -138,8 +138,6 @@ def record_findings(
     """Return what a user should know before applying a record.
 
     Args:
-        experiment: samples of the experiment.
-        record: None if none was made.
         shares: of each limit on single samples that it takes.
         of_powers: whether powers are limited.
     """
@@ -159,9 +157,7 @@ def begun_anywhere(
     A design is of spectra, which have no start; the record may live on its start from rest.
 
     Args:
-        signal: what is said of it so far.
         step: time between samples in the unit of the experiment's frequencies.
-        requirements: what the errors are measured by.
     """
     growth = _growth(experiment, record, step, requirements)
     if growth <= 1.0 + _MATTERS:

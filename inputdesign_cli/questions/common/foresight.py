@@ -56,9 +56,7 @@ class Foresight:
         nominal: the experiment in raw parameters, prior information included.
         entries: errors that have r_u where no requirement bounds one.
         earlier: what counts along where the data are assessed.
-        advice: what to do about rivals.
         knowledge: what the spec says of the parameters, which rules rivals out.
-        looks: whether rivals are looked for at all.
     """
 
     units: Units

@@ -78,11 +78,6 @@ class Bought:
         return float(np.sqrt(self.nearest.objective))
 
     @property
-    def proved(self) -> float:
-        """A proved lower bound on the factor."""
-        return float(np.sqrt(max(self.nearest.certificate.bound, 1.0)))
-
-    @property
     def sentence(self) -> str:
         """What the limits buy, and where that is worst."""
         if self.stated:
@@ -109,7 +104,7 @@ class Bought:
         """Return this as data, with frequencies in the user's unit."""
         return {
             "factor": self.factor,
-            "factor_bound": self.proved,
+            "factor_bound": float(np.sqrt(max(self.nearest.certificate.bound, 1.0))),
             "bought": [
                 {"key": bound.key, "asked": bound.value, "bought": bound.loosened(self.factor)}
                 for bound in self.stated
@@ -155,16 +150,9 @@ class Bought:
 
 
 def named(limit: PowerLimit) -> str:
-    """Return the power that a limit bounds, for a sentence: the input power; the power of input 2."""
+    """Return what a limit bounds, for a sentence: input 2 power, or power of the moves of input 2."""
     number = "" if limit.channel is None else f" {limit.channel + 1}"
-    if limit.kind == "moves":
-        power = f"the power of the moves of input{number}" if number else "the power of the input's moves"
-    else:
-        power = f"the power of {limit.kind}{number}" if number else f"the {limit.kind} power"
-    if not limit.implied:
-        return power
-    bound = "rate limit" if limit.kind == "moves" else "amplitude limit"
-    return f"{power}, which the {bound} {np.sqrt(limit.bound):.6g} bounds,"
+    return f"power of the moves of input{number}" if limit.kind == "moves" else f"{limit.kind}{number} power"
 
 
 def _entry(limit: PowerLimit, share: float) -> dict[str, object]:
@@ -208,11 +196,7 @@ def explain(
 
 
 def _remedies(question: Question, times: float) -> Iterator[str]:
-    """Yield what meets the accuracy within the limits.
-
-    Args:
-        times: what the information lacks within the limits, as a factor.
-    """
+    """Yield what meets the accuracy within the limits."""
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(times):
         # Within the same limits information grows in proportion to the length.
         longer = int(np.ceil(question.experiment.samples * times))
@@ -224,20 +208,34 @@ def _remedies(question: Question, times: float) -> Iterator[str]:
 def _what_would_do(
     unreachable: UnreachableError, question: Question, involved: Sequence[PowerLimit]
 ) -> list[str]:
-    """Which limits are exhausted, and what they would have to be."""
-    needs = {limit: _needed(unreachable, limit) for limit in involved if limit.upper}
-    parts = [f"{named(limit)} is exhausted" for limit, need in needs.items() if not need]
-    parts += [need for need in needs.values() if need]
-    if not any(needs.values()):
-        parts.append(_together(unreachable, question))
-    return parts
+    """Return which limits are exhausted, and what each would have to be with the others kept."""
+    parts, alone = list[str](), False
+    for limit in involved:
+        factor = needed_factor(unreachable, [limit]) if limit.upper else None
+        if factor is not None:
+            alone = True
+            parts.append(_needed(limit, factor * limit.bound))
+        elif limit.upper:
+            parts.insert(0, f"the {named(limit)} is exhausted")
+    return parts if alone else [*parts, _together(unreachable, question)]
+
+
+def _needed(limit: PowerLimit, least: float) -> str:
+    needs = f"needs {named(limit)} >= {rounded_up(least)}"
+    if not limit.implied:
+        return f"{needs}, limit is {limit.bound:.6g}"
+    peak, sample = np.sqrt(limit.bound), limit.of_samples
+    return (
+        f"{needs}, so {sample} of {rounded_up(float(np.sqrt(least)))} at least; the limit, {sample} of "
+        f"{peak:.6g}, allows {limit.bound:.6g}"
+    )
 
 
 def _together(unreachable: UnreachableError, question: Question) -> str:
-    """What all upper limits would have to be."""
-    upper = {limit.key: limit for limit in question.limits if limit.upper}
+    """Return what all upper limits would have to be; the square root of the factor if they bound samples."""
     raised = [limit for limit in question.limits if limit.upper]
-    densities = [density for density in question.densities if density.upper]
+    upper = {limit.key: limit.implied for limit in raised}
+    densities = [density.key for density in question.densities if density.upper]
     # The optimum of the goal "factor" meets the accuracy if limits and densities are multiplied by it.
     factor = unreachable.nearest.objective if densities else needed_factor(unreachable, raised)
     if factor is None:
@@ -245,38 +243,12 @@ def _together(unreachable: UnreachableError, question: Question) -> str:
     times = f"would have to be {rounded_up(factor)} times as large"
     if not upper:
         return f"limits.spectrum {times}"
-    if any(limit.implied for limit in upper.values()):  # what the spec limits there is not a power
-        own = {key: _own_factor(limit, factor) for key, limit in upper.items()}
-        own |= {density.key: factor for density in densities}
+    if any(upper.values()):
+        own = {key: float(np.sqrt(factor)) if implied else factor for key, implied in upper.items()}
+        own |= dict.fromkeys(densities, factor)
         listed = " and ".join(f"{key} {rounded_up(each)} times" for key, each in own.items())
         times = f"would have to be as large as a spectrum needs, {listed}, and larger for a record"
     return f"no change of a single limit is enough; all of them together {times}"
-
-
-def _own_factor(limit: PowerLimit, factor: float) -> float:
-    """Return the factor of the number in the spec if its power is multiplied by `factor`."""
-    return float(np.sqrt(factor)) if limit.implied else factor
-
-
-def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
-    """What the limit would have to be with the others kept; empty if that does not help."""
-    factor = needed_factor(unreachable, [limit])
-    if factor is None:
-        return ""
-    least = factor * limit.bound
-    channel = "" if limit.channel is None else f" {limit.channel + 1}"
-    moves = f"power of the moves of input{channel}"
-    power = moves if limit.kind == "moves" else f"{limit.kind}{channel} power"
-    needs = f"needs {power} >= {rounded_up(least)}"
-    if limit.implied:
-        peak = np.sqrt(limit.bound)
-        least_peak = rounded_up(float(np.sqrt(least)))
-        sample = limit.of_samples
-        return (
-            f"{needs}, so {sample} of {least_peak} at least; the limit, {sample} of {peak:.6g}, allows "
-            f"{limit.bound:.6g}"
-        )
-    return f"{needs}, limit is {limit.bound:.6g}"
 
 
 def _within_reach_of_any(question: Question) -> bool:

@@ -70,10 +70,6 @@ def that_agrees(
     """Return the likeliest minimum that agrees with the knowledge, and the minima that do not.
 
     If none does, the knowledge is wrong and rules nothing out.
-
-    Args:
-        estimate: the likeliest of all, and its rivals.
-        near: makes the estimate at a minimum near parameters (k,).
     """
     minima = (Rival(estimate.theta, 0.0), *estimate.rivals)
     admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]

@@ -55,7 +55,7 @@ def unreachable(units: Units, error: UnreachableError, samples: int) -> Infeasib
     exhausted = " and ".join(dict.fromkeys(map(named, limits)))
     needed = (f"{limit.key} to {rounded_up(_raised(limit, factor))}" for limit in limits)
     more, times = int(np.ceil(samples * factor**2)), rounded_up(factor, 4)
-    message = f"the limits buy standard deviations {times} times those admitted; {exhausted} is exhausted"
+    message = f"the limits buy standard deviations {times} times those admitted; the {exhausted} is exhausted"
     hint = (
         f"raise {' and '.join(needed)}, count {more} samples in place of {samples} "
         f"({units.length(more).split(':')[0]}), or admit {times} times as much"

@@ -64,7 +64,6 @@ class RecordRequest:
         limit_keys: of the spec, for what limits single samples.
         stated_method: whether the spec states the kind of signal.
         others: kinds of signals that may stand in for one that does not fit.
-        units: of lengths in messages.
     """
 
     settings: SignalSettings
@@ -242,11 +241,7 @@ def _power_share(
 
 
 def ratio_before(design: Design, step: float) -> float:
-    """Return the worst ratio that information without excitation gives, at the plant where it is worst.
-
-    Args:
-        step: the sample time, in the unit of the experiment's frequencies.
-    """
+    """Return the worst ratio that information without excitation gives, at the plant where it is worst."""
     ratios = []
     for scenario in design.problem.scenarios:
         silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)

@@ -101,10 +101,6 @@ class Plants:
 
     Args:
         batch: the plants beside the nominal one.
-        source: the key of the spec that they come from.
-        names: of the k parameters.
-        r_adm: as the spec has it.
-        paid: see `Problem`.
         discard: how many of the plants the design may leave out.
         afresh: draws others from the same distribution, a few at a time; None if plants were listed.
         fresh: how many of these were asked for.
@@ -149,12 +145,7 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
 
 
 def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
-    """How near each scenario of the problem comes to missing what the design promises; the nominal one first.
-
-    Args:
-        problem: of the design, on the basis of its answer.
-        samples: of the delivered experiment.
-    """
+    """How near each scenario comes to missing what the design promises; the nominal one first."""
     return _worst(problem, design, delivered(problem, design, samples))
 
 

@@ -41,10 +41,6 @@ def signal_of(
 
     The value of a criterion is for an experiment of its own length that goes on as the record does, so that
     it compares with the design. Other requirements have their worst ratio.
-
-    Args:
-        designed: information matrix (k, k) of the design.
-        spectrum: of the design, for the error of that of the record.
     """
     samples, made = record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)
@@ -108,11 +104,7 @@ def signal_curves(
 def predicted_output(
     units: Units, experiment: Experiment, record: Array, output_limits: Array | None = None
 ) -> tuple[Table, tuple[PredictedPanel, ...]]:
-    """What samples (n, r) cause from rest, and the standard deviation of the noise.
-
-    Args:
-        output_limits: (p,) of |y|, for the figure.
-    """
+    """What samples (n, r) cause from rest, and the standard deviation of the noise."""
     n = len(record)
     y = FiniteRecord(experiment, n, units.step).signals("output", record)
     noise = noise_deviation(experiment, n, units.step)

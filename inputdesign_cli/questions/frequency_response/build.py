@@ -43,9 +43,6 @@ _SIGNAL = (
 # Periods of a block after the transient, if none are stated: their scatter shows the noise.
 _COUNTED = 4
 
-# The longest period that is tried, relative to the stated one, and the number of tries.
-_LONGEST, _TRIED = 1e3, 400
-
 
 def stated_response(spec: Spec) -> FrequencyResponse:
     """Return `accuracy.frequency_response`.
@@ -168,26 +165,12 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
             "too-few-lines",
             f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
             f"asked for{left_out}",
-            hint="take a longer period (more samples, or fewer periods"
-            f"{_longer(spec, period, band, candidates, odd=odd)}), fewer lines, or a higher end of the band",
+            hint="take more samples or fewer periods, fewer lines, or a higher end of the band",
             key=f"{KEY}.lines" if candidates is not None else f"{KEY}.band",
         ) from None
     if group is None:
         return found
     return thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
-
-
-def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
-    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
-    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
-        try:
-            harmonics_between(longer, band, lines, odd=odd)
-        except TooFewHarmonicsError:
-            continue
-        whole = longer * max(spec.experiment.samples // period, 1)
-        lasts = whole * spec.sample_time
-        return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
-    return ""
 
 
 def _check_inside(spec: Spec, wanted: Array, period: int) -> None:

@@ -167,9 +167,6 @@ def measure(
 ) -> Results:
     """Return the response with its confidence; with lines of a spec also how it compares with what is asked.
 
-    Args:
-        assess: whether the result is a verdict.
-
     Raises:
         DataError: a file cannot be used, or does not repeat as the spec says.
     """

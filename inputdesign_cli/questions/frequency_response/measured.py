@@ -131,12 +131,7 @@ def measured_results(
     *,
     assess: bool,
 ) -> Results:
-    """Return the outcome, frequency_response.csv and its figure; with lines of a spec also their deviations.
-
-    Args:
-        shown: the response beside the nominal plant, see `response_of_data`.
-        assess: whether the result is a verdict.
-    """
+    """Return the outcome, frequency_response.csv and its figure; with lines also their deviations."""
     table, curve, response = shown
     data, judged, found = measured.data, measured.judged, list(measured.findings)
     tables, curves = {"frequency_response": table}, dict[str, Curves](frequency_response=curve)

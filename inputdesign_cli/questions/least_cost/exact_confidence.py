@@ -98,9 +98,6 @@ class ExactConfidence:
         """Return the record `made`, or one that keeps the confidence by its own samples.
 
         A record distributes its information otherwise than the design, so that it may need a larger alpha.
-
-        Args:
-            known: the information (k, k) of a record; None if it leaves a parameter undetermined.
         """
         design, alpha, sets = done.design, done.confidence.alpha, 1
         for _ in range(_RECORDS):

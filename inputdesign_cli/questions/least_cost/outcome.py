@@ -151,10 +151,7 @@ def accuracy_of(
     """Return the largest ratio of the model error, and each requirement with its own.
 
     Args:
-        confidence: with alpha of r_u.
-        requirements: what is asked; criteria have no ratio.
         information: M (k, k) in their coordinates.
-        active: frequencies at which they bind.
     """
     listed: list[RequirementMet] = []
     error = ModelError(confidence.alpha, confidence=confidence.reported)

@@ -158,9 +158,6 @@ def _longer(
 ) -> Made:
     """The longer record of a shortest experiment, or the error with what was tried besides.
 
-    Args:
-        samples: the length that was asked for.
-
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
@@ -204,12 +201,7 @@ def _longer(
 def _what_would_do(
     request: RecordRequest, longer: Record | None, search: ShortestRecord, allowed: int | None
 ) -> str:
-    """Return which length would do, as far as it is known.
-
-    Args:
-        longer: a record that meets the accuracy.
-        allowed: the longest experiment, if the shortest is looked for.
-    """
+    """Return which length would do, as far as it is known."""
     if longer is not None:
         samples = len(longer.samples)
         length = request.units.length(samples, "limits" if allowed else "experiment")

@@ -169,10 +169,8 @@ def plants_kept(
     """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
 
     Args:
-        kept: the numbers of the plants that count.
         at_each: what these keep, the plant of the spec first.
         binding: places among them.
-        floors: of the plants that count.
     """
     numbers = [0, *(number + 1 for number in kept)]
     worst = int(np.argmax([one.share for one in at_each]))
@@ -262,7 +260,6 @@ def fresh_plants(
 
     Args:
         try_on: what they keep; a share up to the number may be returned as 0.
-        peak: see `robust_result`.
         promised: the cost that a design promises at every plant.
     """
     if plants.afresh is None:
@@ -305,9 +302,6 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnE
     """Return how near the best accuracy comes to being missed at estimates of the plants that bind.
 
     Data are judged at their estimate, so that some are drawn.
-
-    Args:
-        binding: places among the plants that are kept, the plant of the spec being 0.
     """
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
@@ -348,10 +342,6 @@ def fan_curves(
     """Return fan.csv and its figure: r_u / r_adm at the plant of the spec, the largest, and at active ones.
 
     None if no model error is bounded.
-
-    Args:
-        numbers: what the scenarios are called, in their order; the plant of the spec is 0.
-        active: the places of binding plants, in that order.
     """
     problem, units = done.problem, done.units
     bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]

@@ -127,10 +127,8 @@ class Sought:
         exact: None for the alpha as stated.
         most_samples: the longest experiment allowed.
         plants: that the design is for, beside the plant of the spec.
-        stated: the numbers of the spec that bound errors.
         tolerance: the relative gap that is proved.
         any_spectrum_tolerance: of the bound over every spectrum; None leaves it out.
-        reach: how far spectra reach.
         grid: the program of the papers in place of the exchange.
         columns: a factor of few columns, see `FewColumns`.
     """

@@ -52,9 +52,6 @@ class LoopErrorTerms:
     Attributes:
         law: the control law as the spec calls it.
         covariance: of the estimate, in the limit of a high model order or exact for the model structure.
-        samples: of the experiment.
-        tolerance: relative gap to be proved.
-        cost: weights of the powers.
         grid: number of frequencies of spectrum.csv.
     """
 
@@ -223,12 +220,7 @@ def loss_results(
     inputs: Mapping[str, Lines],
     samples: int,
 ) -> tuple[dict[str, TriedInput], Improvement | None, dict[str, Curves]]:
-    """Return what each input gave, the improvement over white noise, and the histogram where runs count.
-
-    Args:
-        criterion: of the true system.
-        inputs: the spectra that were tried.
-    """
+    """Return what each input gave, the improvement over white noise, and the histogram where runs count."""
     theory, entries = {}, {}
     for name, lines in inputs.items():
         information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))

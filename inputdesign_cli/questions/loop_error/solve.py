@@ -41,8 +41,6 @@ class LoopErrorSignalSettings:
     Attributes:
         filtered: by a filter from white noise; otherwise it is a multisine of equal `periods`.
         order: of a rational filter, states for each input; None: a filter of taps.
-        candidates: records of which the best is taken.
-        bounds: on single samples.
     """
 
     samples: int

@@ -43,7 +43,6 @@ class RegressionTerms:
 
     Attributes:
         toeplitz: whether the regressors are delayed copies of one input.
-        samples: of the experiment.
         target: the mean-squared error that is allowed; the energy is minimised.
         energy: trace R; the error is minimised.
     """
@@ -72,7 +71,6 @@ class MomentsDesign:
         rho: (n,) autocorrelations, if one input has these moments.
         bound: no R of the structure does better.
         tolerance: relative gap up to which the design counts as optimal.
-        how: how it was found.
     """
 
     R: Array
