@@ -140,12 +140,13 @@ def test_a_new_family_of_spectra_is_designed_and_proved():
 
 @pytest.fixture
 def schroeder_chirp(tmp_path, monkeypatch):
-    """A package is installed whose entry point names the kind of signal of docs/extending."""
+    """A package is installed whose entry points name the kind of docs/extending, and one not there."""
     about = tmp_path / "chirps-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: chirps\nVersion: 1.0\n")
-    point = "schroeder_chirp = extending.schroeder_chirp:KIND"
-    (about / "entry_points.txt").write_text(f"[idesign.signals]\n{point}\n")
+    module = "extending.schroeder_chirp"
+    named = f"schroeder_chirp = {module}:KIND\nlost_chirp = {module}:LOST\n"
+    (about / "entry_points.txt").write_text(f"[idesign.signals]\n{named}")
     monkeypatch.syspath_prepend(tmp_path)
     plugins.points.cache_clear()
     yield
@@ -181,6 +182,13 @@ def test_a_new_kind_of_signal_is_made_without_a_spec():
     lines = [n for n in range(1, 200) if 0.1 <= 2 * np.pi * n / 400 <= 1]
     assert signal["channels"]["u1"]["order_of_excitation"] == 2 * len(lines)
     assert signal["channels"]["u1"]["crest_factor"] < 2.0
+
+
+@pytest.mark.usefixtures("schroeder_chirp")
+def test_a_kind_of_signal_that_its_package_does_not_hold_is_refused():
+    result = CliRunner().invoke(app, ["signal", "--kind", "lost_chirp"])
+    assert result.exit_code == 2
+    assert "LOST" in result.output
 
 
 def test_a_kind_of_signal_that_nobody_added_is_refused():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plugins import announce, points
 from inputdesign_cli.signal.chirp import Chirp
 from inputdesign_cli.signal.kind import SignalKind
@@ -34,7 +35,16 @@ def register(name: str, kind: SignalKind) -> None:
 
 
 def kind_of(name: str) -> SignalKind:
-    """Return the kind of this name."""
+    """Return the kind of this name. It raises `SpecError` if the package that adds it does not hold it."""
     if name not in _KINDS:
-        _KINDS[name] = points(GROUP)[name].load()
+        point = points(GROUP)[name]
+        try:
+            _KINDS[name] = point.load()
+        except (ImportError, AttributeError) as error:
+            raise bad_spec(
+                "not-supported",
+                f"the signal {name} is no part of {point.value}, which a package names for it: {error}",
+                hint="update or remove that package, or use another kind of signal",
+                key="signal.type",
+            ) from error
     return _KINDS[name]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, time_is_over
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal.constraints import compressed, peak_ratio
 from inputdesign_cli.signal.evaluation import MET, Evaluator, Target, first_level, last_level, level_of_power
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.limits import Bounds, Limiter
-from inputdesign_cli.signal.switching import better_switching
 
 # Times the level that fits as it is: how much is clipped of the records that are tried.
 _CLIPPED = (1.0, 1.4, 2.0, 3.0)
@@ -29,6 +28,58 @@ LONG = 2000
 _HOPELESS, _SAMPLES, _TRIES, _SPREADS = 1.15, 100, 3, 2.0
 # A record that costs more than the design by this share is worth more candidates.
 _LITTLE = 0.05
+_MOST_CHANGES = 3
+_SHIFTED = 0.6  # the share of the changes that shift a switch; the others add or remove one
+# After this number of tries, or a sixth of all: would the same gain, repeated, be enough?
+_STRETCH, _STRETCHES = 100, 6
+
+
+def better_switching(
+    values: Array,
+    figure: Callable[[Array], float],
+    rng: np.random.Generator,
+    tries: int,
+    enough: float | None = None,
+) -> Array:
+    """The best of the signals of two levels (n, r) that are met from `values` on; out of time, that so far.
+
+    Args:
+        figure: of a signal of two levels, to be small.
+        enough: ends the search; so does a pace that would not lead there. None: as small as it gets.
+    """
+    best, least = values, float(figure(values))
+    stretch = max(min(_STRETCH, tries // _STRETCHES), 1)
+    for left in range(tries, 0, -stretch):
+        before = least
+        for _ in range(min(left, stretch)):
+            if time_is_over() or (enough is not None and least <= enough):
+                return best
+            tried = best
+            for _ in range(rng.integers(1, _MOST_CHANGES + 1)):
+                tried = _changed(tried, rng)
+            reached = float(figure(tried))
+            if reached < least:
+                best, least = tried, reached
+        if enough is not None and (before - least) * (left / stretch - 1.0) < least - enough:
+            return best
+    return best
+
+
+def _changed(values: Array, rng: np.random.Generator) -> Array:
+    """The signal with one switch of one input shifted, added or removed."""
+    changed = values.copy()
+    column = changed[:, rng.integers(changed.shape[1])]
+    switches = 1 + np.flatnonzero(np.diff(np.sign(column)))
+    chance = rng.random()
+    if switches.size and chance < _SHIFTED:
+        furthest = max(1, column.size // (2 * switches.size))
+        at, by = int(rng.choice(switches)), int(rng.integers(1, furthest + 1))
+        column[slice(at, at + by) if rng.random() < 0.5 else slice(max(at - by, 0), at)] *= -1.0
+    elif switches.size and chance < 0.5 * (1.0 + _SHIFTED):
+        column[int(rng.choice(switches)) :] *= -1.0
+    else:
+        column[int(rng.integers(column.size)) :] *= -1.0
+    return changed
 
 
 @dataclass(frozen=True)

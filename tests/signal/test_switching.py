@@ -13,9 +13,8 @@ from inputdesign_cli.signal.evaluation import Target
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.limits import Bounds
 from inputdesign_cli.signal.lines import DesignedSpectrum
-from inputdesign_cli.signal.selection import best_record
+from inputdesign_cli.signal.selection import best_record, better_switching
 from inputdesign_cli.signal.settings import Quantiser, SignalSettings
-from inputdesign_cli.signal.switching import better_switching
 from inputdesign_cli.spectrum import FirBasis
 
 

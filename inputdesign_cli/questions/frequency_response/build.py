@@ -20,7 +20,7 @@ from inputdesign_cli.questions.building.signal_settings import build_record_requ
 from inputdesign_cli.questions.building.simulation import build_simulation
 from inputdesign_cli.questions.building.system import build_cost, build_model
 from inputdesign_cli.questions.building.tables import has_column
-from inputdesign_cli.questions.building.unhandled import ONE_PLANT, refuse_unhandled
+from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.frequency_response.measure import Measurement
 from inputdesign_cli.questions.frequency_response.solve import ResponseTask
 from inputdesign_cli.questions.frequency_response.terms import KEY, ResponseTerms
@@ -36,6 +36,8 @@ from inputdesign_cli.specification.models.sizes import most
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
+# The longest period that is tried, relative to the stated one, and the number of tries.
+_LONGEST, _TRIED = 1e3, 400
 _SIGNAL = (
     *("hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "scale", "order"),
     *("samples", "start"),
@@ -165,12 +167,26 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
             "too-few-lines",
             f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
             f"asked for{left_out}",
-            hint="take more samples or fewer periods, fewer lines, or a higher end of the band",
+            hint="take a longer period (more samples, or fewer periods"
+            f"{_longer(spec, period, band, candidates, odd=odd)}), fewer lines, or a higher end of the band",
             key=f"{KEY}.lines" if candidates is not None else f"{KEY}.band",
         ) from None
     if group is None:
         return found
     return thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
+
+
+def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
+    """Return the end of a hint: which period and experiment hold the lines; empty if none is found."""
+    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
+        try:
+            harmonics_between(longer, band, lines, odd=odd)
+        except TooFewHarmonicsError:
+            continue
+        whole = longer * max(spec.experiment.samples // period, 1)
+        lasts = whole * spec.sample_time
+        return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
+    return ""
 
 
 def _check_inside(spec: Spec, wanted: Array, period: int) -> None:
@@ -224,6 +240,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
         tabulated=stated.noise is not None,
     )
     record, simulation = build_record_request(spec, experiment.size), build_simulation(spec, experiment)
+    check_compared(simulation.compare, "white")
     return ResponseTask(terms, _given(spec, grid), record, simulation)
 
 

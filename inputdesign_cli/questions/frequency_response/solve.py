@@ -110,7 +110,13 @@ class ResponseTask:
 
     def simulate(self, executor: Executor | None = None) -> Results:
         """Return the design, and beside its deviations the scatter of many simulated experiments."""
-        self._check_study()
+        if self.simulation.runs < 2:
+            raise bad_spec(
+                "out-of-range",
+                "a single run has no standard deviation",
+                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
+                key="simulation.runs",
+            )
         terms, study = self.terms, self.simulation
         plan, results = self._solved()
         begun = time.perf_counter()
@@ -136,23 +142,6 @@ class ResponseTask:
         table, curves = studied_deviations(terms, plan, results, studies["design"])
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
         return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
-
-    def _check_study(self) -> None:
-        """Raise `SpecError` for a study that this kind of question does not have."""
-        if any(name != "white" for name in self.simulation.compare):
-            raise bad_spec(
-                "not-supported",
-                "a frequency response is compared with that of equal lines only",
-                hint="write compare: [white], which stands for lines of equal power",
-                key="simulation.compare",
-            )
-        if self.simulation.runs < 2:
-            raise bad_spec(
-                "out-of-range",
-                "a single run has no standard deviation",
-                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
-                key="simulation.runs",
-            )
 
     def _designed(self) -> tuple[ResponseDesign, int]:
         """Return the powers and the samples that count."""
