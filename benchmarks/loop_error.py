@@ -37,7 +37,7 @@ from inputdesign_cli.design.loop_error.weight import adjoint, weight
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.questions.loop_error.build import build_loop_error_task
-from inputdesign_cli.questions.loop_error.signal import design_lines, white_lines
+from inputdesign_cli.questions.loop_error.solve import design_lines, white_lines
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "distillation_column.yaml"

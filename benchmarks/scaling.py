@@ -114,8 +114,8 @@ def ours(spec: Spec) -> tuple[Design, Row]:
     built = time.process_time()
     design = solve_design(
         task.asked.question,
-        tolerance=task.method.tolerance,
-        any_spectrum_tolerance=task.method.any_spectrum_tolerance,
+        tolerance=task.asked.tolerance,
+        any_spectrum_tolerance=task.asked.any_spectrum_tolerance,
     )
     found, free = design.result, design.any_spectrum
     return design, {

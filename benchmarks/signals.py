@@ -26,8 +26,10 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli import load_spec, solve
-from inputdesign_cli.signal import Sinusoids, crest_factor, grid_lines, optimise_phases
 from inputdesign_cli.signal.constraints import compressed
+from inputdesign_cli.signal.lines import grid_lines
+from inputdesign_cli.signal.phases import crest_factor, optimise_phases
+from inputdesign_cli.signal.sinusoids import Sinusoids
 from inputdesign_cli.spectrum import FirBasis
 
 ROOT = Path(__file__).parent.parent

@@ -10,6 +10,11 @@ from pathlib import Path
 import cvxpy as cp
 import numpy as np
 import pytest
+from typer.testing import CliRunner
+
+from inputdesign_cli import parse_spec, plugins, solve
+from inputdesign_cli.cli import app
+from inputdesign_cli.errors import SpecError
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -166,3 +171,62 @@ def test_a_broken_package_is_named(tmp_path):
     done = run(tmp_path, "-m", "inputdesign_cli", "schema")
     assert done.returncode == 2
     assert "bad-plug-in" in done.stderr
+
+
+@pytest.fixture
+def schroeder_chirp(tmp_path, monkeypatch):
+    """A package is installed whose entry points name the kind of docs/extending, and one not there."""
+    about = tmp_path / "chirps-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: chirps\nVersion: 1.0\n")
+    module = "extending.schroeder_chirp"
+    named = f"schroeder_chirp = {module}:KIND\nlost_chirp = {module}:LOST\n"
+    (about / "entry_points.txt").write_text(f"[idesign.signals]\n{named}")
+    monkeypatch.syspath_prepend(tmp_path)
+    plugins.points.cache_clear()
+    yield
+    monkeypatch.undo()
+    plugins.points.cache_clear()
+
+
+def chirp_spec():
+    accuracy = "accuracy: {model_error: {relative: 0.2, alpha: 2}}\nspectrum: {type: fir, order: 6}"
+    return parse_spec(PLANT.replace("{seed: 1}", "{type: schroeder_chirp, seed: 1}") + accuracy)
+
+
+@pytest.mark.usefixtures("schroeder_chirp")
+def test_a_new_kind_of_signal_realises_a_design():
+    found = solve(chirp_spec())
+    signal, u = found.result["signal"], found.tables["signal"].columns["u1"]
+    assert signal["type"] == "schroeder_chirp"
+    assert signal["worst_ratio"] <= 1.0 + 1e-9
+    # Its lines have the powers of the design, c_0 + 2 sum c_k cos(k w), and Schroeder's phases a low peak.
+    c, w = found.result["spectrum"]["coefficients"], 2.0 * np.pi * np.arange(SAMPLES // 2 + 1) / SAMPLES
+    density = c[0] + 2.0 * sum(c[k] * np.cos(k * w) for k in range(1, len(c)))
+    lines = np.abs(np.fft.rfft(u))[1:-1] ** 2
+    assert lines / lines.sum() == pytest.approx(density[1:-1] / density[1:-1].sum(), abs=1e-9)
+    assert signal["crest_factor"][0] < 2.0
+
+
+@pytest.mark.usefixtures("schroeder_chirp")
+def test_a_new_kind_of_signal_is_made_without_a_spec():
+    words = ["signal", "--kind", "schroeder_chirp", "--band", "0.1:1", "--samples", "400", "--json"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    signal = json.loads(result.stdout)["signal"]
+    lines = [n for n in range(1, 200) if 0.1 <= 2 * np.pi * n / 400 <= 1]
+    assert signal["channels"]["u1"]["order_of_excitation"] == 2 * len(lines)
+    assert signal["channels"]["u1"]["crest_factor"] < 2.0
+
+
+@pytest.mark.usefixtures("schroeder_chirp")
+def test_a_kind_of_signal_that_its_package_does_not_hold_is_refused():
+    result = CliRunner().invoke(app, ["signal", "--kind", "lost_chirp"])
+    assert result.exit_code == 2
+    assert "LOST" in result.output
+
+
+def test_a_kind_of_signal_that_nobody_added_is_refused():
+    with pytest.raises(SpecError, match="type"):
+        chirp_spec()
+    assert CliRunner().invoke(app, ["signal", "--kind", "schroeder_chirp"]).exit_code == 2

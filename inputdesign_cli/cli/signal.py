@@ -13,6 +13,7 @@ import typer
 from inputdesign_cli.cli.options import Json, Quiet, path_option
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.errors import OutputError
+from inputdesign_cli.plugins import names
 
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.results import Results
@@ -49,6 +50,10 @@ class Kinds:
         typer.Option("--steps", metavar="N", min=2, help="N levels over the range, in random order."),
     ] = None
 
+    kind: Annotated[
+        str, typer.Option("--kind", metavar="NAME", help="A kind that another package adds, in --band.")
+    ] = ""
+
     def chosen(self) -> str:
         """Return the kind that is asked for.
 
@@ -59,7 +64,10 @@ class Kinds:
         if len(kinds) != 1:
             said = " and ".join(f"--{name}" for name in kinds) or "none of them"
             raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
-        return next(iter(kinds))
+        if self.kind and self.kind not in names("idesign.signals"):
+            message = f"no package adds a kind {self.kind!r}"
+            raise typer.BadParameter(message, param_hint="--kind")
+        return self.kind or next(iter(kinds))
 
 
 @dataclass(frozen=True)
@@ -93,7 +101,7 @@ class Form:
         others = {"--band": (bool(self.band), "multisine"), "--odd": (self.odd, "multisine")}
         others |= {"--periods": (self.periods > 1, "multisine"), "--hold": (self.hold > 1, "prbs")}
         for option, (stated, owner) in others.items():
-            if stated and kind != owner:
+            if stated and kind != owner and kind not in names("idesign.signals"):
                 message = f"it is of --{owner}, and does nothing to --{kind}: leave it out"
                 raise typer.BadParameter(message, param_hint=option)
         if not _SMALLEST <= self.sample_time <= _LARGEST:

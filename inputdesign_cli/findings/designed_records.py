@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.finding import Finding, doubt, note
 from inputdesign_cli.outcome.shares import per_cent
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal.selection import Record
 
 _FALLS_SHORT = 5e-3
 _DEAR = 1.0  # beyond the cost of the design, relative to it

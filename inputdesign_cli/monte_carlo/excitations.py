@@ -10,9 +10,10 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, in_phase_record
-from inputdesign_cli.signal.designed import constant_density
-from inputdesign_cli.signal.settings import Method
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.lines import DesignedSpectrum, constant_density
+from inputdesign_cli.signal.multisine import in_phase_record
+from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import Basis, LinesBasis, TabulatedSpectrum
 
 
@@ -61,7 +62,7 @@ class Redrawn:
 
     @classmethod
     def flat(
-        cls, name: str, method: Method, powers: Array, band: tuple[float, float], samples: int, step: float
+        cls, name: str, method: str, powers: Array, band: tuple[float, float], samples: int, step: float
     ) -> Redrawn:
         """Independent inputs of these powers (r,), each flat over a band in the unit of the experiment."""
         white = TabulatedSpectrum.white(powers, band)

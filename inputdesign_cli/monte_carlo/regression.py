@@ -12,7 +12,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
-from inputdesign_cli.signal import delayed_regressors
+from inputdesign_cli.signal.moments import delayed_regressors
 
 _BATCH_SAMPLES = 2_000_000  # noise samples drawn at once
 

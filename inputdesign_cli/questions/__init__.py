@@ -5,7 +5,7 @@ A verb imports its question when it is called, so that a command waits for no ot
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import singledispatch
@@ -43,20 +43,14 @@ def solve(spec: Spec) -> Results:
     """
     from inputdesign_cli.questions.task import build_task
 
-    with _placed(spec), time_limit(spec.solver.time_limit):
-        return finite(build_task(spec).solve(), most_extreme(spec.content))
+    return _in_time(spec, lambda: build_task(spec).solve())
 
 
 def analyse(spec: Spec) -> Results:
-    """What a given excitation buys, without designing anything.
-
-    Raises:
-        SpecError, DataError: the spec or a file that it names cannot be used.
-    """
+    """Return what a given excitation buys, without designing anything. It raises as `solve` does."""
     from inputdesign_cli.questions.task import build_analysis
 
-    with _placed(spec), time_limit(spec.solver.time_limit):
-        return finite(build_analysis(spec).solve(), most_extreme(spec.content))
+    return _in_time(spec, lambda: build_analysis(spec).solve())
 
 
 def validate(spec: Spec) -> None:
@@ -74,14 +68,10 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
     Args:
         executor: where batches of runs are computed (default: in this process); the result does not depend
             on it.
-
-    Raises:
-        SpecError: what this version does not simulate, and all that `solve` raises.
     """
     from inputdesign_cli.questions.task import build_task
 
-    with _placed(spec), time_limit(spec.solver.time_limit):
-        return finite(build_task(spec).simulate(executor), most_extreme(spec.content))
+    return _in_time(spec, lambda: build_task(spec).simulate(executor))
 
 
 def identify(
@@ -113,13 +103,15 @@ def identify(
     from inputdesign_cli.questions.frequency_response.build import build_measurement
     from inputdesign_cli.questions.frequency_response.measure import measure
 
-    with _placed(spec):
-        known = _prepared(preparation, operating_point, remove_means)
+    known = _prepared(preparation, operating_point, remove_means)
+
+    def found() -> Results:
         if frequency_response:
-            measured = measure(build_measurement(spec), _paths(data), known)
-            return finite(measured, most_extreme(spec.content))
-        found = identify_records(build_identification(spec), _paths(data), known)
-        return finite(found, most_extreme(spec.content))
+            return measure(build_measurement(spec), _paths(data), known)
+        return identify_records(build_identification(spec), _paths(data), known)
+
+    with _placed(spec):
+        return finite(found(), most_extreme(spec.content))
 
 
 def assess(
@@ -132,13 +124,7 @@ def assess(
 ) -> Assessment:
     """Identify the model from real experiments, compare what the data buy with what is asked, and top up.
 
-    Args:
-        spec: what is asked.
-        data, remove_means, operating_point, preparation: see `identify`.
-
-    Raises:
-        SpecError: nothing is asked that data could meet; see `identify`.
-        DataError: a file cannot be used.
+    It takes data as `identify` does, and raises `SpecError` where nothing is asked that data could meet.
     """
     from inputdesign_cli.questions.assessment.assess import Assessment, assess as assess_records
     from inputdesign_cli.questions.assessment.build import build_identification
@@ -259,6 +245,12 @@ def _prepared(
     point = {**given.operating_point, **(operating_point or {})}
     detrend = "constant" if remove_means and given.detrend == "none" else given.detrend
     return replace(given, operating_point=point, detrend=detrend)
+
+
+def _in_time(spec: Spec, found: Callable[[], Results]) -> Results:
+    """Return finite results that are found within the time limit of the spec."""
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return finite(found(), most_extreme(spec.content))
 
 
 @contextmanager

@@ -13,10 +13,12 @@ from inputdesign_cli.outcome import Outcome, Signal
 from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common.plain_signal import signal_results
+from inputdesign_cli.questions.common.signal_outcome import signal_results
 from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
-from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
-from inputdesign_cli.signal.shift_register import register_length
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.signal.prbs import register_length
+from inputdesign_cli.signal.ready_made import equal_lines, excites, scaled
+from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.specification.models.sizes import SIZES
 
 _USUAL = 1000
@@ -27,14 +29,14 @@ class ReadyMade:
     """The signal that is asked for.
 
     Attributes:
-        kind: prbs, multisine, chirp or steps.
+        kind: the name of a kind of signal.
         bits: of the register of a prbs; None: enough for the samples without repetition.
         number: lines of a multisine, levels of steps.
-        band: of a multisine or a chirp, in rad per time unit; None: all frequencies.
+        band: in rad per time unit; None: all frequencies.
         samples: None: one period, or 1000.
         levels: least and largest value of each input.
-        hold: samples for which each value of a prbs stands.
-        periods: equal ones, of a multisine.
+        hold: samples for which each value stands.
+        periods: equal ones.
     """
 
     kind: str
@@ -86,34 +88,52 @@ def make_signal(asked: ReadyMade) -> Results:
 
 def _made(asked: ReadyMade) -> tuple[Array, int]:
     """Return the record (N, inputs) from -1 to 1, and its period."""
-    rng, r = np.random.default_rng(asked.seed), asked.inputs
+    r, bits, period = asked.inputs, asked.bits, asked.samples or _USUAL
     if asked.kind == "prbs":
-        bits = asked.bits or register_length(-(-(asked.samples or _USUAL) // asked.hold))
+        bits = bits or register_length(-(-period // asked.hold))
         period = asked.hold * (2**bits - 1)
-        samples = asked.samples or period
-        _check_size(max(samples, asked.hold), r, whole_period=asked.samples is None)
-        values = prbs(bits, -(-samples // asked.hold), r, rng)
-        return np.repeat(values, asked.hold, axis=0)[:samples], min(period, samples)
-    samples = asked.samples or _USUAL
-    _check_size(samples, r)
-    if asked.kind == "multisine":
-        return _multisine(asked, samples, rng), samples // asked.periods
+    samples = asked.samples or period
+    _check_size(max(samples, asked.hold), r, whole_period=bits is not None and asked.samples is None)
+    settings = SignalSettings(asked.kind, phases="even", bits=bits, number=asked.number, seed=asked.seed)
+    _check_kind(asked, samples, asked.periods * kind_of(asked.kind).blocks(settings, r))
+    values = -(-samples // (asked.hold * asked.periods))
+    try:
+        one = equal_lines(settings, values, r, _band(asked), asked.number, odd=asked.odd)
+    except TooFewHarmonicsError as error:
+        raise bad_spec(
+            "too-few-lines",
+            f"a period of {values // kind_of(asked.kind).blocks(settings, r)} samples has {error.there} "
+            f"harmonics in the band, and {asked.number or 'at least one'} are asked for",
+            hint="take more --samples, a wider --band, or fewer lines",
+        ) from None
+    u = np.tile(np.repeat(one, asked.hold, axis=0), (asked.periods, 1))[:samples]
+    return u, min(period, samples) // asked.periods
+
+
+def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
+    """Raise `SpecError` for what the kind cannot make of this many samples, in `whole` periods and blocks."""
+    kind = kind_of(asked.kind)
+    if asked.inputs > 1 and not kind.several:
+        raise bad_spec(
+            "not-supported",
+            "a chirp has one frequency at a time, so that it cannot separate effects of several inputs",
+            hint="use a multisine for several inputs, or one chirp after the other",
+        )
     if asked.kind == "chirp":
-        if r > 1:
-            raise bad_spec(
-                "not-supported",
-                "a chirp has one frequency at a time, so that it cannot separate effects of several inputs",
-                hint="use a multisine for several inputs, or one chirp after the other",
-            )
         _check_turns(asked, samples)
-        return chirp(samples, _band(asked)), samples
-    if asked.number is not None and asked.number > samples:
+    if asked.kind == "steps" and asked.number is not None and asked.number > samples:
         raise bad_spec(
             "too-large",
             f"{asked.number} levels are more than the {samples} samples",
             hint=f"write at most --steps {samples}, or more --samples",
         )
-    return steps(asked.number or 2, samples, r, rng), samples
+    if not kind.flat and (samples % whole or samples // whole < 3):
+        each = f" for each of {asked.inputs} inputs" if asked.inputs > 1 else ""
+        raise bad_spec(
+            "bad-period",
+            f"{samples} samples do not make {asked.periods} equal periods{each}",
+            hint=f"write --samples {max(samples // whole, 3) * whole}",
+        )
 
 
 def _check_apart(u: Array, asked: ReadyMade) -> None:
@@ -165,27 +185,6 @@ def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> Non
         f"the signal has {samples} samples{each}, and {fit} fit: {size.why}",
         hint=f"write {'fewer --prbs BITS, a shorter --hold, or ' * whole_period}--samples {fit} at most",
     )
-
-
-def _multisine(asked: ReadyMade, samples: int, rng: np.random.Generator) -> Array:
-    whole = asked.periods * asked.inputs
-    if samples % whole or samples // whole < 3:
-        each = f" for each of {asked.inputs} inputs" if asked.inputs > 1 else ""
-        raise bad_spec(
-            "bad-period",
-            f"{samples} samples do not make {asked.periods} equal periods{each}",
-            hint=f"write --samples {max(samples // whole, 3) * whole}",
-        )
-    try:
-        one = multisine(samples // whole, asked.inputs, _band(asked), asked.number, rng, odd=asked.odd)
-    except TooFewHarmonicsError as error:
-        raise bad_spec(
-            "too-few-lines",
-            f"a period of {samples // whole} samples has {error.there} harmonics in the band, and "
-            f"{asked.number or 'at least one'} are asked for",
-            hint="take more --samples, a wider --band, or fewer lines",
-        ) from None
-    return np.tile(one, (asked.periods, 1))
 
 
 def _band(asked: ReadyMade) -> tuple[float, float]:

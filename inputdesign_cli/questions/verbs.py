@@ -16,23 +16,14 @@ Verb = Literal["solve", "analyse", "simulate"]
 def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Results:
     """What `idesign VERB` computes; the numerical libraries are imported now.
 
-    Args:
-        verb: what to do.
-        spec: on what.
-        executor: where to `simulate` (default: in this process); the other verbs need none.
-
     Raises:
         IdesignError: as the verb does.
     """
     from inputdesign_cli import questions
 
-    match verb:
-        case "solve":
-            return questions.solve(spec)
-        case "analyse":
-            return questions.analyse(spec)
-        case "simulate":
-            return questions.simulate(spec, executor=executor)
+    if verb == "simulate":
+        return questions.simulate(spec, executor=executor)
+    return questions.solve(spec) if verb == "solve" else questions.analyse(spec)
 
 
 def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:

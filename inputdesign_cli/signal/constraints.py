@@ -13,7 +13,7 @@ from inputdesign_cli.compute.time_limit import seconds_left
 
 LinearMap = Callable[[Array], Array]
 # The limits hold in floating-point arithmetic, not only before rounding.
-_INSIDE = 1.0 - 1e-12
+INSIDE = 1.0 - 1e-12
 _ROUNDS = 40
 _PENALTIES = (1.0, 10.0, 100.0, 1000.0)
 _STEPS = 60
@@ -97,9 +97,6 @@ def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Arra
 
     Least squares, each input in its own root mean square, with the excess penalised ever more (a
     quasi-Newton method), scaled down at the end so that the bounds hold exactly.
-
-    Raises:
-        OutOfTimeError: see `seconds_left`.
     """
     record = values
     if peak_ratio(record, constraints) > 1.0:
@@ -117,7 +114,7 @@ def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Arra
             )
             record = found.x.reshape(values.shape) * scale
     excess = peak_ratio(record, constraints)
-    return record if excess <= 1.0 else record * (_INSIDE / excess)
+    return record if excess <= 1.0 else record * (INSIDE / excess)
 
 
 def peak_ratio(values: Array, constraints: tuple[SignalConstraint, ...]) -> float:
@@ -134,7 +131,7 @@ def _penalised(
     value, slope = 0.5 * float(np.sum(away**2)), away
     for signal in constraints:
         ratio = signal.apply(record) / signal.bound
-        excess = ratio - np.clip(ratio, -_INSIDE, _INSIDE)
+        excess = ratio - np.clip(ratio, -INSIDE, INSIDE)
         value += 0.5 * penalty * float(np.sum(excess**2))
         slope = slope + penalty * signal.adjoint(excess / signal.bound) * scale
     return value, slope.ravel()

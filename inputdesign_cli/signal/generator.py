@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.signal.designed import DesignedSpectrum
-from inputdesign_cli.signal.levels import few_levels
-from inputdesign_cli.signal.lines import Lines
-from inputdesign_cli.signal.multisine import blocks_of, gaussian_record, multisine_record
-from inputdesign_cli.signal.phases import LimitedResponse, low_peak_phases, schroeder_phases
-from inputdesign_cli.signal.settings import Method, SignalSettings
-from inputdesign_cli.signal.shift_register import register_length, shifted_sequences
+from inputdesign_cli.signal.kind import Draft, LimitedResponses, SignalKind
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
+from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.signal.sinusoids import select
 from inputdesign_cli.signal.spectral_factor import SpectralFactor, spectral_factor
 
 # Beyond this relative error of its autocovariances a factor no longer has the designed spectrum.
 _FACTOR_RESIDUAL = 1e-8
-
-LimitedResponses = Callable[[Array], Sequence[LimitedResponse]]
 
 
 @dataclass(frozen=True)
@@ -48,7 +42,7 @@ class SignalGenerator:
         return spectral_factor(self.spectrum.autocovariances)
 
     @property
-    def method(self) -> Method:
+    def method(self) -> str:
         """What is made.
 
         A multisine where noise was asked for, but the spectrum consists of sinusoids, or no spectral factor
@@ -58,6 +52,11 @@ class SignalGenerator:
             return self.settings.method
         unusable = self.factor is not None and self.factor.residual > _FACTOR_RESIDUAL
         return "multisine" if unusable or self.spectrum.sinusoids is not None else "filtered_noise"
+
+    @property
+    def kind(self) -> SignalKind:
+        """The kind of this name."""
+        return kind_of(self.method)
 
     @property
     def period(self) -> int:
@@ -71,14 +70,10 @@ class SignalGenerator:
         Lines of a design of sinusoids keep their own frequencies in a multisine of single samples that is not
         repeated. Otherwise they move to the nearest harmonics.
         """
-        settings, blocks = self.settings, 1
-        if self.method == "multisine":
-            blocks = blocks_of(self.settings.vectors, self.spectrum.inputs)
-        elif self.method in ("binary", "slewed", "ternary"):
-            blocks = self.spectrum.inputs
-        block = self.period // blocks
+        settings, kind = self.settings, self.kind
+        block = self.period // kind.blocks(settings, self.spectrum.inputs)
         lines = self.spectrum.lines(block, settings.hold)
-        if self.method == "multisine" and settings.block == 1 and settings.lines is None:
+        if kind.off_grid and settings.block == 1 and settings.lines is None:
             return lines
         powers = select(lines.dense(block), settings.lines)
         if settings.hold > 1:
@@ -91,37 +86,14 @@ class SignalGenerator:
         if self.factor is not None and self.method == "filtered_noise" and settings.periods == 1:
             whole = self.factor.filtered(self.samples, rng)[:: settings.hold, None]
         else:
-            whole = np.tile(self._period(rng), (settings.periods, 1))
+            whole = np.tile(self.kind.draw(self._draft, rng), (settings.periods, 1))
         return whole * settings.taper(len(whole))[:, None] if settings.ramp else whole
 
-    def _period(self, rng: np.random.Generator) -> Array:
-        method, lines, length = self.method, self.lines, self.period
-        if method == "multisine":
-            return multisine_record(
-                lines, length, rng, self.settings.vectors, angles=self._phases(lines, rng)
-            )
-        if method == "binary" or method == "slewed":  # the ramps come with the limits
-            return few_levels(lines, length, rng, "binary")
-        if method == "ternary":
-            return few_levels(lines, length, rng, "ternary")
-        if method == "filtered_noise":
-            return gaussian_record(lines, rng)
-        if method == "white":
-            return gaussian_record(self._white(lines), rng)
-        if method == "prbs":
-            bits = self.settings.bits or register_length(length)
-            return shifted_sequences(bits, length, lines.inputs, rng) * np.sqrt(lines.mean_squares)
-        raise ValueError("a given record is not drawn")
-
-    def _phases(self, lines: Lines, rng: np.random.Generator) -> Array | None:
-        """The common phases (L,) of the lines; None for uniform ones."""
-        if self.settings.phases == "schroeder":
-            return schroeder_phases(lines, self.period)
-        if self.settings.phases != "optimised":
-            return None
-        start = 2.0 * np.pi * rng.random(lines.frequencies.size)
-        limited = [] if self.limited is None else self.limited(lines.frequencies)
-        return low_peak_phases(lines, self.period, start, limited=limited)
+    @property
+    def _draft(self) -> Draft:
+        """What one period is drawn from; the band is in rad per value, as the lines are."""
+        lo, hi = (min(edge * self.settings.hold, np.pi) for edge in self.band)
+        return Draft(self.lines, self.period, self.settings, (lo, hi), self.limited)
 
     def _hold_gain(self, block: int) -> Array:
         """(block // 2 + 1,): what holding each value k times does to the powers of the harmonics.
@@ -130,15 +102,3 @@ class SignalGenerator:
         """
         w = 2.0 * np.pi * np.arange(block // 2 + 1) / (block * self.settings.hold)
         return np.abs(np.exp(-1j * np.outer(w, np.arange(self.settings.hold))).mean(axis=1)) ** 2
-
-    def _white(self, lines: Lines) -> Lines:
-        """Flat over the band, each input with its designed power, not correlated."""
-        harmonics = np.arange(self.period // 2 + 1)
-        w = 2.0 * np.pi * harmonics / (self.period * self.settings.hold)
-        inside = (w >= self.band[0] * (1 - 1e-9)) & (w <= self.band[1] * (1 + 1e-9))
-        ends = (harmonics == 0) | (2 * harmonics == self.period)
-        share = np.where(inside, np.where(ends, 0.5, 1.0), 0.0)
-        share = share / max(float(share.sum()), 1e-300)
-        return Lines.of_period(
-            share[:, None, None] * np.diag(lines.mean_squares).astype(complex), self.period
-        )

@@ -17,24 +17,44 @@ phase of the line and restores its modulus.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
+from inputdesign_cli.signal.kind import Draft, SignalKind
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.multisine import multisine_record
 from inputdesign_cli.signal.phases import low_peak_phases
+from inputdesign_cli.signal.settings import SignalSettings
 
 # The 4-norm alone makes the modulus even.
 _EVEN, _EVEN_STEPS = (4,), 60
 _ROUNDS = 60
 
 
+@dataclass(frozen=True)
+class FewLevels(SignalKind):
+    """Two or three levels with a spectrum near the wanted one; `nearest` takes values (n,) to levels."""
+
+    nearest: Callable[[Array], Array]
+    few_levels: bool = False
+    slewed: bool = False
+    switched: bool = False
+
+    def blocks(self, settings: SignalSettings, inputs: int) -> int:
+        """See `SignalKind`."""
+        return inputs
+
+    def draw(self, draft: Draft, rng: np.random.Generator) -> Array:
+        """See `SignalKind`; ramps between the levels come with the limits."""
+        return few_levels(draft.lines, draft.samples, rng, self.nearest)
+
+
 def few_levels(
-    lines: Lines, samples: int, rng: np.random.Generator, kind: Literal["binary", "ternary"]
+    lines: Lines, samples: int, rng: np.random.Generator, nearest: Callable[[Array], Array]
 ) -> Array:
-    """(samples, r): `lines.inputs` blocks of a period each, every input of two or three levels of its own.
+    """(samples, r): `lines.inputs` blocks of a period each, every input of few levels of its own.
 
     The inputs have the powers of the lines. What remains beyond the last period continues it.
     """
@@ -56,7 +76,6 @@ def few_levels(
         blocks = np.fft.irfft(wanted.transpose(2, 0, 1), period, axis=1)
         return blocks.reshape(r * period, r), float(np.sum(np.abs(wanted - fit * transform) ** 2))
 
-    nearest = {"binary": signs, "ternary": signs_and_zeros}[kind]
     record = _alternate(start, lambda values: _each(values, nearest, rms), restored)
     edges = np.linspace(0, samples, r + 1).astype(int)
     lengths = np.diff(edges)
@@ -68,13 +87,7 @@ def few_levels(
 def _alternate(
     start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
 ) -> Array:
-    """The best signal of few levels that is met on the way between the two things wanted.
-
-    Args:
-        start: the first signal of any values.
-        nearest: the signal of few levels next to one of any values.
-        restored: the signal with the wanted spectrum next to one of few levels, and the misfit of that.
-    """
+    """The best signal of few levels that is met on the way between the two things wanted."""
     levels = nearest(start)
     best, least = levels, np.inf
     for _ in range(_ROUNDS):

@@ -9,22 +9,47 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.signal.lines import Lines
-from inputdesign_cli.signal.settings import LineVectors
+from inputdesign_cli.signal.kind import Draft, SignalKind
+from inputdesign_cli.signal.lines import Lines, orthogonal_columns
+from inputdesign_cli.signal.phases import low_peak_phases, schroeder_phases
+from inputdesign_cli.signal.settings import LineVectors, SignalSettings
 
 _AT_ONCE = 1_000_000  # values of sinusoids
+# With more lines Schroeder's phases are nearly as good as optimised ones.
+_OPTIMISED = 2000
 
 
-def orthogonal_columns(order: int) -> NDArray:
-    """(order, order), entries of modulus one, orthogonal columns: Hadamard where there is one, or Fourier."""
-    if order & (order - 1) == 0:
-        return scipy.linalg.hadamard(order).astype(float)
-    return np.exp(2j * np.pi * np.outer(np.arange(order), np.arange(order)) / order)
+class Multisine(SignalKind):
+    """Sinusoids of exactly the wanted powers, with phases as the settings ask."""
+
+    off_grid = True
+
+    def blocks(self, settings: SignalSettings, inputs: int) -> int:
+        """See `SignalKind`."""
+        return blocks_of(settings.vectors, inputs)
+
+    def draw(self, draft: Draft, rng: np.random.Generator) -> Array:
+        """See `SignalKind`."""
+        angles, vectors = self._phases(draft, rng), draft.settings.vectors
+        return multisine_record(draft.lines, draft.samples, rng, vectors, angles=angles)
+
+    def _phases(self, draft: Draft, rng: np.random.Generator) -> Array | None:
+        """Return the common phases (L,) of the lines; None for uniform ones."""
+        lines, samples, phases = draft.lines, draft.samples, draft.settings.phases
+        if phases == "random" or phases == "orthogonal":
+            return None
+        if phases == "optimised":
+            start = 2.0 * np.pi * rng.random(lines.frequencies.size)
+        else:
+            start = schroeder_phases(lines, samples)
+        if phases == "schroeder" or (phases == "even" and lines.frequencies.size > _OPTIMISED):
+            return start
+        limited = [] if draft.limited is None else draft.limited(lines.frequencies)
+        return low_peak_phases(lines, samples, start, limited=limited)
 
 
 def blocks_of(vectors: LineVectors, inputs: int) -> int:
@@ -84,11 +109,6 @@ def in_phase_record(frequencies: Array, amplitudes: Array, samples: int, rng: np
     return np.cos(np.outer(np.arange(samples), frequencies) + phases) @ amplitudes
 
 
-def block_vectors(lines: Lines, block: int) -> ComplexArray:
-    """(L, r): root(P) q_b, the line vectors of a period of an orthogonal record but for the common phase."""
-    return np.asarray(lines.roots @ orthogonal_columns(lines.inputs)[:, block].astype(complex))
-
-
 def _sinusoids(lines: Lines, vectors: ComplexArray, samples: int) -> Array:
     """Return (samples, r), the sum of sinusoids with the mean squares of `vectors` (L, r)."""
     if lines.period is None:
@@ -107,11 +127,7 @@ def _sinusoids(lines: Lines, vectors: ComplexArray, samples: int) -> Array:
 
 
 def _pieces(samples: int, lines: int) -> Iterator[NDArray[np.int64]]:
-    """The numbers of the samples, as many at once as memory likes, and as the time limit can wait for.
-
-    Raises:
-        OutOfTimeError: see `seconds_left`.
-    """
+    """The numbers of the samples, as many at once as memory likes, and as the time limit can wait for."""
     for times in np.array_split(np.arange(samples), max(samples * lines // _AT_ONCE, 1)):
         seconds_left()
         yield times

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.signal.crest import POWERS, STEPS, optimise_phases
-from inputdesign_cli.signal.lines import Lines
-from inputdesign_cli.signal.multisine import block_vectors
+from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.signal.lines import Lines, block_vectors
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
 # A frequency this near to a harmonic, in harmonics, is that one.
@@ -17,6 +17,82 @@ _ON_GRID = 1e-9
 
 # From the lines (L, r) to a signal, and the largest modulus that it may have.
 LimitedResponse = tuple[ComplexArray, float]
+POWERS = (4, 8, 16, 32, 64, 128, 256, 512)
+STEPS = 150
+_NEGLIGIBLE = 1e-40
+
+
+def optimise_phases(
+    lines: Sinusoids,
+    start: Array,
+    *,
+    gains: Sequence[ComplexArray] = (),
+    powers: Sequence[int] = POWERS,
+    steps: int = STEPS,
+) -> Array:
+    """(L,): phases from `start` (L,) on that keep the largest of all samples low.
+
+    [guillaume-1991]: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak.
+
+    Args:
+        gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by what each may
+            reach; the record itself when there are none.
+        powers: the p, powers of two; with 4 alone the modulus comes out as even as can be.
+        steps: of the quasi-Newton method, for each p.
+    """
+    signals = np.array(gains) if len(gains) else None
+    phases, best = start, np.inf
+    kept = start
+    for p in powers:
+        found = scipy.optimize.minimize(
+            _log_norm,
+            phases,
+            args=(lines, signals, p),
+            jac=True,
+            method="L-BFGS-B",
+            options={"maxiter": steps, "maxcor": 20},
+        )
+        phases = found.x
+        peak = joint_peak(lines, phases, signals)
+        if peak < best:
+            kept, best = phases, peak
+    return kept
+
+
+def joint_peak(lines: Sinusoids, phases: Array, gains: ComplexArray | None = None) -> float:
+    """Return the largest modulus over all samples of all the signals with these `gains` (S, L)."""
+    return float(np.abs(lines.record(phases, gains)).max())
+
+
+def crest_factor(record: Array) -> float:
+    """Largest modulus over root mean square; one for a record that is zero."""
+    peak = float(np.abs(record).max())
+    return peak / float(np.sqrt(np.mean(record**2))) if peak > 0.0 else 1.0
+
+
+def _log_norm(phases: Array, lines: Sinusoids, gains: ComplexArray | None, p: int) -> tuple[float, Array]:
+    """log of the p-norm (a mean) of all the signals, and its gradient with respect to the phases."""
+    seconds_left()
+    records = lines.record(phases, gains)
+    peak = np.abs(records).max()
+    if peak == 0.0:  # so few samples that all of them are zeros of the sinusoids: no phase is better
+        return 0.0, np.zeros(phases.size)
+    # Leave out negligible values: powers that underflow are slow.
+    least = _NEGLIGIBLE ** (1.0 / p)
+    relative = np.where(np.abs(records) < least * peak, 0.0, records / peak)
+    powers = _power_before_last(relative, p)
+    total = np.sum(powers * relative)
+    slopes = np.atleast_2d(lines.slopes(phases, powers / (peak * total), gains))
+    return float(np.log(peak) + np.log(total / records.size) / p), np.sum(slopes, axis=0)
+
+
+def _power_before_last(values: Array, p: int) -> Array:
+    """Return values^(p - 1) for a power of two p, by squaring: a tenth of the time of a general power."""
+    power = square = values
+    for _ in range(p.bit_length() - 2):
+        square = square * square
+        power = power * square
+    return power
 
 
 def schroeder_phases(lines: Lines, samples: int) -> Array:
@@ -37,9 +113,7 @@ def low_peak_phases(
 
     Args:
         samples: of the whole record, in as many periods as there are inputs.
-        start: (L,), where to begin.
         limited: what is kept low; each input relative to its root mean square when nothing is limited.
-        powers, steps: see `optimise_phases`.
     """
     rms = np.sqrt(lines.mean_squares)
     unit = np.eye(lines.inputs)

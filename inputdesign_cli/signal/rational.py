@@ -64,15 +64,13 @@ class RationalFilter:
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
         """(samples, n): stationary noise, started from the stationary distribution of the state."""
+        import scipy.signal  # only now: see `plant.filtering`
+
         covariance = scipy.linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T)
         values, vectors = np.linalg.eigh(covariance)
         state = vectors @ (np.sqrt(np.maximum(values, 0)) * rng.standard_normal(self.order))
         drive = rng.standard_normal((samples, self.B.shape[1]))
-        out = np.empty((samples, self.C.shape[0]))
-        for t in range(samples):
-            out[t] = self.C @ state + self.D @ drive[t]
-            state = self.A @ state + self.B @ drive[t]
-        return out
+        return np.asarray(scipy.signal.dlsim((self.A, self.B, self.C, self.D, 1.0), drive, x0=state)[1])
 
 
 def rational_filter(taps: Array, order: int) -> RationalFilter:

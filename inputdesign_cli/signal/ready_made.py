@@ -1,4 +1,4 @@
-"""Signals that need no design: sequences, multisines, chirps and steps, and what each of them excites."""
+"""Signals that need no design: equal lines of any kind, and what records excite."""
 
 from __future__ import annotations
 
@@ -10,65 +10,38 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.harmonic_grid import harmonics_between
+from inputdesign_cli.signal.kind import Draft
+from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.lines import Lines
-from inputdesign_cli.signal.multisine import multisine_record
-from inputdesign_cli.signal.phases import low_peak_phases, schroeder_phases
-from inputdesign_cli.signal.shift_register import shifted_sequences
+from inputdesign_cli.signal.settings import SignalSettings
 
 # Of the largest line: smaller ones are rounding.
 _EXCITED = 1e-9
 _DIGITS = 13
 _MIDDLE = (0.05, 0.95)
-# With more lines, phases are not optimised: Schroeder's are nearly as good.
-_OPTIMISED = 2000
 
 
-def prbs(bits: int, samples: int, inputs: int, rng: np.random.Generator) -> Array:
-    """(samples, inputs) of +1 and -1, of period 2^bits - 1, inputs shifted by equal parts of it."""
-    return shifted_sequences(bits, samples, inputs, rng)
-
-
-def multisine(
-    period: int,
+def equal_lines(
+    settings: SignalSettings,
+    samples: int,
     inputs: int,
-    band: tuple[float, float],
-    lines: int | None,
-    rng: np.random.Generator,
+    band: tuple[float, float] = (0.0, np.pi),
+    lines: int | None = None,
     *,
-    odd: bool,
+    odd: bool = False,
 ) -> Array:
-    """(period inputs, inputs) up to 1: equal lines of a low peak, in a band in rad/sample.
-
-    One period for each input, over which the inputs are orthogonal.
+    """(samples, inputs) up to 1: one period of equal lines in a band in rad/sample, of the kind asked for.
 
     Raises:
         TooFewHarmonicsError: the band has fewer harmonics than lines.
     """
-    harmonics = harmonics_between(period, band, lines, odd=odd)
+    kind = kind_of(settings.method)
+    period = samples // kind.blocks(settings, inputs)
+    harmonics = np.ones(1) if kind.flat else harmonics_between(period, band, lines, odd=odd)
     powers = np.broadcast_to(np.eye(inputs, dtype=complex), (harmonics.size, inputs, inputs))
-    grid = Lines(2.0 * np.pi * harmonics / period, powers, period)
-    angles = schroeder_phases(grid, period * inputs)
-    if harmonics.size <= _OPTIMISED:
-        angles = low_peak_phases(grid, period * inputs, angles)
-    u = multisine_record(grid, period * inputs, rng, "orthogonal", angles=angles)
+    draft = Draft(Lines(2.0 * np.pi * harmonics / period, powers, period), samples, settings, band)
+    u = kind.draw(draft, np.random.default_rng(settings.seed))
     return np.asarray(u / np.abs(u).max())
-
-
-def chirp(samples: int, band: tuple[float, float]) -> Array:
-    """(samples, 1) up to 1: a sinusoid whose frequency (rad/sample) rises evenly over the band."""
-    import scipy.signal  # only now: see `plant.filtering`
-
-    t = np.arange(samples, dtype=float)
-    lo, hi = (edge / (2.0 * np.pi) for edge in band)
-    u = np.asarray(scipy.signal.chirp(t, lo, float(samples), hi, phi=-90.0))[:, None]
-    return np.asarray(u / np.abs(u).max())  # samples may miss the peaks
-
-
-def steps(number: int, samples: int, inputs: int, rng: np.random.Generator) -> Array:
-    """Return (samples, inputs) from -1 to 1: `number` even levels, each for as long, in random order."""
-    levels = np.linspace(-1.0, 1.0, number)
-    which = np.minimum(np.arange(samples) * number // samples, number - 1)
-    return np.stack([rng.permutation(levels)[which] for _ in range(inputs)], axis=1)
 
 
 @dataclass(frozen=True)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, time_is_over
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.signal.bounds import Bounds, limiter_of
 from inputdesign_cli.signal.constraints import compressed, peak_ratio
-from inputdesign_cli.signal.evaluation import MET, Evaluator, Target
+from inputdesign_cli.signal.evaluation import MET, Evaluator, Target, first_level, last_level, level_of_power
 from inputdesign_cli.signal.generator import SignalGenerator
-from inputdesign_cli.signal.level_search import first_level, last_level, level_of_power
-from inputdesign_cli.signal.limiter import Limiter
-from inputdesign_cli.signal.settings import FROM_LEVELS, LEVELLED, Method
-from inputdesign_cli.signal.switching import better_switching
+from inputdesign_cli.signal.limits import Bounds, Limiter
 
 # Times the level that fits as it is: how much is clipped of the records that are tried.
 _CLIPPED = (1.0, 1.4, 2.0, 3.0)
@@ -32,6 +28,58 @@ LONG = 2000
 _HOPELESS, _SAMPLES, _TRIES, _SPREADS = 1.15, 100, 3, 2.0
 # A record that costs more than the design by this share is worth more candidates.
 _LITTLE = 0.05
+_MOST_CHANGES = 3
+_SHIFTED = 0.6  # the share of the changes that shift a switch; the others add or remove one
+# After this number of tries, or a sixth of all: would the same gain, repeated, be enough?
+_STRETCH, _STRETCHES = 100, 6
+
+
+def better_switching(
+    values: Array,
+    figure: Callable[[Array], float],
+    rng: np.random.Generator,
+    tries: int,
+    enough: float | None = None,
+) -> Array:
+    """The best of the signals of two levels (n, r) that are met from `values` on; out of time, that so far.
+
+    Args:
+        figure: of a signal of two levels, to be small.
+        enough: ends the search; so does a pace that would not lead there. None: as small as it gets.
+    """
+    best, least = values, float(figure(values))
+    stretch = max(min(_STRETCH, tries // _STRETCHES), 1)
+    for left in range(tries, 0, -stretch):
+        before = least
+        for _ in range(min(left, stretch)):
+            if time_is_over() or (enough is not None and least <= enough):
+                return best
+            tried = best
+            for _ in range(rng.integers(1, _MOST_CHANGES + 1)):
+                tried = _changed(tried, rng)
+            reached = float(figure(tried))
+            if reached < least:
+                best, least = tried, reached
+        if enough is not None and (before - least) * (left / stretch - 1.0) < least - enough:
+            return best
+    return best
+
+
+def _changed(values: Array, rng: np.random.Generator) -> Array:
+    """The signal with one switch of one input shifted, added or removed."""
+    changed = values.copy()
+    column = changed[:, rng.integers(changed.shape[1])]
+    switches = 1 + np.flatnonzero(np.diff(np.sign(column)))
+    chance = rng.random()
+    if switches.size and chance < _SHIFTED:
+        furthest = max(1, column.size // (2 * switches.size))
+        at, by = int(rng.choice(switches)), int(rng.integers(1, furthest + 1))
+        column[slice(at, at + by) if rng.random() < 0.5 else slice(max(at - by, 0), at)] *= -1.0
+    elif switches.size and chance < 0.5 * (1.0 + _SHIFTED):
+        column[int(rng.choice(switches)) :] *= -1.0
+    else:
+        column[int(rng.integers(column.size)) :] *= -1.0
+    return changed
 
 
 @dataclass(frozen=True)
@@ -43,7 +91,7 @@ class Record:
     """
 
     samples: Array
-    method: Method
+    method: str
     worst_ratio: float
     factor_residual: float | None = None
     extra_power: float = 0.0
@@ -75,7 +123,7 @@ def best_record(
         OutOfTimeError: the time limit passed before the first was made.
     """
     bounds, settings = bounds or Bounds(), generator.settings
-    limiter = limiter_of(limiting or plant, settings, bounds)
+    limiter = Limiter.of(limiting or plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
     best = candidates.record(_stream(settings.seed, 0))
     missed = [best.worst_ratio]
@@ -129,7 +177,7 @@ class _Candidates:
         drawn = _power(values)
         if drawn > 0.0:  # a few samples may all be zeros of the sinusoids: they excite nothing at any level
             values = values * np.sqrt(power / drawn)
-        if self.generator.method == "slewed":
+        if self.generator.kind.slewed:
             values = self._switched(values, self._strongest, rng)
         factor, evaluator = self.generator.factor, self.evaluator
         designed = evaluator.target.designed or power
@@ -160,7 +208,7 @@ class _Candidates:
     @property
     def _strongest(self) -> float:
         """The highest level; where there is none, that of the design."""
-        return 1.0 if any(limits.reach is None for limits in self.limiter.inputs) else _FAR
+        return _FAR if np.isfinite(self.limiter.reach).all() else 1.0
 
     def _switched(self, values: Array, level: float, rng: np.random.Generator) -> Array:
         """The values (m, r) of two levels, switched at better times; what repeats stays so.
@@ -201,9 +249,10 @@ class _Candidates:
         samples = limiter.record(values, level)
         if evaluator.figure(samples) <= 1.0:
             return samples, True
-        if settings.method in LEVELLED and evaluator.ratio(limiter.record(values, _FAR * level)) > MET:
+        kind = self.generator.kind
+        if kind.few_levels and evaluator.ratio(limiter.record(values, _FAR * level)) > MET:
             # More of the same levels is always better, and there is no more.
-            if settings.method == "binary" and switched:
+            if kind.switched and switched:
                 values = self._switched(values, _FAR * level, rng)
             if evaluator.figure(limiter.record(values, _FAR * level)) > 1.0:
                 return self._affordable(values, _FAR * level), False
@@ -220,7 +269,7 @@ class _Candidates:
         What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
         strongest = self._of_designed_power(values)
-        if self.limiter.settings.method in FROM_LEVELS:
+        if self.generator.kind.of_levels:
             return strongest
         fit = self._fitting(values)
         tried = [strongest, *(self._affordable(values, share * fit) for share in _CLIPPED)]
@@ -230,10 +279,7 @@ class _Candidates:
     def _fitting(self, values: Array) -> float:
         """The largest level at which the values need no change."""
         limiter = self.limiter
-        factors = [limits.factor(column) for limits, column in zip(limiter.inputs, values.T, strict=True)]
-        if limiter.constraints:
-            factors.append(1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
-        return min(min(factors), 1.0)
+        return min(limiter.factor(values), 1.0 / max(peak_ratio(values, limiter.constraints), 1.0))
 
     def _of_designed_power(self, values: Array) -> Array:
         """The record of the power of the design, or of the most below that the limits allow."""
@@ -247,10 +293,10 @@ class _Candidates:
 
     def _lowered(self, values: Array, level: float) -> Array:
         """Lower the peak of the values towards what the limits admit, if that keeps their kind."""
-        settings, reach = self.limiter.settings, self.limiter.inputs[0].reach
-        fixed = settings.method in FROM_LEVELS or settings.phases == "optimised" or settings.ramp
+        settings, reach = self.limiter.settings, float(self.limiter.reach[0])
+        fixed = self.generator.kind.of_levels or settings.phases == "optimised" or settings.ramp
         # Phases of several inputs that give way one by one would spoil the cross-spectra.
-        if reach is None or fixed or values.shape[1] > 1:
+        if np.isinf(reach) or fixed or values.shape[1] > 1:
             return values
         return compressed(values[:, 0], reach / level)[:, None]
 

@@ -10,11 +10,8 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.signal.sinusoids import Selection
 
-Method = Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white", "given"]
-Phases = Literal["orthogonal", "random", "schroeder", "optimised"]
+Phases = Literal["orthogonal", "random", "schroeder", "optimised", "even"]
 LineVectors = Literal["orthogonal", "random"]
-LEVELLED = ("binary", "ternary", "prbs")
-FROM_LEVELS = (*LEVELLED, "slewed")  # ramps between them too
 
 
 @dataclass(frozen=True)
@@ -60,26 +57,29 @@ class SignalSettings:
     """What is generated.
 
     Args:
+        method: the name of a kind, see `kinds.py`.
         phases: of a multisine. `orthogonal`: uniform, with vectors across the inputs that make the matrix
             spectrum exact over as many periods as inputs; so do `schroeder` and `optimised`. `random`:
-            uniform and independent in each input, exact on average only.
+            uniform and independent in each input, exact on average only. `even`: optimised from Schroeder's.
         lines: harmonics of a period that are used.
         periods: equal ones in the record.
         hold: each value stands for this many samples.
         ramp: samples over which the record fades in and out.
         bits: register of a pseudo-random sequence.
+        number: levels of steps.
         level: (r,) the peaks that the inputs are to have, whatever that buys.
         candidates, most_candidates: up to the second number are tried while the best of the first costs more
             than a twentieth beyond the design.
     """
 
-    method: Method = "filtered_noise"
+    method: str = "filtered_noise"
     phases: Phases = "orthogonal"
     lines: Selection = None
     periods: int = 1
     hold: int = 1
     ramp: int = 0
     bits: int | None = None
+    number: int | None = None
     level: Array | None = None
     candidates: int = 20
     most_candidates: int = 80

@@ -19,7 +19,7 @@ from inputdesign_cli.outcome.robust import FloorUse, LostPlant
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, Searched, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import PolynomialModel
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal.selection import Record
 from tests.support.wording import long_sentences
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=True, inputs=1, outputs=1)

@@ -9,7 +9,8 @@ import scipy.signal
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.information.record_transforms import RecordTransforms
 from inputdesign_cli.plant import Loop, PolynomialModel, TransferMatrix
-from inputdesign_cli.signal import grid_lines, multisine_record
+from inputdesign_cli.signal.lines import grid_lines
+from inputdesign_cli.signal.multisine import multisine_record
 from tests.support.plants import arrays, arx, paper_experiment
 from tests.support.random_plants import random_case
 

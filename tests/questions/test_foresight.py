@@ -7,7 +7,6 @@ import scipy.signal
 
 from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.questions.common import foresight, simulation
 from inputdesign_cli.questions.least_cost.build import build_convex
 from tests.support.heater import said
@@ -60,7 +59,7 @@ def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
         assert min(abs(rival["theta"]["L"] - L) for L in scan) < 3.0
         assert rival["ratio"] > 1.0
     (note,) = [note for note in result["notes"] if "nearly as well" in note]
-    assert "{type: fir, order: 12} leaves none" in note
+    assert "spectrum: {type: fir, order: 12}" in note
     assert "plant.known: [L]" in note
 
 
@@ -111,7 +110,7 @@ def test_what_was_not_looked_at_is_said(override, longest, reason, monkeypatch):
 def test_without_time_nothing_is_begun():
     asked = build_convex(load_spec("specs/heater.yaml"))
     with time_limit(0.01):
-        foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), (), Outcome())
+        foreseen = asked.foresight.foreseen(np.ones((SAMPLES, 1)), ())
     assert foreseen.entry is None
     (found,) = foreseen.findings
     assert found.code == "other-minima-not-looked-at"

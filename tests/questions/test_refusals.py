@@ -345,6 +345,7 @@ conflicting-keys signal.hold | signal.hold=7
 out-of-range signal.bits | signal.bits=3 | signal.type=prbs
 out-of-range signal.lines | signal.lines=[1, 200]
 unsuitable-key signal.ramp | signal.ramp=10 | signal.type=binary
+not-supported signal.type | signal.type=chirp
 conflicting-keys signal.amplitudes | signal.amplitudes=[1, 9] | limits.amplitude=[2, 8]
 wrong-shape signal.quantisation.range | signal.quantisation={bits: 4, range: [9, 9, 9]}
 coarse-converter signal.offset | signal.quantisation={bits: 4, range: 9} | signal.offset=[0, 9]

@@ -12,7 +12,7 @@ from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.monte_carlo.regression import run_experiments
 from inputdesign_cli.outcome.run_directory import write_run
-from inputdesign_cli.signal import delayed_regressors, free_regressors
+from inputdesign_cli.signal.moments import delayed_regressors, free_regressors
 
 SPECS = Path(__file__).parents[2] / "specs"
 FREE, FIR = SPECS / "regression.yaml", SPECS / "regression_fir.yaml"

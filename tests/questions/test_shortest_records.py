@@ -16,7 +16,8 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.questions.common.record import Made, make_record
 from inputdesign_cli.questions.least_cost.shortest_record import ShortestRecord, Way
 from inputdesign_cli.questions.task import build_task
-from inputdesign_cli.signal import Record, SignalGenerator
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.selection import Record
 
 # A lag whose spectrum alone would take five samples, and two inputs whose designs of stated length differ.
 LAG = """

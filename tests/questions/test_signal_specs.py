@@ -30,6 +30,8 @@ CASES = [
     ("signal: {type: ternary, hold: 2}", {}),
     ("signal: {bits: 7}", {"crest_factor": 1 + 1e-9}),
     ("signal: {type: white, ramp: 20}", {}),
+    ("signal: {type: chirp, candidates: 1}", {"crest_factor": 1.45}),
+    ("signal: {type: steps, candidates: 1}", {"crest_factor": 1.45}),
     ("signal: {quantisation: {bits: 8, range: 4}, offset: 1}", {}),
     ("limits: {amplitude: 1.2}", {"peak": 1.2}),
     ("limits: {rate: 0.5}", {"input_move": 0.5 + 1e-12}),

@@ -12,7 +12,7 @@ from inputdesign_cli.accuracy.calibration import Calibration, Coverage
 from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.outcome.design import Coverage as Reached
 from inputdesign_cli.questions.common import simulated_estimates
-from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates
+from inputdesign_cli.questions.common.confidence import SimulatedEstimates
 
 SPEC = """
 plant: {{B: [0, 3.6], F: [1, -0.7]}}

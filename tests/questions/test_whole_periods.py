@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 from inputdesign_cli import identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.questions.frequency_response.whole_periods import whole_periods
+from inputdesign_cli.questions.frequency_response.measure import whole_periods
 from inputdesign_cli.records import Record
 
 PERIOD = 20

@@ -100,8 +100,7 @@ def test_several_channels_name_the_entry_and_the_input():
     tightest = max(details["limits"], key=lambda item: item["share"])
     assert tightest["channel"] == 2
     assert (
-        "needs input 2 power >= " in diagnostic.message
-        or "power of input 2 is exhausted" in diagnostic.message
+        "needs input 2 power >= " in diagnostic.message or "input 2 power is exhausted" in diagnostic.message
     )
 
 

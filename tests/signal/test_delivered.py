@@ -6,7 +6,11 @@ from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.questions.common.record import worst_ratio
-from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
+from inputdesign_cli.signal.evaluation import Target
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.lines import DesignedSpectrum
+from inputdesign_cli.signal.selection import best_record
+from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.random_plants import random_case
 

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.signal import (
-    DesignedSpectrum,
-    SignalGenerator,
-    SignalSettings,
-    Target,
-    autocorrelation,
-    best_record,
-)
+from inputdesign_cli.signal.evaluation import Target
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.signal.multisine import gaussian_record
+from inputdesign_cli.signal.selection import best_record
+from inputdesign_cli.signal.settings import SignalSettings
+from inputdesign_cli.signal.spectral_factor import autocorrelation
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
-KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
+KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "steps"]
 
 
 def rng(seed=0):

@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.signal import Quantiser, autocorrelation, grid_lines, multisine_record, select
+from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.signal.levels import few_levels
-from inputdesign_cli.signal.shift_register import pseudo_random, register_length
+from inputdesign_cli.signal.lines import grid_lines
+from inputdesign_cli.signal.multisine import multisine_record
+from inputdesign_cli.signal.prbs import pseudo_random, register_length
+from inputdesign_cli.signal.settings import Quantiser
+from inputdesign_cli.signal.sinusoids import select
+from inputdesign_cli.signal.spectral_factor import autocorrelation
 from inputdesign_cli.spectrum import FirBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
@@ -53,7 +58,7 @@ def test_levels_of_one_input_and_their_spectrum(kind, values):
         wanted = np.sqrt(power)
         return 1 - (found @ wanted) ** 2 / (found @ found) / (wanted @ wanted)
 
-    record = few_levels(lines, samples, rng(), kind)[:, 0]
+    record = few_levels(lines, samples, rng(), kind_of(kind).nearest)[:, 0]
     assert set(np.unique(np.sign(record))) <= values
     assert np.unique(np.abs(record[record != 0.0])).size == 1
     signs = [
@@ -67,7 +72,7 @@ def test_levels_of_one_input_and_their_spectrum(kind, values):
 def test_few_levels_at_several_inputs(kind, number, samples):
     """Levels of the powers of the inputs, and a matrix spectrum nearer than that of clipped multisines."""
     lines = design(240)
-    record = few_levels(lines, samples, rng(), kind)
+    record = few_levels(lines, samples, rng(), kind_of(kind).nearest)
     assert record.shape == (samples, 2)
     assert all(np.unique(column).size == number for column in record.T)
     np.testing.assert_allclose(np.mean(record[:480] ** 2, axis=0), lines.mean_squares, rtol=0.01)

@@ -4,20 +4,15 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.signal import (
-    Bounds,
-    DesignedSpectrum,
-    Lines,
-    Quantiser,
-    SignalGenerator,
-    SignalSettings,
-    Target,
-    best_record,
-    largest_move,
-    levels,
-)
-from inputdesign_cli.signal.constraints import compressed, slow_moves
-from inputdesign_cli.signal.level_search import first_level, last_level, least_level, level_of_power
+from inputdesign_cli.signal import levels
+from inputdesign_cli.signal.constraints import compressed, largest_move, slow_moves
+from inputdesign_cli.signal.evaluation import Target, first_level, last_level, least_level, level_of_power
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.signal.limits import Bounds
+from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
+from inputdesign_cli.signal.selection import best_record
+from inputdesign_cli.signal.settings import Quantiser, SignalSettings
 from inputdesign_cli.spectrum import FirBasis
 from tests.support.plants import arx
 
@@ -208,7 +203,7 @@ def test_levels_of_a_signal_of_zeros(monkeypatch, kind):
     monkeypatch.setattr(levels, "multisine_record", lambda lines, samples, *_, **__: np.zeros((samples, 1)))
     lines = Lines.of_period(np.ones((9, 1, 1), dtype=complex), 16)
     with np.errstate(divide="raise", invalid="raise"):
-        found = levels.few_levels(lines, 16, np.random.default_rng(0), kind)
+        found = levels.few_levels(lines, 16, np.random.default_rng(0), kind_of(kind).nearest)
     assert np.all(np.isfinite(found))
 
 

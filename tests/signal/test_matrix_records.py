@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.signal.lines import Lines, grid_lines
-from inputdesign_cli.signal.matrix_factor import matrix_factor
 from inputdesign_cli.signal.periodic import (
     dense_roots,
     even_multisine,
@@ -14,6 +13,7 @@ from inputdesign_cli.signal.periodic import (
     shaped_noise,
 )
 from inputdesign_cli.signal.rational import rational_filter
+from inputdesign_cli.signal.spectral_factor import matrix_factor
 from tests.support.loop_error import adjoint, column, random_hermitian
 
 TAPS = np.array([[[2.0, 0.0], [0.5, 1.0]], [[0.6, 0.3], [-0.4, 0.2]]])

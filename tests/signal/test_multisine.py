@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError, time_limit
-from inputdesign_cli.signal import Lines, autocorrelation, grid_lines, merged, multisine_record
-from inputdesign_cli.signal.multisine import orthogonal_columns
+from inputdesign_cli.signal.lines import Lines, grid_lines, merged, orthogonal_columns
+from inputdesign_cli.signal.multisine import multisine_record
+from inputdesign_cli.signal.spectral_factor import autocorrelation
 from inputdesign_cli.spectrum import FirBasis
 
 

@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from inputdesign_cli.signal import (
-    DesignedSpectrum,
-    Lines,
-    SignalGenerator,
-    SignalSettings,
-    Sinusoids,
-    crest_factor,
-    low_peak_phases,
-    multisine_record,
-    optimise_phases,
-    schroeder_phases,
-)
 from inputdesign_cli.signal.constraints import compressed
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
+from inputdesign_cli.signal.multisine import multisine_record
+from inputdesign_cli.signal.phases import crest_factor, low_peak_phases, optimise_phases, schroeder_phases
+from inputdesign_cli.signal.settings import SignalSettings
+from inputdesign_cli.signal.sinusoids import Sinusoids
 from inputdesign_cli.spectrum import LinesBasis
 
 

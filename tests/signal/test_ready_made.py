@@ -7,17 +7,20 @@ import pytest
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.questions.ready_made import ReadyMade, make_signal
-from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
+from inputdesign_cli.signal.ready_made import equal_lines, excites, scaled
+from inputdesign_cli.signal.settings import SignalSettings
 
 
-def rng():
-    return np.random.default_rng(5)
+def made(kind, samples, inputs=1, *more, odd=False, **settings):
+    return equal_lines(
+        SignalSettings(kind, phases="even", seed=5, **settings), samples, inputs, *more, odd=odd
+    )
 
 
 @pytest.mark.parametrize("bits", [3, 7, 10])
 def test_a_prbs_is_white_over_its_period(bits):
     period = 2**bits - 1
-    u = prbs(bits, 2 * period, 1, rng())
+    u = made("prbs", 2 * period, bits=bits)
     assert set(np.unique(u)) == {-1.0, 1.0}
     assert np.array_equal(u[:period], u[period:])
     lag = np.fft.irfft(np.abs(np.fft.rfft(u[:period, 0])) ** 2, period) / period
@@ -29,14 +32,14 @@ def test_a_prbs_is_white_over_its_period(bits):
 
 
 def test_inputs_of_a_prbs_are_hardly_correlated():
-    u = prbs(10, 1023, 3, rng())
+    u = made("prbs", 1023, 3, bits=10)
     gram = u.T @ u / 1023
     assert np.abs(gram - np.eye(3)).max() == pytest.approx(1.0 / 1023)
 
 
 @pytest.mark.parametrize("odd", [False, True])
 def test_a_multisine_has_equal_lines_of_a_low_peak(odd):
-    u = multisine(600, 1, (0.1, 2.0), 25, rng(), odd=odd)
+    u = made("multisine", 600, 1, (0.1, 2.0), 25, odd=odd)
     power = np.abs(np.fft.rfft(u[:, 0])) ** 2
     lines = np.flatnonzero(power > 1e-9 * power.max())
     assert lines.size == 25
@@ -50,13 +53,13 @@ def test_a_multisine_has_equal_lines_of_a_low_peak(odd):
 
 
 def test_inputs_of_a_multisine_are_orthogonal():
-    u = multisine(128, 3, (0.0, np.pi), 10, rng(), odd=False)
+    u = made("multisine", 3 * 128, 3, (0.0, np.pi), 10)
     gram = u.T @ u
     assert np.abs(gram - np.diag(np.diag(gram))).max() < 1e-9 * gram[0, 0]
 
 
 def test_a_chirp_sweeps_its_band():
-    u = chirp(20000, (0.1, 1.0))
+    u = made("chirp", 20000, 1, (0.1, 1.0))
     assert np.abs(u).max() <= 1.0
     (found,) = excites(u)
     # Power is even over the band, and a twentieth lies on either side.
@@ -65,7 +68,7 @@ def test_a_chirp_sweeps_its_band():
 
 
 def test_steps_take_every_level_once():
-    u = steps(6, 600, 2, rng())
+    u = made("steps", 600, 2, number=6)
     for channel in u.T:
         assert sorted(channel[50::100]) == pytest.approx(np.linspace(-1, 1, 6))
         assert np.count_nonzero(np.diff(channel)) == 5
@@ -100,7 +103,7 @@ def test_what_would_not_fit_is_refused_before_it_is_made(asked):
 
 
 def test_levels_are_written_without_rounding():
-    levels = scaled(steps(11, 11, 1, rng()), [(40.0, 60.0)])[:, 0]
+    levels = scaled(made("steps", 11, number=11), [(40.0, 60.0)])[:, 0]
     assert sorted(levels.tolist()) == [float(x) for x in range(40, 61, 2)]
     tiny = scaled(np.array([[-1.0], [0.0], [1.0]]), [(0.0, 1e-20)])[:, 0]
     assert tiny == pytest.approx([0.0, 5e-21, 1e-20], rel=1e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.signal import SpectralFactor, autocorrelation, spectral_factor
+from inputdesign_cli.signal.spectral_factor import SpectralFactor, autocorrelation, spectral_factor
 from inputdesign_cli.spectrum import FirBasis
 
 

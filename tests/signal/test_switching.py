@@ -8,18 +8,13 @@ from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.information import FiniteRecord
-from inputdesign_cli.signal import (
-    Bounds,
-    DesignedSpectrum,
-    Quantiser,
-    SignalGenerator,
-    SignalSettings,
-    Target,
-    best_record,
-    largest_move,
-)
-from inputdesign_cli.signal.constraints import ramped
-from inputdesign_cli.signal.switching import better_switching
+from inputdesign_cli.signal.constraints import largest_move, ramped
+from inputdesign_cli.signal.evaluation import Target
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.limits import Bounds
+from inputdesign_cli.signal.lines import DesignedSpectrum
+from inputdesign_cli.signal.selection import best_record, better_switching
+from inputdesign_cli.signal.settings import Quantiser, SignalSettings
 from inputdesign_cli.spectrum import FirBasis
 
 

@@ -140,7 +140,7 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
             return task.solve()
         # Both records are assessed together.
         earlier = Earlier(raw.model.theta, factor @ factor.T)
-        return replace(task, foresight=replace(task.foresight, earlier=earlier, richer={})).solve()
+        return replace(task, foresight=replace(task.foresight, earlier=earlier)).solve()
 
     requirements = [make(experiment) for make in build_requirements(spec, raw)]
     usual, information = model_error_alpha(spec, raw.model), np.eye(experiment.size)

@@ -24,7 +24,7 @@ from inputdesign_cli.questions.building.model_error import (
 )
 from inputdesign_cli.questions.building.parameters import embedded
 from inputdesign_cli.questions.building.weights import build_weight, check_finite
-from inputdesign_cli.questions.common.within_limits import StatedBound
+from inputdesign_cli.questions.common.infeasible import StatedBound
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.plugins import added
 

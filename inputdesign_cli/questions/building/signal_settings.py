@@ -13,8 +13,10 @@ from inputdesign_cli.questions.building.demand import check_record, longest_reco
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest, least_period
-from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings, blocks_of
-from inputdesign_cli.signal.settings import FROM_LEVELS, Method, Phases
+from inputdesign_cli.signal.kinds import kind_of
+from inputdesign_cli.signal.limits import Bounds
+from inputdesign_cli.signal.multisine import blocks_of
+from inputdesign_cli.signal.settings import Phases, Quantiser, SignalSettings
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.units import SECONDS
 
@@ -60,7 +62,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     )
 
 
-def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSettings:
+def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettings:
     """Return the settings of the signal; its type and phases, if not stated, follow from other keys.
 
     Args:
@@ -74,7 +76,7 @@ def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSet
     candidates = max(_CANDIDATES // inputs, _FEWEST)
     if method == "multisine" and phases == "optimised":
         candidates = _OPTIMISED
-    elif method == "slewed":
+    elif kind_of(method).slewed:
         candidates = _SEARCHED
     most = _PATIENCE * candidates if method == "filtered_noise" else candidates
     return SignalSettings(
@@ -170,7 +172,7 @@ def sampling_rate(spec: Spec) -> float:
     return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
 
 
-def _method(spec: Spec) -> Method:
+def _method(spec: Spec) -> str:
     """The type of signal: stated, or the one that other keys belong to."""
     signal = spec.signal
     if signal.type is not None:
@@ -180,7 +182,7 @@ def _method(spec: Spec) -> Method:
     return "prbs" if signal.bits is not None else _usual_method(spec)
 
 
-def _usual_method(spec: Spec) -> Method:
+def _usual_method(spec: Spec) -> str:
     """The type if none is stated: filtered noise for one input and output in q^-1, otherwise a multisine."""
     plant, spectrum = spec.plant, spec.spectrum
     single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
@@ -189,11 +191,11 @@ def _usual_method(spec: Spec) -> Method:
     return "filtered_noise" if noise else "multisine"
 
 
-def _other_methods(spec: Spec) -> tuple[Method, ...]:
+def _other_methods(spec: Spec) -> tuple[str, ...]:
     """Other types that may serve as well; empty if the spec states how the signal is made."""
     if spec.signal.stated("phases", "lines", "bits"):
         return ()
-    levels: list[Method] = ["slewed" if _ramps_needed(spec) else "binary"]
+    levels: list[str] = ["slewed" if _ramps_needed(spec) else "binary"]
     if not spec.plant.sampled or spec.signal.ramp:
         levels = []
     others = dict.fromkeys((_usual_method(spec), "multisine", *levels))
@@ -265,14 +267,18 @@ def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
 def _kind_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
     """Settings and files go with the type of the signal."""
     method, bits, inputs = settings.method, settings.bits, spec.plant.inputs
-    if settings.ramp and method in FROM_LEVELS:
+    kind = kind_of(method)
+    if settings.ramp and kind.of_levels:
         message = f"ramp does not go with type: {method}, whose values are of a few levels"
         yield "unsuitable-key", "signal.ramp", message, "remove it, or use filtered_noise or multisine"
-    if method == "slewed" and (spec.closed_loop or spec.limits.rate is None):
+    if kind.slewed and (spec.closed_loop or spec.limits.rate is None):
         why = "in a loop does not limit what is applied" if spec.closed_loop else "is not stated"
         message = f"type: slewed ramps between two levels at the speed of limits.rate, which {why}"
         instead = "" if spec.closed_loop else "state limits.rate, or "
         yield "unsuitable-key", "signal.type", message, f"{instead}use type: binary, which switches at once"
+    if not kind.several and inputs > 1:
+        message = f"type: {method} is a signal of one input, and the plant has {inputs}"
+        yield "not-supported", "signal.type", message, "use type: multisine"
     if method == "prbs" and bits is not None and 2**bits - 1 < least_period(inputs):
         # Several inputs apply shifted parts of the sequence.
         message = f"a register of {bits} bits repeats after {2**bits - 1} values, too few for {inputs} inputs"

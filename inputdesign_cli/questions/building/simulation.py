@@ -7,7 +7,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import unstated_errors
 from inputdesign_cli.questions.building.system import build_cost, build_loop, build_model, held_plant
-from inputdesign_cli.questions.common.simulated_estimates import Simulator
+from inputdesign_cli.questions.common.confidence import Simulator
 from inputdesign_cli.questions.common.simulation import Simulation, TrueSystem
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.specification.models.experiment import Noise

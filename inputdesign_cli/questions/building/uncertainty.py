@@ -238,7 +238,7 @@ class _Scenarios(UncertainPlant):
         """Return the region of this confidence in which the worst plant is searched."""
         found = self.region(confidence)
         name = "the intervals" if found.box else f"the ellipsoid of confidence {confidence:g}"
-        return Region(name, found.centre, found.columns, found.box, self.possible)
+        return Region(found.centre, found.columns, found.box, name, self.possible)
 
     def possible(self, theta: Array) -> Alternative | None:
         """Return the plant with these parameters; None if there is none, or it is unstable."""

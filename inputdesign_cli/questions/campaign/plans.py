@@ -26,7 +26,7 @@ from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
-from inputdesign_cli.signal import DesignedSpectrum
+from inputdesign_cli.signal.lines import DesignedSpectrum
 from inputdesign_cli.spectrum import FlatBasis
 
 # A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.

@@ -67,13 +67,7 @@ class Informed:
     def curves(
         self, experiment: Experiment, pairs: Pairs | None, *, flat: bool = True
     ) -> tuple[dict[str, Table], dict[str, Curves]]:
-        """Return the tables and figures of the bound, the loop and the parameters, as far as they exist.
-
-        Args:
-            experiment: in the coordinates of the information.
-            pairs: of parameters that ellipses show.
-            flat: whether ellipses show white excitation as well.
-        """
+        """Return the tables and figures of the bound, the loop and the parameters, as far as they exist."""
         tables, curves = dict[str, Table](), dict[str, Curves]()
         with suppress(np.linalg.LinAlgError):  # a parameter that the design does not excite
             tables["bound"], curves["bound"] = self.bound()
@@ -86,14 +80,11 @@ class Informed:
     def of_length(
         self, experiment: Experiment, pairs: Pairs | None, samples: int, *, flat: bool = True
     ) -> dict[str, Curves]:
-        """Return `bound` and `ellipses` of records of this many samples with the same spectrum."""
-        found: dict[str, Curves] = {}
-        longer = experiment.of_length(self.information, samples)
+        """Return the curves of records of this many samples with the same spectrum."""
         white = experiment.of_length(self.white, samples) if flat and self.white is not None else None
-        with suppress(np.linalg.LinAlgError):
-            found["bound"] = Informed(self.units, self.errors, longer, self.stated).bound()[1]
-        drawn = experiment_ellipses(experiment, longer, white, pairs)
-        return found if drawn is None else found | {"ellipses": drawn}
+        information = experiment.of_length(self.information, samples)
+        longer = Informed(self.units, self.errors, information, self.stated, white=white)
+        return longer.curves(experiment, pairs, flat=flat)[1]
 
     def bound(self) -> tuple[Table, BoundCurves]:
         """Return r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement."""
@@ -202,9 +193,6 @@ def experiment_ellipses(
     experiment: Experiment, information: Array, white: Array | None, pairs: Pairs | None
 ) -> EllipseCurves | None:
     """The chosen `pairs`, by default those most correlated where there are several channels.
-
-    Args:
-        information, white: (k, k) in the coordinates of `experiment`, by the design and by flat excitation.
 
     Returns:
         None when there is no pair to show, or some parameter has no finite variance.

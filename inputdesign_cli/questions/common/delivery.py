@@ -1,8 +1,9 @@
-"""What designs and given excitations deliver alike: a record with its curves, its files and its findings."""
+"""What all kinds of questions deliver alike: results with a record, its files, its findings, and a study."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,19 +20,22 @@ from inputdesign_cli.findings.designed_records import (
 )
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import Excitation
-from inputdesign_cli.outcome import Outcome, Signal
+from inputdesign_cli.outcome import Outcome, Signal, Simulation
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Searched
-from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.bound import Pairs
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.record import RecordRequest, worst_ratio
 from inputdesign_cli.questions.common.signal_outcome import other_files, signal_curves
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal.selection import Record
 
 # Errors that grow by less than this, relative, where the start is unknown are not mentioned.
 _MATTERS = 0.2
+# A gap up to this many tolerances is almost optimal.
+ALMOST = 100.0
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -69,42 +73,51 @@ class Delivered:
     rivals: Callable[[int], Searched | None] | None = None
 
 
-@dataclass(frozen=True)
-class Report:
-    """An outcome with its tables and curves by file stem, and other files by name."""
+def results_of(
+    header: Header, outcome: Outcome, tables: Mapping[str, Table], curves: Mapping[str, Curves]
+) -> Results:
+    """Return the results of a question with this header."""
+    return Results(outcome, header.resolved_spec, header.units.time_unit, tables, curves)
 
-    outcome: Outcome
-    tables: dict[str, Table]
-    curves: dict[str, Curves]
-    files: Mapping[str, bytes]
 
-    def with_record(
-        self, request: RecordRequest, shown: Shown, experiment: Experiment, record: Record, signal: Signal
-    ) -> Report:
-        """Add a record, its curves and its files."""
-        units = shown.header.units
-        tables, drawn = signal_curves(request, units, experiment, record)
-        return Report(
-            replace(self.outcome, signal=signal),
-            self.tables | tables,
-            self.curves | {"signal": drawn},
-            other_files(request, units, record),
-        )
+def adding(
+    results: Results,
+    outcome: Outcome,
+    findings: Iterable[Finding] = (),
+    tables: Mapping[str, Table] | None = None,
+    curves: Mapping[str, Curves] | None = None,
+) -> Results:
+    """Return the results with an outcome of more sections, findings, and tables and curves by stem."""
+    return replace(
+        results,
+        outcome=outcome.saying(findings),
+        tables={**results.tables, **(tables or {})},
+        curves={**results.curves, **(curves or {})},
+    )
 
-    def foreseeing(
-        self, foresight: Foresight | None, record: Array, requirements: Sequence[Requirement]
-    ) -> Report:
-        """Add the other minima that data of this record (n, r) would leave."""
-        if foresight is None:
-            return self
-        found = foresight.foreseen(record, requirements, self.outcome)
-        return replace(self, outcome=replace(self.outcome, foreseen=found.entry).saying(found.findings))
 
-    def results(self, header: Header, timing: Mapping[str, float]) -> Results:
-        """Return the results of a run that took this time."""
-        outcome = replace(self.outcome, timing_s=timing)
-        time_unit = header.units.time_unit
-        return Results(outcome, header.resolved_spec, time_unit, self.tables, self.curves, self.files)
+def with_record(
+    results: Results,
+    request: RecordRequest,
+    units: Units,
+    experiment: Experiment,
+    record: Record,
+    signal: Signal,
+) -> Results:
+    """Return the results with a record, its curves and its files."""
+    tables, drawn = signal_curves(request, units, experiment, record)
+    results = replace(results, files=other_files(request, units, record))
+    return adding(results, replace(results.outcome, signal=signal), (), tables, {"signal": drawn})
+
+
+def foreseeing(
+    results: Results, foresight: Foresight | None, record: Array, requirements: Sequence[Requirement]
+) -> Results:
+    """Return the results with the other minima that data of this record (n, r) would leave."""
+    if foresight is None:
+        return results
+    found = foresight.foreseen(record, requirements)
+    return adding(results, replace(results.outcome, foreseen=found.entry), found.findings)
 
 
 def searching(
@@ -125,8 +138,6 @@ def record_findings(
     """Return what a user should know before applying a record.
 
     Args:
-        experiment: samples of the experiment.
-        record: None if none was made.
         shares: of each limit on single samples that it takes.
         of_powers: whether powers are limited.
     """
@@ -146,9 +157,7 @@ def begun_anywhere(
     A design is of spectra, which have no start; the record may live on its start from rest.
 
     Args:
-        signal: what is said of it so far.
         step: time between samples in the unit of the experiment's frequencies.
-        requirements: what the errors are measured by.
     """
     growth = _growth(experiment, record, step, requirements)
     if growth <= 1.0 + _MATTERS:
@@ -171,3 +180,29 @@ def _growth(experiment: Experiment, record: Array, step: float, requirements: Se
     except np.linalg.LinAlgError:
         return np.inf
     return free / at_rest if at_rest > 0.0 else 1.0
+
+
+def timing(started: float, solved: float) -> dict[str, float]:
+    """Return the seconds that the design and, until now, its signal took; times by `perf_counter`."""
+    return {"design": solved - started, "signal": time.perf_counter() - solved}
+
+
+def with_study(
+    results: Results,
+    study: Simulation,
+    begun: float,
+    findings: Iterable[Finding] = (),
+    tables: Mapping[str, Table] | None = None,
+    curves: Mapping[str, Curves] | None = None,
+) -> Results:
+    """Return the results with a Monte Carlo study that began then, by `perf_counter`."""
+    seconds = {**(results.outcome.timing_s or {}), "simulation": time.perf_counter() - begun}
+    outcome = replace(results.outcome, simulation=study, timing_s=seconds)
+    return adding(results, outcome, findings, tables, curves)
+
+
+def proof_status(gap: float, tolerance: float) -> str:
+    """Whether the relative gap that is proved is as small as asked."""
+    if gap <= tolerance * (1.0 + _ROUNDING):
+        return "optimal"
+    return "almost_optimal" if gap <= ALMOST * tolerance else "gap_open"

@@ -6,8 +6,8 @@ away. A record of the design is simulated on the nominal plant and estimated wit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from inputdesign_cli.findings.rivals import Apart, beyond, foreseen_entries, for
 from inputdesign_cli.identification import Earlier, Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.study import searched_run
-from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.design import Foreseen as Entry
 from inputdesign_cli.outcome.simulation import Searched
 from inputdesign_cli.outcome.units import Units
@@ -30,8 +29,6 @@ from inputdesign_cli.questions.common.knowledge import Knowledge
 _SEED = 0
 # Seconds of a search for each sample, channel, channel and parameter, measured; the longest that is begun.
 _SECONDS, _LONGEST = 1.2e-4, 20.0
-# Another spectrum that costs no more than this is not improved on.
-_CHEAP = 1.2
 # What a simulated search may end with; then nothing can be said.
 _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
 
@@ -52,11 +49,7 @@ class Foresight:
         nominal: the experiment in raw parameters, prior information included.
         entries: errors that have r_u where no requirement bounds one.
         earlier: what counts along where the data are assessed.
-        advice: what to do about rivals, where nothing better is known.
         knowledge: what the spec says of the parameters, which rules rivals out.
-        looks: whether rivals are looked for at all.
-        richer: by its words in a spec the outcome of the same design with another spectrum; empty if there
-            is no other.
     """
 
     units: Units
@@ -66,10 +59,9 @@ class Foresight:
     advice: str
     knowledge: Knowledge | None = None
     looks: bool = True
-    richer: Mapping[str, Callable[[], Outcome]] = field(default_factory=dict)
 
-    def foreseen(self, record: Array, requirements: Sequence[Requirement], design: Outcome) -> Foreseen:
-        """The rivals that a record (n, r) of a design would leave, and what to do about them."""
+    def foreseen(self, record: Array, requirements: Sequence[Requirement]) -> Foreseen:
+        """The rivals that a record (n, r) would leave, and what to do about them."""
         reason = self._not_now(len(record))
         if reason:
             return Foreseen(findings=(not_foreseen(reason),))
@@ -79,8 +71,7 @@ class Foresight:
         except _ENDS:
             return Foreseen()
         entry = Entry(foreseen_entries(self.units, estimate, found))
-        remedy = self._remedy(design) if found else ""
-        return Foreseen(entry, tuple(foreseen_rivals(self.units, estimate, found, remedy)))
+        return Foreseen(entry, tuple(foreseen_rivals(self.units, estimate, found, self.advice)))
 
     def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> Searched | None:
         """Return how many of some records end elsewhere, and how many leave rivals; None if not known."""
@@ -123,36 +114,3 @@ class Foresight:
             return f"{what_ended()} left no time" if seconds > seconds_left() else ""
         except OutOfTimeError:
             return f"{what_ended()} left no time"
-
-    def _remedy(self, design: Outcome) -> str:
-        """The advice, and before it the cheapest spectrum that is found to leave no rivals."""
-        best = (np.inf, "")
-        for words, solved in self.richer.items():
-            try:
-                seconds_left()
-                other = solved()
-            except _ENDS:
-                continue
-            if other.foreseen is not None and not other.foreseen.rivals:
-                best = min(
-                    best, (_price(other), f"spectrum: {words} leaves none{_instead(design, other)}; or ")
-                )
-            if best[0] <= _CHEAP * _price(design):
-                break
-        return best[1] + self.advice
-
-
-def _price(design: Outcome) -> float:
-    """Return what a design takes: its cost, or its samples; nothing if it is the best of a given cost."""
-    cheapest = design.objective is not None and design.objective.kind == "least_cost"
-    return float((design.cost if cheapest else design.samples) or 0)
-
-
-def _instead(design: Outcome, other: Outcome) -> str:
-    """Return what another design takes, for a sentence."""
-    kind = None if design.objective is None else design.objective.kind
-    if kind == "shortest_experiment":
-        return f", with {other.samples} samples instead of {design.samples}"
-    if kind == "least_cost":
-        return f", at a cost of {other.cost:.4g} instead of {design.cost:.4g}"
-    return ""

@@ -32,9 +32,13 @@ class Knowledge:
     columns: Array
     box: bool
 
+    def coordinates(self, theta: Array) -> Array:
+        """Return z (m,) of parameters (k,)."""
+        return np.asarray(np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0], dtype=float)
+
     def admits(self, theta: Array) -> bool:
         """Whether parameters (k,) are possible."""
-        z = np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0]
+        z = self.coordinates(theta)
         size = np.max(np.abs(z), initial=0.0) if self.box else np.linalg.norm(z)
         return bool(size <= _ROOM)
 
@@ -66,10 +70,6 @@ def that_agrees(
     """Return the likeliest minimum that agrees with the knowledge, and the minima that do not.
 
     If none does, the knowledge is wrong and rules nothing out.
-
-    Args:
-        estimate: the likeliest of all, and its rivals.
-        near: makes the estimate at a minimum near parameters (k,).
     """
     minima = (Rival(estimate.theta, 0.0), *estimate.rivals)
     admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]

@@ -18,18 +18,12 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.signal import (
-    Bounds,
-    DesignedSpectrum,
-    Record,
-    SignalGenerator,
-    SignalSettings,
-    Target,
-    best_record,
-    limited_responses,
-    peak_share,
-)
-from inputdesign_cli.signal.evaluation import MET
+from inputdesign_cli.signal.evaluation import MET, Target
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.limits import Bounds, limited_responses, peak_share
+from inputdesign_cli.signal.lines import DesignedSpectrum
+from inputdesign_cli.signal.selection import Record, best_record
+from inputdesign_cli.signal.settings import SignalSettings
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # rounding errors: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
@@ -70,7 +64,6 @@ class RecordRequest:
         limit_keys: of the spec, for what limits single samples.
         stated_method: whether the spec states the kind of signal.
         others: kinds of signals that may stand in for one that does not fit.
-        units: of lengths in messages.
     """
 
     settings: SignalSettings
@@ -248,11 +241,7 @@ def _power_share(
 
 
 def ratio_before(design: Design, step: float) -> float:
-    """Return the worst ratio that information without excitation gives, at the plant where it is worst.
-
-    Args:
-        step: the sample time, in the unit of the experiment's frequencies.
-    """
+    """Return the worst ratio that information without excitation gives, at the plant where it is worst."""
     ratios = []
     for scenario in design.problem.scenarios:
         silent = FiniteRecord(replace(scenario.experiment, samples=1), 1, step)

@@ -20,6 +20,7 @@ from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import jointly_whitened
+from inputdesign_cli.questions.common.knowledge import Knowledge
 
 CONFIDENCE = 0.999
 """Of the statements on plants that were not drawn."""
@@ -74,16 +75,10 @@ class Searched:
 
 
 @dataclass(frozen=True)
-class Region:
-    """The plants centre + columns z, (k,) and (k, m): z in the unit ball, or with `box` in [-1, 1]^m.
-
-    `name` says in words what it is; `at` gives the plant at theta (k,), None if there is none.
-    """
+class Region(Knowledge):
+    """A region of plants: its `name` in words, and the plant at theta (k,), None if there is none."""
 
     name: str
-    centre: Array
-    columns: Array
-    box: bool
     at: Callable[[Array], Alternative | None]
 
     def theta(self, z: Array) -> Array:
@@ -92,16 +87,12 @@ class Region:
 
     def nearest(self, theta: Array) -> Array:
         """(m,): a point of the region near these parameters."""
-        z = np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0]
-        if self.box:
-            return np.asarray(np.clip(z, -1.0, 1.0), dtype=float)
-        return np.asarray(z / max(float(np.linalg.norm(z)), 1.0), dtype=float)
+        z = self.coordinates(theta)
+        return np.clip(z, -1.0, 1.0) if self.box else z / max(float(np.linalg.norm(z)), 1.0)
 
     def farthest(self, gradient: Array) -> Array:
         """(m,): the point of the region that is farthest in this direction."""
-        if self.box:
-            return np.asarray(np.sign(gradient), dtype=float)
-        return np.asarray(gradient / max(float(np.linalg.norm(gradient)), 1e-300), dtype=float)
+        return np.sign(gradient) if self.box else gradient / max(float(np.linalg.norm(gradient)), 1e-300)
 
 
 @dataclass(frozen=True)
@@ -110,10 +101,6 @@ class Plants:
 
     Args:
         batch: the plants beside the nominal one.
-        source: the key of the spec that they come from.
-        names: of the k parameters.
-        r_adm: as the spec has it.
-        paid: see `Problem`.
         discard: how many of the plants the design may leave out.
         afresh: draws others from the same distribution, a few at a time; None if plants were listed.
         fresh: how many of these were asked for.
@@ -158,12 +145,7 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
 
 
 def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
-    """How near each scenario of the problem comes to missing what the design promises; the nominal one first.
-
-    Args:
-        problem: of the design, on the basis of its answer.
-        samples: of the delivered experiment.
-    """
+    """How near each scenario comes to missing what the design promises; the nominal one first."""
     return _worst(problem, design, delivered(problem, design, samples))
 
 

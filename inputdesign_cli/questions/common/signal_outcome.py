@@ -12,13 +12,14 @@ from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.outcome import Signal, write_plain
+from inputdesign_cli.outcome import Signal
 from inputdesign_cli.outcome.curves import PredictedPanel, SignalCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.signal_files import WRITERS
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest
-from inputdesign_cli.signal import Bounds, DesignedSpectrum, Lines, Record
+from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
+from inputdesign_cli.signal.selection import Record
 
 _LAGS = 50
 _LOST = 1e-6  # of the largest sample
@@ -40,10 +41,6 @@ def signal_of(
 
     The value of a criterion is for an experiment of its own length that goes on as the record does, so that
     it compares with the design. Other requirements have their worst ratio.
-
-    Args:
-        designed: information matrix (k, k) of the design.
-        spectrum: of the design, for the error of that of the record.
     """
     samples, made = record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)
@@ -54,14 +51,10 @@ def signal_of(
         value = criterion.value(level)
         efficiency = None if designed is None else level / criterion.level(designed)
     delivery, y, u = request.delivery, plant.signals("output", samples), plant.signals("input", samples)
-    peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
-    found = Signal(
-        samples=len(samples),
+    return replace(
+        plain_signal(samples),
         type=record.method,
         sample_time=units.sample_time,
-        power=_channels(rms**2),
-        peak=_channels(peak),
-        crest_factor=_channels(peak / np.maximum(rms, 1e-300)),
         input_power=_channels(np.mean(u**2, axis=0)),
         output_power=_channels(np.mean(y**2, axis=0)),
         input_peak=_channels(np.abs(u).max(axis=0)),
@@ -73,6 +66,7 @@ def signal_of(
         extra_power=record.extra_power if made else None,
         spectrum_error=None if spectrum is None else _spectrum_error(spectrum.lines(len(samples)), samples),
         limits=_limits(request, units, record) or None,
+        of_limits=request.bounds.shares(u, y) or None,
         spectral_factor_residual=record.factor_residual,
         operating_point=None
         if delivery.operating_points is None or not made
@@ -80,14 +74,6 @@ def signal_of(
         wav_full_scale=_full_scale(delivery, record) if "wav" in delivery.also else None,
         details={"phases": request.settings.phases} if record.method == "multisine" else {},
     )
-    return replace(found, of_limits=_of_limits(request.bounds, found) or None)
-
-
-def signal_entry(
-    request: RecordRequest, units: Units, experiment: Experiment, record: Record
-) -> dict[str, object]:
-    """Return `signal_of` as plain data, for an outcome that is put together from them."""
-    return dict(write_plain(signal_of(request, units, experiment, record)))
 
 
 def _channels(values: Array) -> tuple[float, ...]:
@@ -97,11 +83,7 @@ def _channels(values: Array) -> tuple[float, ...]:
 def signal_curves(
     request: RecordRequest, units: Units, experiment: Experiment, record: Record
 ) -> tuple[dict[str, Table], SignalCurves]:
-    """signal.csv and predicted_output.csv by file stem, with time stamps in the unit of the spec; their plot.
-
-    Raises:
-        SpecError: see `applied`.
-    """
+    """signal.csv and predicted_output.csv, with time stamps in the unit of the spec, and their plot."""
     columns = applied_columns(request, units, record)
     time, *signals = columns.values()
     predicted, panels = predicted_output(units, experiment, record.samples, request.bounds.output)
@@ -122,11 +104,7 @@ def signal_curves(
 def predicted_output(
     units: Units, experiment: Experiment, record: Array, output_limits: Array | None = None
 ) -> tuple[Table, tuple[PredictedPanel, ...]]:
-    """What samples (n, r) cause from rest, and the standard deviation of the noise.
-
-    Args:
-        output_limits: (p,) of |y|, for the figure.
-    """
+    """What samples (n, r) cause from rest, and the standard deviation of the noise."""
     n = len(record)
     y = FiniteRecord(experiment, n, units.step).signals("output", record)
     noise = noise_deviation(experiment, n, units.step)
@@ -193,16 +171,6 @@ def _largest_moves(u: Array) -> Array:
     return np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0)
 
 
-def _of_limits(bounds: Bounds, found: Signal) -> dict[str, float]:
-    """Return the largest share over the channels of each limit on single samples that the record takes."""
-    stated = (
-        ("amplitude.input", bounds.amplitude, found.input_peak),
-        ("amplitude.output", bounds.output, found.output_peak),
-        ("rate", bounds.rate, found.input_move),
-    )
-    return {key: float(np.max(np.array(sizes) / most)) for key, most, sizes in stated if most is not None}
-
-
 def applied(delivery: Delivery, record: Record) -> Array:
     """(n, r): the samples shifted to the operating points; a record that was given is left as it is.
 
@@ -259,3 +227,18 @@ def _spectrum_error(lines: Lines, samples: Array) -> float:
     size = np.sqrt(np.maximum(np.diag(wanted[0]), 0.0))
     scale = np.where(size > 0.0, size, np.inf)
     return float(np.abs((found - wanted) / np.outer(scale, scale)).max())
+
+
+def plain_signal(u: Array) -> Signal:
+    """Return length, mean squares, peaks and crest factors by channel; the crest of a zero channel is 1."""
+    power = np.mean(u * u, axis=0)
+    peak = np.abs(u).max(axis=0)
+    crest = np.divide(peak, np.sqrt(power), out=np.ones_like(peak), where=power > 0.0)
+    return Signal(len(u), power=_channels(power), peak=_channels(peak), crest_factor=_channels(crest))
+
+
+def signal_results(units: Units, u: Array) -> tuple[Table, SignalCurves]:
+    """Return signal.csv and its plot."""
+    time = units.sample_time * np.arange(len(u), dtype=np.float64)
+    channels = {f"u{i + 1}": samples for i, samples in enumerate(u.T)}
+    return Table({units.time_header: time, **channels}), SignalCurves(time, channels)

@@ -17,7 +17,7 @@ from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.simulated_runs import (
     initial_estimate_off,
@@ -27,25 +27,179 @@ from inputdesign_cli.findings.simulated_runs import (
 )
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
-from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_truth
-from inputdesign_cli.monte_carlo.trials import PredictedError
-from inputdesign_cli.outcome.curves import BoundCurves, Curves
+from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
+from inputdesign_cli.monte_carlo.study import Study, Tried, tried_on_model, tried_on_truth
+from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
+from inputdesign_cli.outcome import Powers, Simulation as Studied
+from inputdesign_cli.outcome.curves import (
+    BoundCurves,
+    CloudCurves,
+    Curves,
+    ErrorBandCurves,
+    ErrorBandPanel,
+    SignalCurves,
+)
 from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.simulation import TriedInput
+from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.questions.common.bound import Informed
-from inputdesign_cli.questions.common.delivery import Delivered
-from inputdesign_cli.questions.common.simulation_curves import cloud, disturbance, error_bands
-from inputdesign_cli.questions.common.simulation_outcome import (
-    covariance_in_theory,
-    study_outcome,
-    tried_input,
-)
-from inputdesign_cli.signal.settings import LEVELLED, Method
+from inputdesign_cli.questions.common.delivery import Delivered, with_study
+from inputdesign_cli.signal.kinds import kind_of
 
 # Records that are searched from several starts, where those leave other minima.
 _SEARCHED = 10
+QUANTILES = (0.05, 0.5, 0.95)
+_PAIRS = 4
+_CLOUD = 2000
+# Time constants of the loop that a figure shows after the end of the excitation.
+_FADED = 3.0
+
+
+def error_bands(units: Units, predicted: PredictedError, errors: Array, name: str) -> ErrorBandCurves:
+    """Quantiles of the errors (runs, n) over frequency, of every entry that the prediction is about."""
+    frequency = predicted.w / units.frequency
+    r_u = predicted.r_u if name == "design" else None
+
+    def panel(own: Array, entry: tuple[int, int] | None) -> ErrorBandPanel:
+        return ErrorBandPanel(
+            frequency=frequency[own],
+            quantiles={q: np.quantile(errors[:, own], q, axis=0) for q in QUANTILES},
+            r_u=None if r_u is None else r_u[own],
+            r_adm=None if predicted.r_adm is None else predicted.r_adm[own],
+            entry=entry,
+            names=units.passage(entry),
+        )
+
+    entries = predicted.entries
+    if entries is None:
+        panels = [panel(np.ones(frequency.size, dtype=bool), None)]
+    else:
+        places = np.unique(entries, axis=0).tolist()
+        panels = [panel(np.all(entries == (i, j), axis=1), (i, j)) for i, j in places]
+    return ErrorBandCurves(tuple(panels), name.replace("_", " "), len(errors))
+
+
+def cloud(trials: Trials, covariance: Array | None) -> CloudCurves | None:
+    """The estimates in some planes; None without a covariance (k, k) in theory, or for a single parameter."""
+    size = len(trials.names)
+    if covariance is None or size < 2:
+        return None
+    pairs = sorted({round(i) for i in np.linspace(0, size - 2, _PAIRS)})
+    return CloudCurves(
+        names=trials.names,
+        pairs=tuple((i, i + 1) for i in pairs),
+        theta=trials.theta[:_CLOUD],
+        centre=trials.truth,
+        covariance=covariance,
+    )
+
+
+def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, SignalCurves]:
+    """r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
+    slowest = float(np.abs(loop.closed_poles).max(initial=0.0))
+    tail = min(int(np.ceil(_FADED / (1.0 - slowest))), len(excitation))
+    r = np.concatenate([excitation, np.zeros((tail, units.inputs))])
+    y, u = loop.signals(r, np.zeros((len(r), units.outputs)))
+    instants = units.sample_time * np.arange(len(r), dtype=np.float64)
+    columns, shown = {units.time_header: instants}, {}
+    for letter, cause, signals in (("r", "", r), ("u", "r", u), ("y", "r", y)):
+        for number, samples in enumerate(signals.T, start=1):
+            columns[f"{letter}{number}" + (f"_{cause}" if cause else "")] = samples
+            shown[f"{letter}{'' if units.single else number}{cause}"] = samples
+    first = "ruy" if units.single else "yur"
+    return Table(columns), SignalCurves(
+        instants,
+        {name: shown[name] for name in sorted(shown, key=lambda name: first.index(name[0]))},
+        held=False,
+    )
+
+
+def study_outcome(study: Study, inputs: Mapping[str, TriedInput], *, excitation: str) -> Studied:
+    """Return `simulation` of the outcome; each run applies a `new` realisation, or the one `record`."""
+    model, size = study.true.model, len(study.nominal.model.names)
+    rng = np.random.default_rng(study.seed)
+    several = tuple(map(tuple, model.covariance.tolist()))
+    return Studied(
+        runs=study.runs,
+        seed=study.seed,
+        inputs=inputs,
+        samples=study.true.samples,
+        excitation=excitation,
+        true_parameters=dict(zip(model.names, model.theta.tolist(), strict=True)),
+        true_variance=float(model.covariance[0, 0]) if model.outputs == 1 else several,
+        wishart_range=tuple(wishart_range(size, study.runs, rng)) if study.runs > 1 else (),
+    )
+
+
+def tried_input(
+    units: Units,
+    tried: Tried,
+    predicted: PredictedError,
+    errors: Array,
+    cost: Mapping[PowerKind, Weight],
+    modelled: Tried | None,
+) -> TriedInput:
+    """Return what one excitation gave on the true system.
+
+    Args:
+        errors: of the runs, see `Trials.errors`; they are compared with what is `predicted`.
+        modelled: runs in which the true system is the design model, if the two differ.
+    """
+    trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
+    frequency = predicted.w / units.frequency
+    entry = TriedInput(
+        **vars(_fractions(tried, predicted, errors)),
+        mean_estimate=_named(trials, trials.theta.mean(axis=0)),
+        cost=weighted_sum(cost, trials.power),
+        power=Powers.of(trials.power),
+        total_power=Powers.of(trials.total_power),
+        not_converged=int(np.sum(~trials.converged)),
+    )
+    if modelled is not None:
+        on_model = _fractions(modelled, predicted, modelled.trials.errors(predicted))
+        entry = replace(entry, on_design_model=on_model)
+    if information is not None:
+        deviations = np.sqrt(np.diag(covariance_in_theory(information)))
+        rms = np.sqrt(np.mean((trials.theta - trials.truth) ** 2, axis=0))
+        eigenvalues = whitened_eigenvalues(trials.theta, information)
+        of_theory = _named(trials, rms / deviations)
+        entry = replace(entry, covariance_eigenvalues=eigenvalues, rms_over_theory=of_theory)
+    if information is not None and r_adm is not None:
+        ratio = trials.bound(predicted, information) / r_adm
+        worst = int(np.argmax(ratio))
+        entry = replace(entry, theory_on_truth=RatioAt(float(ratio[worst]), float(frequency[worst])))
+    if r_adm is not None:
+        beyond = errors / r_adm
+        failed = beyond.max(axis=1) > 1.0
+        if np.any(failed):
+            quantiles = np.quantile(frequency[np.argmax(beyond[failed], axis=1)], QUANTILES)
+            entry = replace(entry, violations=Violations(int(failed.sum()), quantiles, float(beyond.max())))
+    return entry
+
+
+def _named(trials: Trials, values: Array) -> dict[str, float]:
+    return dict(zip(trials.names, values.tolist(), strict=True))
+
+
+def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesignModel:
+    """Return fractions of the runs whose error stays within bounds at all frequencies, with 95 % limits."""
+
+    def within(bound: Array | None) -> tuple[float | None, tuple[float, float] | None]:
+        if bound is None:
+            return None, None
+        inside = int(np.sum(np.all(errors <= bound, axis=1)))
+        return inside / len(errors), binomial_limits(inside, len(errors))
+
+    own = None if tried.information is None else tried.trials.bound(predicted, tried.information)
+    promised = predicted.r_u if tried.name == "design" else None
+    return OnDesignModel(*within(predicted.r_adm), *within(own), *within(promised))
+
+
+def covariance_in_theory(information: Array) -> Array:
+    """Return M^-1 (k, k) by way of unit diagonal."""
+    scale = np.sqrt(np.diag(information))
+    return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
 
 
 @dataclass(frozen=True)
@@ -87,16 +241,13 @@ class Simulation:
     runs: int
     seed: int
     renewed: bool
-    compare: Sequence[Method]
+    compare: Sequence[str]
     cost: Mapping[PowerKind, Weight]
     entries: Sequence[ModelError]
 
 
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
-    """The results of the design with the study of its excitation added.
-
-    Args:
-        executor: where the batches of runs are computed (default: in this process).
+    """Return the results of the design with the study of its excitation, computed by the executor.
 
     Raises:
         SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
@@ -153,14 +304,8 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
         *(runs_miss_confidence(asked, inputs["design"]) if "design" in inputs else []),
         *one_minimum(searched),
     ]
-    simulation = study_outcome(study, inputs, excitation="new" if plan.renewed else "record")
-    timing = {**(outcome.timing_s or {}), "simulation": time.perf_counter() - started}
-    return replace(
-        results,
-        outcome=replace(outcome, simulation=simulation, timing_s=timing).saying(findings),
-        tables={**results.tables, **tables},
-        curves={**results.curves, **curves},
-    )
+    entry = study_outcome(study, inputs, excitation="new" if plan.renewed else "record")
+    return with_study(results, entry, started, findings, tables, curves)
 
 
 def _excitations(plan: Simulation, delivered: Delivered, record: Array) -> list[Excitation]:
@@ -179,7 +324,7 @@ def _excitations(plan: Simulation, delivered: Delivered, record: Array) -> list[
     return listed
 
 
-def _flat(plan: Simulation, kind: Method, name: str, power: float, samples: int) -> Excitation:
+def _flat(plan: Simulation, kind: str, name: str, power: float, samples: int) -> Excitation:
     """An excitation of a flat spectrum over the band of the experiment, even over its channels.
 
     Raises:
@@ -187,7 +332,7 @@ def _flat(plan: Simulation, kind: Method, name: str, power: float, samples: int)
     """
     nominal, band = plan.nominal, plan.nominal.band
     everywhere = plan.units.sampled and band == (0.0, np.pi)
-    if kind in LEVELLED and not everywhere:
+    if kind_of(kind).few_levels and not everywhere:
         raise bad_spec(
             "not-supported",
             f"a {kind} signal has power at all frequencies of discrete time, the excitation only on a band",

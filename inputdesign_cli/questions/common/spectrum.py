@@ -73,7 +73,6 @@ def spectrum_curves(
 
     Args:
         band: of the excitation, in the unit of the experiment.
-        white: the flat level to compare with.
     """
     if basis.has_density:
         w = np.unique(np.concatenate([[band[0]], axis(*band, basis.knots)]))

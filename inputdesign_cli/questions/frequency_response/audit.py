@@ -13,14 +13,11 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weights_of
-from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.outcome import MeasuredLines, Outcome, Signal, Spectrum, read_plain
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.text_formats import csv_columns, csv_text, json_text
+from inputdesign_cli.questions.common.audit import APART, check_claims, of_bounds, of_cost, of_limit
 from inputdesign_cli.questions.frequency_response.terms import Planned, ResponseTerms
-
-# Two ways to the same number may differ by this share of it.
-_APART = 1e-6
 
 
 def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> None:
@@ -35,18 +32,10 @@ def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> Non
     assert response is not None
     assert signal is not None
     _, *samples = csv_columns(csv_text(results.tables["signal"]).encode()).values()
-    wrong = [
-        *_of_lines(terms, written, spectrum, response),
-        *_of_record(terms, plan, signal, np.stack(samples, axis=1)),
-    ]
-    for claim in wrong:
-        raise InaccurateError.because(
-            "internal-disagreement",
-            claim,
-            hint="rescale the signals, or leave out lines where |G| is very small; if the spec is plain, "
-            "please report it: the spec is enough to see the same",
-            key="accuracy",
-        )
+    wrong = _of_lines(terms, written, spectrum, response)
+    of_record = _of_record(terms, plan, signal, np.stack(samples, axis=1))
+    remedy = "rescale the signals, or leave out lines where |G| is very small"
+    check_claims([*wrong, *of_record], remedy)
 
 
 def _of_lines(
@@ -64,9 +53,9 @@ def _of_lines(
         if np.all(np.isfinite(admitted := terms.lines.admitted[:, i, j]))
     ]
     worst = float(np.max(ratios))
-    if not abs(worst - ratio) <= _APART * worst:
+    if not abs(worst - ratio) <= APART * worst:
         yield f"the lines leave {worst:.10g} times the deviation admitted, not {ratio:.10g}"
-    if terms.goal in ("cost", "samples") and not worst <= 1.0 + _APART:
+    if terms.goal in ("cost", "samples") and not worst <= 1.0 + APART:
         yield f"the lines leave {worst:.10g} times the deviation that is admitted"
     found = {
         "input": powers,
@@ -80,17 +69,11 @@ def _of_lines(
         return float(total.sum() if channel is None else total[channel])
 
     paid = sum(weight * power(kind, channel) for kind, channel, weight in weights_of(terms.cost))
-    if not abs(paid - cost) <= _APART * abs(paid):
-        yield f"the lines cost {paid:.10g}, not {cost:.10g}"
+    yield from of_cost(paid, cost)
     for limit in terms.limits if terms.goal != "given" else ():
-        value = power(limit.kind, limit.channel)
-        if not (value - limit.bound if limit.upper else limit.bound - value) <= _APART * limit.bound:
-            yield f"{limit.key} is {limit.bound:.6g}, but the lines have {value:.10g}"
-    objective = written.objective
-    if objective is not None and objective.lower_bound is not None:
-        value, bound = objective.value, objective.lower_bound
-        if not bound - value <= _APART * abs(value):
-            yield f"the value {value:.10g} lies below lower_bound ({bound:.10g})"
+        yield from of_limit(limit, power(limit.kind, limit.channel))
+    if written.objective is not None:
+        yield from of_bounds(written.objective)
 
 
 def _of_record(terms: ResponseTerms, plan: Planned, written: Signal, record: Array) -> Iterator[str]:
@@ -103,8 +86,8 @@ def _of_record(terms: ResponseTerms, plan: Planned, written: Signal, record: Arr
     noise *= 1.0 + (written.extra_power or 0.0)
     found = np.sqrt(noise * spread[:, None, :] / each)
     apart = float(np.max(np.abs(found / plan.deviations - 1.0)))
-    if not apart <= _APART:
+    if not apart <= APART:
         yield f"the samples of the record leave deviations that are off those claimed by {apart:.3g}"
     worst, claimed = float(np.max(found / terms.lines.admitted)), written.worst_ratio or 0.0
-    if not abs(worst - claimed) <= _APART * worst:
+    if not abs(worst - claimed) <= APART * worst:
         yield f"the record leaves {worst:.10g} times what is admitted, not {claimed:.10g}"

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.frequency_responses import REMEDY, UNLIKE, inputs_do_not_repeat, unexcited_lines
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.frequency_responses import (
+    REMEDY,
+    UNLIKE,
+    inputs_do_not_repeat,
+    periods_between_gaps,
+    samples_before_periods,
+    unexcited_lines,
+)
 from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
@@ -23,7 +31,13 @@ from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.period_drift import period_drift
-from inputdesign_cli.identification.periodic_response import PeriodicResponse, differing, excited_lines
+from inputdesign_cli.identification.periodic_response import (
+    PeriodicResponse,
+    Periods,
+    differing,
+    excited_lines,
+    periodic_response,
+)
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.identification.spikes import period_spikes
 from inputdesign_cli.outcome.results import Results
@@ -33,12 +47,104 @@ from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.assessment.outcome import response_of_data
 from inputdesign_cli.questions.frequency_response.measured import Judged, Measured, measured_results
 from inputdesign_cli.questions.frequency_response.terms import ResponseTerms
-from inputdesign_cli.questions.frequency_response.whole_periods import Counted, whole_periods
 from inputdesign_cli.records import Preparation, Record, read_data
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
 _SURE = 0.95
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Data that count, how they repeat, the number of records of equal length, and what is left out."""
+
+    data: Record
+    periods: Periods
+    repeats: int
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def kept(self) -> int:
+        """Periods of one phase that count, in all records."""
+        return self.repeats * self.periods.kept(self.data.lengths[0])
+
+    def response(self, harmonics: NDArray[np.int_]) -> PeriodicResponse | None:
+        """Return the response at harmonics (L,); None if the inputs are alike there."""
+        data = self.data
+        return periodic_response(data.u, data.y, self.periods, harmonics, repeats=self.repeats)
+
+
+def whole_periods(stated: Periods, data: Record, name: str, step: float) -> Counted:
+    """Return the data that count.
+
+    Records of equal length are not changed. Of pieces between gaps, and of records of several lengths, the
+    periods that lie in one piece are taken. All have the same phase, counted from the begin of each file:
+    the one with the most periods.
+
+    Args:
+        name: of the file that messages name.
+        step: the sample time, in the unit of the times of the data.
+
+    Raises:
+        DataError: `bad-period`, `too-few-samples`.
+    """
+    lengths, length = set(data.lengths), data.lengths[0]
+    whole = stated.blocks * stated.period
+    if len(lengths) == 1 and len(data.files) == len(data.lengths):
+        if stated.blocks == 1 or length % whole == 0:
+            _check(stated.kept(length), stated.kept(length) * len(data.lengths), stated, name)
+            return Counted(data, stated, len(data.lengths), tuple(samples_before_periods(length, stated)))
+    elif stated.blocks == 1:
+        return _from_pieces(stated, data, name, step)
+    what = " and ".join(str(one) for one in sorted(lengths))
+    raise DataError.because(
+        "bad-period",
+        f"{name} has stretches of {what} samples, and the design has {stated.blocks} blocks of "
+        f"whole periods of {stated.period}",
+        hint="cut every record to the length of signal.csv (--skip, --range), and close gaps",
+    )
+
+
+def _from_pieces(stated: Periods, data: Record, name: str, step: float) -> Counted:
+    """Return one record of the periods without a gap."""
+    period, places = stated.period, _places(data, step)
+    transient = stated.skip * period
+    follow = np.ones(len(places), dtype=bool)
+    follow[np.cumsum(data.lengths)[:-1]] = False
+    gaps = np.cumsum(~follow)
+    last = np.arange(len(places)) + period - 1
+    begins = np.flatnonzero((last < len(places)) & (places >= transient))
+    begins = begins[gaps[last[begins]] == gaps[begins]]
+    taken: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+    if begins.size:
+        phase = int(np.argmax(np.bincount(places[begins] % period)))
+        taken = begins[places[begins] % period == phase]
+    _check(taken.size, taken.size, stated, name)
+    samples = (taken[:, None] + np.arange(period)).ravel()
+    kept = data.at(samples, (len(samples),))
+    left_out = periods_between_gaps(len(data.lengths), taken.size, period)
+    return Counted(kept, replace(stated, skip=0), 1, (left_out,))
+
+
+def _places(data: Record, step: float) -> NDArray[np.int64]:
+    """Return the number (N,) of samples between the begin of a file and each of its samples."""
+    files = np.split(data.time, np.cumsum([count for _, count in data.files])[:-1])
+    return np.concatenate([np.round((part - part[0]) / step) for part in files]).astype(np.int64)
+
+
+def _check(each: int, together: int, stated: Periods, name: str) -> None:
+    """Check that enough periods count, in a block and in all records.
+
+    Raises:
+        DataError: `too-few-samples`.
+    """
+    if each < 1 or together < 2:
+        raise DataError.because(
+            "too-few-samples",
+            f"{name} has {max(each, 0)} whole periods of {stated.period} samples after {stated.skip} that "
+            "are transient: the noise is estimated from the scatter of two or more",
+            hint="record more periods, or give several records",
+        )
 
 
 @dataclass(frozen=True)
@@ -60,9 +166,6 @@ def measure(
     question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
 ) -> Results:
     """Return the response with its confidence; with lines of a spec also how it compares with what is asked.
-
-    Args:
-        assess: whether the result is a verdict.
 
     Raises:
         DataError: a file cannot be used, or does not repeat as the spec says.

@@ -22,6 +22,7 @@ from inputdesign_cli.outcome.curves import Curves, ResponseCurves
 from inputdesign_cli.outcome.response import SilentLine
 from inputdesign_cli.outcome.results import Array, Results, Table
 from inputdesign_cli.outcome.units import Header, Units
+from inputdesign_cli.questions.common.delivery import results_of
 from inputdesign_cli.questions.frequency_response.terms import deviation_curves
 from inputdesign_cli.records import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
@@ -130,12 +131,7 @@ def measured_results(
     *,
     assess: bool,
 ) -> Results:
-    """Return the outcome, frequency_response.csv and its figure; with lines of a spec also their deviations.
-
-    Args:
-        shown: the response beside the nominal plant, see `response_of_data`.
-        assess: whether the result is a verdict.
-    """
+    """Return the outcome, frequency_response.csv and its figure; with lines also their deviations."""
     table, curve, response = shown
     data, judged, found = measured.data, measured.judged, list(measured.findings)
     tables, curves = {"frequency_response": table}, dict[str, Curves](frequency_response=curve)
@@ -162,7 +158,7 @@ def measured_results(
         notes=data.notes or None,
         timing_s={"measurement": seconds},
     )
-    return Results(outcome.saying(found), header.resolved_spec, header.units.time_unit, tables, curves)
+    return results_of(header, outcome.saying(found), tables, curves)
 
 
 def _of_lines(response: MeasuredLines, judged: Judged, w: Array, records: int, samples: int) -> MeasuredLines:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -17,20 +19,18 @@ from inputdesign_cli.outcome import (
     Objective,
     Outcome,
     Powers,
-    Signal,
     Solver,
     Spectrum,
     White,
-    read_plain,
 )
-from inputdesign_cli.outcome.curves import DeviationCurves, SpectrumCurves
+from inputdesign_cli.outcome.curves import Curves, DeviationCurves, SpectrumCurves
 from inputdesign_cli.outcome.response import DetectionLines
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
+from inputdesign_cli.questions.common.delivery import proof_status, results_of, with_record
 from inputdesign_cli.questions.common.record import RecordRequest
-from inputdesign_cli.questions.common.signal_outcome import other_files, signal_curves, signal_entry
+from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
-from inputdesign_cli.questions.common.status import proof_status
 from inputdesign_cli.questions.frequency_response.terms import Planned, ResponseTerms, deviation_curves
 
 _KINDS: dict[Goal, str] = {
@@ -42,15 +42,11 @@ _ROUNDING = 1e-9
 _CHANCE = 0.05
 
 
-def response_outcome(
-    terms: ResponseTerms, plan: Planned, request: RecordRequest, timing: dict[str, float]
-) -> Outcome:
+def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, float]) -> Outcome:
     """Return what result.json says of a design or of given lines."""
     units, lines, designed = terms.header.units, terms.lines, terms.goal != "given"
     ratios = lines.ratios(lines.deviations(plan.powers, plan.counted))
     worst, (power, cost) = int(np.argmax(ratios)), terms.powers(plan.powers)
-    entry = signal_entry(request, units, terms.experiment, plan.record)
-    entry |= {"worst_ratio": plan.record.worst_ratio, "start_shift": plan.shift}
     odd, even = (terms.grid.at(silent) / units.frequency for silent in (terms.grid.odd, terms.grid.even))
     met = "met" if ratios[worst] <= 1.0 + _ROUNDING else "missed"
     objective, baseline = _objective(terms, plan) if designed else (None, None)
@@ -64,7 +60,6 @@ def response_outcome(
         power=power,
         spectrum=Spectrum("multisine", {"frequencies": terms.frequency, "powers": powers}),
         baseline=baseline,
-        signal=read_plain(Signal, entry),
         frequency_response=MeasuredLines(
             lines=int(ratios.size),
             period=terms.grid.period,
@@ -120,25 +115,19 @@ def response_results(
     terms: ResponseTerms, plan: Planned, request: RecordRequest, timing: dict[str, float]
 ) -> Results:
     """Return the outcome with its tables and figures."""
-    units = terms.header.units
-    signals, drawn = signal_curves(request, units, terms.experiment, plan.record)
+    units, experiment = terms.header.units, terms.experiment
+    signal = signal_of(request, units, experiment, plan.record)
+    signal = replace(signal, worst_ratio=plan.record.worst_ratio, start_shift=plan.shift)
     matrices = _matrices(plan.powers)
     spectrum = {units.frequency_header: terms.frequency, **hermitian_columns(matrices, "power")}
     columns, deviations = deviation_curves(units, terms.frequency, terms.lines, _deviations(terms, plan))
     for i in range(units.outputs):
         columns[f"noise_spectrum{'' if units.outputs == 1 else f'_{i + 1}'}"] = terms.lines.noise[:, i]
-    return Results(
-        response_outcome(terms, plan, request, timing),
-        terms.header.resolved_spec,
-        units.time_unit,
-        {"deviations": Table(columns), "spectrum": Table(spectrum), **signals},
-        {
-            "deviations": deviations,
-            "spectrum": SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True),
-            "signal": drawn,
-        },
-        other_files(request, units, plan.record),
-    )
+    tables = {"deviations": Table(columns), "spectrum": Table(spectrum)}
+    lines = SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True)
+    curves: dict[str, Curves] = {"deviations": deviations, "spectrum": lines}
+    results = results_of(terms.header, response_outcome(terms, plan, timing), tables, curves)
+    return with_record(results, request, units, experiment, plan.record, signal)
 
 
 def _deviations(terms: ResponseTerms, plan: Planned) -> dict[str, NDArray[np.float64]]:

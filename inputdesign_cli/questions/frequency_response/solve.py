@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,27 +17,78 @@ from inputdesign_cli.design.convex.response_lines import (
     cheapest,
     most_accurate,
 )
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
 from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.rounding import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
+from inputdesign_cli.questions.common.delivery import timing, with_study
+from inputdesign_cli.questions.common.no_record import no_record, too_long, unreachable
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.simulation import Simulation
-from inputdesign_cli.questions.common.study import timing, with_study
 from inputdesign_cli.questions.frequency_response.audit import audit_response
-from inputdesign_cli.questions.frequency_response.limits import too_long, too_tight, unreachable
 from inputdesign_cli.questions.frequency_response.outcome import (
     response_results,
     studied_deviations,
     tried_lines,
 )
-from inputdesign_cli.questions.frequency_response.record import LineRecords
 from inputdesign_cli.questions.frequency_response.terms import KEY, Planned, ResponseTerms
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.signal.kind import Draft
+from inputdesign_cli.signal.limits import Bounds, limited_responses
+from inputdesign_cli.signal.lines import Lines
+from inputdesign_cli.signal.multisine import Multisine
+from inputdesign_cli.signal.selection import Record
+from inputdesign_cli.signal.settings import Phases, SignalSettings
 
 _ROUNDING = 1e-9
+_STREAM = 0x5EED
+
+
+@dataclass(frozen=True)
+class LineRecords:
+    """Periodic records with lines on a grid of harmonics, and the limits on their samples."""
+
+    experiment: Experiment
+    grid: HarmonicGrid
+    settings: SignalSettings
+    bounds: Bounds
+
+    def best(self, powers: NDArray[np.float64], length: int) -> Array:
+        """Return the record (length, r) of the lowest peak among several choices of phases.
+
+        Args:
+            powers: (L, r) of the lines.
+        """
+        r, period, settings = powers.shape[1], self.grid.period, self.settings
+        diagonal = np.einsum("lr,rs->lrs", powers, np.eye(r)).astype(complex)
+        limited = partial(limited_responses, self.experiment, self.bounds, 1.0, 1)
+        lines = Lines(self.grid.frequencies, diagonal, period)
+
+        def drawn(number: int) -> Array:
+            rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(_STREAM, number)))
+            phases: Phases = "orthogonal" if settings.phases == "random" else settings.phases
+            phases = "even" if (phases, number) == ("optimised", 0) else phases
+            draft = Draft(lines, r * period, replace(settings, phases=phases), limited=limited)
+            blocks = np.split(Multisine().draw(draft, rng), r)  # each in as many periods
+            return np.concatenate([np.tile(block, (length // (r * period), 1)) for block in blocks])
+
+        height = self.beyond if self.bounds.hard else lambda u: float(np.max(np.abs(u)))
+        number = 1 if settings.phases == "schroeder" else settings.candidates
+        return min(map(drawn, range(number)), key=height)
+
+    def beyond(self, u: Array) -> float:
+        """Return the largest share of their limits that samples of u (n, r), its moves and outputs take."""
+        y = None if self.bounds.output is None else self.answer(u)
+        return max(self.bounds.shares(u, y).values(), default=0.0)
+
+    def answer(self, u: Array) -> Array:
+        """Return the outputs (n, p) to inputs u (n, r) from rest, without noise."""
+        model = self.experiment.model
+        return np.asarray(model.simulate(u[None], np.zeros((1, 1, model.outputs)), 1.0)[0][0])
 
 
 @dataclass(frozen=True)
@@ -53,21 +105,18 @@ class ResponseTask:
     simulation: Simulation
 
     def solve(self) -> Results:
-        """Return the powers of the lines, their proof, and a record.
-
-        Raises:
-            InfeasibleError: the limits exclude the accuracy.
-            InaccurateError: `solver-failed`, `gap-not-closed`, `internal-disagreement`.
-        """
+        """Return the powers of the lines, their proof, and a record."""
         return self._solved()[1]
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Return the design, and beside its deviations the scatter of many simulated experiments.
-
-        Raises:
-            SpecError: `not-supported` for inputs to compare with; see `solve`.
-        """
-        self._check_study()
+        """Return the design, and beside its deviations the scatter of many simulated experiments."""
+        if self.simulation.runs < 2:
+            raise bad_spec(
+                "out-of-range",
+                "a single run has no standard deviation",
+                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
+                key="simulation.runs",
+            )
         terms, study = self.terms, self.simulation
         plan, results = self._solved()
         begun = time.perf_counter()
@@ -93,23 +142,6 @@ class ResponseTask:
         table, curves = studied_deviations(terms, plan, results, studies["design"])
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
         return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
-
-    def _check_study(self) -> None:
-        """Raise `SpecError` for a study that this kind of question does not have."""
-        if any(name != "white" for name in self.simulation.compare):
-            raise bad_spec(
-                "not-supported",
-                "a frequency response is compared with that of equal lines only",
-                hint="write compare: [white], which stands for lines of equal power",
-                key="simulation.compare",
-            )
-        if self.simulation.runs < 2:
-            raise bad_spec(
-                "out-of-range",
-                "a single run has no standard deviation",
-                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
-                key="simulation.runs",
-            )
 
     def _designed(self) -> tuple[ResponseDesign, int]:
         """Return the powers and the samples that count."""
@@ -168,12 +200,19 @@ class ResponseTask:
         if terms.goal == "cost" and self.record.meets:
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
-                raise too_tight(terms.header.units, self.record.limit_keys, scale * beyond, len(samples))
+                raise self._too_tight(scale * beyond, len(samples))
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
         return Planned(design, problem, powers, counted, record, exact, self._shifted(samples, exact))
+
+    def _too_tight(self, beyond: float, length: int) -> InfeasibleError:
+        more, times = int(np.ceil(length * beyond**2)), rounded_up(beyond, 4)
+        best = f"meets the accuracy: the one of the lowest peaks would have to be {times} times as large"
+        enough = f"about {more} samples do ({self.record.units.length(more)}); raise the limits"
+        hint = f"{enough}, admit {times} times as much, or write objective: shortest_experiment"
+        return no_record(self.record, length, f"{best} as they allow", hint)
 
     def _length(self, counted: int) -> int:
         """Return the length of a record, transient included.

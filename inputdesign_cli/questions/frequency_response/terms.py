@@ -17,8 +17,8 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.outcome import Powers
 from inputdesign_cli.outcome.curves import DeviationCurves, DeviationPanel
 from inputdesign_cli.outcome.units import Header, Units
-from inputdesign_cli.signal import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.signal.selection import Record
 
 KEY = "accuracy.frequency_response"
 

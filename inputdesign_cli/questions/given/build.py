@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.findings.limits_not_kept import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.questions.building.foresight import build_foresight
@@ -28,6 +29,7 @@ from inputdesign_cli.questions.building.system import (
     record_step,
 )
 from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.common.delivery import Shown
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.given.solve import GivenAsked, GivenExcitation, GivenTask
@@ -42,8 +44,7 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
-_REFUSED = ("spectrum", "energy")
-_OF_DESIGNS = ("objective", "campaign")
+_OF_DESIGNS = ("limits.spectrum", "objective", "campaign")
 # Keys of signals that mean something for a record that the tool makes.
 _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
 
@@ -55,24 +56,14 @@ def build_given(spec: Spec) -> GivenTask:
         SpecError, DataError: `nothing-given` when there is no excitation; see the builders of the parts.
     """
     if spec.spectrum is None or spec.spectrum.type != "given":
-        raise spec.complain(
+        raise bad_spec(
             "nothing-given",
             "there is no excitation to analyse",
             hint="give one, spectrum: {given: {type: white, power: 1}}, or design one: idesign solve SPEC",
             key="spectrum",
         )
-    check_supported(spec)
-    for name in spec.limits.stated(*_REFUSED):
-        raise spec.complain(
-            "not-supported",
-            f"this version does not compare a given excitation with limits.{name}",
-            hint="remove it",
-            key=f"limits.{name}",
-        )
-    for name in spec.stated(*_OF_DESIGNS):
-        raise spec.complain(
-            "not-supported", f"{name} is of designs, and this excitation is given", hint="remove it", key=name
-        )
+    check_supported(spec, "the analysis of a given excitation")
+    refuse_unhandled(spec, "the analysis of a given excitation", dict.fromkeys(_OF_DESIGNS, "remove it"))
     _check_signal_is_open(spec, spec.spectrum)
     check_signal(spec)
     experiment = build_experiment(spec)
@@ -96,7 +87,7 @@ def build_given(spec: Spec) -> GivenTask:
         build_record_request(spec, experiment.size),
         Shown(build_header(spec), unstated_errors(spec, experiment), spec.report.ellipses),
         build_simulation(spec, experiment),
-        build_foresight(spec, experiment, None),
+        build_foresight(spec, experiment),
     )
 
 
@@ -122,7 +113,7 @@ def _build_plants(spec: Spec, experiment: Experiment) -> Plants | None:
         plants = build_plants(spec, experiment, None)
         return None if plants is None else replace(plants, paid="nominal")
     hint = "remove it, or uncertainty; a design holds for all plants: remove spectrum.given"
-    raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
+    raise refuse(key, what, hint)
 
 
 def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
@@ -141,11 +132,8 @@ def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
             "random",
         ):
             continue
-        raise spec.complain(
-            "not-supported",
-            f"this version does not apply signal.{name} to this given excitation: its samples are settled",
-            hint="remove it",
-            key=f"signal.{name}",
+        raise refuse(
+            f"signal.{name}", "apply it to a given excitation whose samples are settled", "remove it"
         )
 
 
@@ -199,7 +187,7 @@ def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
     amplitudes = np.array(given.rows, dtype=float).T
     there = np.any(amplitudes != 0.0, axis=1)
     if not there.any():
-        raise spec.complain(
+        raise bad_spec(
             "not-exciting",
             "all amplitudes are zero: nothing is excited",
             hint="give the sinusoids amplitudes",

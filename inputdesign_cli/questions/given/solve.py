@@ -25,14 +25,17 @@ from inputdesign_cli.outcome.objectives import white_labels
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound import Informed
-from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates, Simulator
 from inputdesign_cli.questions.common.delivery import (
     Delivered,
-    Report,
     Shown,
+    adding,
     begun_anywhere,
+    foreseeing,
     record_findings,
+    results_of,
     searching,
+    with_record,
 )
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.record import (
@@ -45,12 +48,13 @@ from inputdesign_cli.questions.common.record import (
 )
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates, Simulator
 from inputdesign_cli.questions.common.simulation import Simulation, simulate
 from inputdesign_cli.questions.common.spectrum import spectrum_curves
-from inputdesign_cli.questions.given.build_plants import AtPlants, given_robust, kept_of
 from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
-from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
+from inputdesign_cli.questions.least_cost.robust_outcome import AtPlants, given_robust, kept_of
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.lines import DesignedSpectrum
+from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 
 _TOO_FAINT = 1e-12
@@ -163,19 +167,11 @@ class GivenTask:
     foresight: Foresight | None = None
 
     def solve(self) -> Results:
-        """Return r_u, information, predicted standard deviations and powers of the excitation.
-
-        Raises:
-            SpecError: `not-exciting` when the excitation leaves parameters undetermined.
-        """
+        """Return r_u, information, predicted standard deviations and powers of the excitation."""
         return self._delivered().results
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Return this with the excitation tried many times on the true system; see `common.simulation`.
-
-        Raises:
-            SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with; see `solve`.
-        """
+        """Return this with the excitation tried many times on the true system; see `common.simulation`."""
         return simulate(self.simulation, self._delivered(), executor)
 
     def _delivered(self) -> Delivered:
@@ -191,7 +187,7 @@ class GivenTask:
         confidence = Confidence.of(asked.calibration, requirements, information, asked.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
         informed, white = self._informed(experiment, requirements, information)
-        report = self._report(experiment, informed, white, requirements, confidence)
+        results = self._report(experiment, informed, white, requirements, confidence)
         record = self._record(experiment, worst_ratio(requirements))
         findings = record_findings(self.record, experiment.samples, None) if record is None else []
         if record is not None:
@@ -200,13 +196,14 @@ class GivenTask:
                 step = self.record.step
                 signal, start = begun_anywhere(signal, experiment, record.samples, step, requirements)
                 findings += start
-            report = report.with_record(self.record, self.shown, experiment, record, signal)
+            results = with_record(results, self.record, informed.units, experiment, record, signal)
         power = Powers.of(excitation.power)
-        findings += limits_not_kept(asked.limits, experiment.samples, power, report.outcome.signal)
-        report = replace(report, outcome=report.outcome.saying(findings))
+        findings += limits_not_kept(asked.limits, experiment.samples, power, results.outcome.signal)
+        results = adding(results, results.outcome, findings)
         if record is not None:
-            report = report.foreseeing(self.foresight, record.samples, requirements)
-        results = report.results(self.shown.header, {"analysis": time.perf_counter() - started})
+            results = foreseeing(results, self.foresight, record.samples, requirements)
+        seconds = {"analysis": time.perf_counter() - started}
+        results = adding(results, replace(results.outcome, timing_s=seconds))
         if record is None:
             return Delivered(results, None, None, confidence.alpha)
         return Delivered(
@@ -240,7 +237,7 @@ class GivenTask:
         white: White,
         requirements: Sequence[Requirement],
         confidence: Confidence,
-    ) -> Report:
+    ) -> Results:
         """Return what the excitation buys, with its tables and curves."""
         units, excitation = informed.units, self.excitation
         beyond, of_table = self._beyond(experiment, requirements, informed.information)
@@ -275,7 +272,7 @@ class GivenTask:
             status = "missed" if found.entry.missed else outcome.status
             outcome = replace(outcome, robust=found.entry, status=status).saying(found.findings)
             tables |= found.tables
-        return Report(outcome, tables, curves, {})
+        return results_of(self.shown.header, outcome, tables, curves)
 
     def _objective(self, experiment: Experiment, information: Array) -> Objective | None:
         """Return the value of the criterion."""
@@ -307,14 +304,13 @@ class GivenTask:
         excitation, request = self.excitation, self.record
         if excitation.samples is not None:
             return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
-        basis, x = excitation.basis, excitation.x
-        if basis is None or x is None:
-            return None
-        several = experiment.inputs > 1
-        if excitation.sinusoids is not None and several:
-            return self._in_phase(*excitation.sinusoids, experiment, ratio)
-        spectrum = DesignedSpectrum.of(basis, x, inputs=experiment.inputs, step=request.step)
-        return given_record(request, experiment, spectrum, ratio)
+        samples = request.length(experiment.samples)
+        if self._in_phase is None or not request.feasible(experiment.samples, least_period(1)):
+            return given_record(request, experiment, self._spectrum, ratio)
+        rng = np.random.default_rng(request.settings.seed)
+        record = self._in_phase.draw(1, samples, rng)[0]
+        plant = FiniteRecord(experiment, samples, request.step)
+        return Record(record, "multisine", ratio_at(plant, ratio, record))
 
     def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
         """Estimates of such experiments, for an exact confidence."""
@@ -328,29 +324,26 @@ class GivenTask:
 
     def _renewed(self, samples: int) -> Excitation | None:
         """What realises the spectrum anew; None for a record that was given."""
-        excitation, request = self.excitation, self.record
-        basis, x = excitation.basis, excitation.x
+        basis, x, request = self.excitation.basis, self.excitation.x, self.record
         if basis is None or x is None:
             return None
-        inputs = self.experiment.inputs
-        if excitation.sinusoids is not None and isinstance(basis, LinesBasis) and inputs > 1:
-            frequencies, amplitudes = excitation.sinusoids
-            return InPhase("design", frequencies * request.step, amplitudes, basis, x)
-        spectrum = DesignedSpectrum.of(basis, x, inputs=inputs, step=request.step)
-        return Redrawn("design", SignalGenerator(spectrum, request.settings, samples, request.band), basis, x)
+        generator = SignalGenerator(self._spectrum, request.settings, samples, request.band)
+        return self._in_phase or Redrawn("design", generator, basis, x)
 
-    def _in_phase(
-        self, frequencies: Array, amplitudes: Array, experiment: Experiment, ratio: Callable[[Array], float]
-    ) -> Record | None:
+    @property
+    def _in_phase(self) -> InPhase | None:
         """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
-        request = self.record
-        samples = request.length(experiment.samples)
-        if not request.feasible(experiment.samples, least_period(1)):
+        basis, x, sinusoids = self.excitation.basis, self.excitation.x, self.excitation.sinusoids
+        if sinusoids is None or x is None or not isinstance(basis, LinesBasis) or self.experiment.inputs == 1:
             return None
-        rng = np.random.default_rng(request.settings.seed)
-        record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)
-        plant = FiniteRecord(experiment, len(record), request.step)
-        return Record(record, "multisine", ratio_at(plant, ratio, record))
+        return InPhase("design", sinusoids[0] * self.record.step, sinusoids[1], basis, x)
+
+    @property
+    def _spectrum(self) -> DesignedSpectrum:
+        basis, x = self.excitation.basis, self.excitation.x
+        assert basis is not None
+        assert x is not None
+        return DesignedSpectrum.of(basis, x, inputs=self.experiment.inputs, step=self.record.step)
 
 
 def _check_excites(experiment: Experiment, information: Array) -> None:

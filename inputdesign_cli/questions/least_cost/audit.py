@@ -21,16 +21,14 @@ from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.problem import Goal
-from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.outcome import Objective, Outcome, read_plain, write_plain
 from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.plant import graded_grid
+from inputdesign_cli.questions.common.audit import APART, check_claims, of_bounds, of_cost, of_limit
 from inputdesign_cli.questions.common.robust import kept_by
 from inputdesign_cli.questions.least_cost.outcome import Designed
 
-# Two ways to the same number may differ by this share of it.
-_APART = 1e-6
 # A plant that keeps less than this share of the limit is not looked at again.
 _DOUBTFUL = 0.9
 _NODES_AT_ONCE = 1024
@@ -56,16 +54,10 @@ def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0
     Raises:
         InaccurateError: `internal-disagreement`.
     """
-    apart = max(_APART, loose)
+    apart = max(APART, loose)
     reread = read_plain(_Written, json.loads(json_text(write_plain(outcome))))
-    for claim in _Audit(done, reread, apart).disagreements(on_grid):
-        raise InaccurateError.because(
-            "internal-disagreement",
-            claim,
-            hint="rescale the signals, restrict the band, or look for poles near the unit circle; if the "
-            "spec is plain, please report it: the spec is enough to see the same",
-            key="accuracy",
-        )
+    remedy = "rescale the signals, restrict the band, or look for poles near the unit circle"
+    check_claims(_Audit(done, reread, apart).disagreements(on_grid), remedy)
 
 
 @dataclass(frozen=True)
@@ -100,10 +92,12 @@ class _Audit:
 
     def disagreements(self, on_grid: bool) -> Iterator[str]:
         """Yield a sentence for each claim that the spectrum does not bear out."""
-        yield from self._bounds()
+        claimed = self.written.objective
+        size = float(self.done.experiment.size) if claimed.kind == "D" else 0.0
+        yield from of_bounds(claimed, self.apart, size)
         if self.written.status == "nothing_needed":
             return
-        goal, value = self.done.question.goal, self.written.objective.value
+        goal, value = self.done.question.goal, claimed.value
         problem = self.done.design.problem
         plants = [_Reread(self.done, self.written.spectrum, scenario) for scenario in problem.scenarios]
         for reread in self._doubtful(plants) if not on_grid else ():
@@ -115,35 +109,16 @@ class _Audit:
             sum(w * plants[number].power(kind, channel) for kind, channel, w in weights)
             for number in problem.paying
         ]
-        cost = paid_for(problem.paid, costs)
-        if not abs(cost - self.written.cost) <= _APART * cost:
-            yield f"the spectrum costs {cost:.10g}, not {self.written.cost:.10g}"
+        yield from of_cost(paid_for(problem.paid, costs), self.written.cost)
         for limit in self.done.question.limits:
             for number in (problem.limits[index].scenario for index in limit.everywhere(problem.limits)):
-                power = plants[number].power(limit.kind, limit.channel)
-                excess = power - limit.bound if limit.upper else limit.bound - power
-                if not excess <= _APART * limit.bound:
-                    yield f"{limit.key} is {limit.bound:.6g}, but the spectrum has {power:.10g}"
+                yield from of_limit(limit, plants[number].power(limit.kind, limit.channel))
 
     def _doubtful(self, plants: list[_Reread]) -> list[_Reread]:
         """Return the nominal plant, and others that keep nearly all that is admitted."""
         kept = kept_by(self.done.problem, self.done.design, self.done.experiment.samples)
         pairs = list(zip(plants, kept, strict=True))
         return [reread for n, (reread, one) in enumerate(pairs) if n == 0 or one.share > _DOUBTFUL]
-
-    def _bounds(self) -> Iterator[str]:
-        """No value lies beyond a bound that is called proved."""
-        claimed = self.written.objective
-        value, largest = claimed.value, claimed.upper_bound is not None
-        size = max(abs(value), float(self.done.experiment.size) if claimed.kind == "D" else 0.0)
-        for name, bound in (
-            ("upper_bound", claimed.upper_bound),
-            ("lower_bound", claimed.lower_bound),
-            ("any_spectrum_bound", claimed.any_spectrum_bound),
-        ):
-            beyond = 0.0 if bound is None else value - bound
-            if not (beyond if largest else -beyond) <= self.apart * size:
-                yield f"the value {value:.10g} lies beyond {name} ({bound:.10g})"
 
     def _reached(self, plants: list[_Reread], value: float) -> Iterator[str]:
         """The value of the best accuracy is that of the plant at which it is worst."""
@@ -169,7 +144,7 @@ class _Reread:
         """The requirements that are promised and not met."""
         for requirement in self.scenario.side if goal == "factor" else self.scenario.requirements:
             worst = self._worst(requirement)
-            if not worst <= 1.0 + _APART:
+            if not worst <= 1.0 + APART:
                 yield f"the design leaves {worst:.6g} times the error that {requirement.name} admits"
 
     @property

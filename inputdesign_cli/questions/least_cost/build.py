@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.questions.building.demand import check_design
 from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header
@@ -25,12 +25,12 @@ from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.common.delivery import Shown
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
-from inputdesign_cli.questions.least_cost.methods import FewColumns, GridMethod
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
-from inputdesign_cli.questions.least_cost.sought import Method, Sought
-from inputdesign_cli.signal.settings import FROM_LEVELS
+from inputdesign_cli.questions.least_cost.sought import FewColumns, GridMethod, Sought
+from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
@@ -39,11 +39,7 @@ _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "sho
 
 
 def build_convex(spec: Spec) -> ConvexTask:
-    """The task of a design for requirements and criteria that are convex in the information matrix.
-
-    Raises:
-        SpecError, DataError: see the builders of the parts; `not-identifiable`.
-    """
+    """The task of a design for requirements and criteria that are convex in the information matrix."""
     check_supported(spec)
     experiment = build_experiment(spec)
     requirements, side = build_asked(spec, experiment)
@@ -75,20 +71,29 @@ def build_convex(spec: Spec) -> ConvexTask:
     # What no spectrum attains is proved as what every spectrum reaches.
     loose = basis.free and goal == "factor" and not reach.attained
     tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
-    bounded = solver.any_spectrum and reach.bounded
     alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)
-    header = build_header(spec)
-    exact = None
-    if calibration is not None:
-        exact = ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment))
-    bound = solver.any_spectrum_tolerance if bounded else None
+    simulator = build_simulator(spec, experiment)
+    exact = None if calibration is None else ExactConfidence(calibration, alpha, question, simulator)
     return ConvexTask(
-        Sought(header, question, cost, alpha, exact, spec.limits.samples, plants, stated_bounds(spec)),
-        Method(tolerance, bound, reach, grid, _few_columns(spec, basis)),
+        Sought(
+            build_header(spec),
+            question,
+            cost,
+            alpha,
+            exact,
+            spec.limits.samples,
+            plants,
+            stated_bounds(spec),
+            tolerance,
+            solver.any_spectrum_tolerance if solver.any_spectrum and reach.bounded else None,
+            reach,
+            grid,
+            _few_columns(spec, basis),
+        ),
         build_record_request(spec, experiment.size),
-        Shown(header, unstated_errors(spec, experiment), spec.report.ellipses),
+        Shown(build_header(spec), unstated_errors(spec, experiment), spec.report.ellipses),
         build_simulation(spec, experiment),
-        build_foresight(spec, experiment, _designed_alone),
+        build_foresight(spec, experiment),
     )
 
 
@@ -100,38 +105,19 @@ def _approaching(question: Question, band: tuple[float, float]) -> Question:
     return replace(question, experiment=experiment, basis=LinesBasis.anywhere(*band, experiment.inputs))
 
 
-def _designed_alone(spec: Spec) -> Outcome:
-    """Return the outcome of a design that another one is compared with: without bounds and comparisons."""
-    task = build_convex(spec)
-    alone = None if task.foresight is None else replace(task.foresight, richer={})
-    method = replace(task.method, any_spectrum_tolerance=None)
-    return replace(task, foresight=alone, method=method).solve().outcome
+_STATED = "state the accuracy as model_error or a criterion"
+_UNHANDLED = {
+    "accuracy.closed_loop_error": _STATED,
+    "accuracy.mean_squared_error": _STATED,
+    "limits.energy": "limit input_power, its mean a sample",
+    "solver.method": "use exchange or lmi",
+    "signal.order": "remove it: noise comes from a long filter",
+}
 
 
-def check_supported(spec: Spec) -> None:
-    """Say plainly what is not designed here, rather than ignore it.
-
-    Raises:
-        SpecError: `not-supported`.
-    """
-
-    def refuse(key: str, what: str, hint: str) -> Exception:
-        return spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
-
-    for name, asked in (
-        ("closed_loop_error", spec.accuracy.closed_loop_error),
-        ("mean_squared_error", spec.accuracy.mean_squared_error),
-    ):
-        if asked is not None:
-            raise refuse(
-                f"accuracy.{name}", f"handle {name} here", "state the accuracy as model_error or a criterion"
-            )
-    if spec.limits.energy is not None:
-        raise refuse("limits.energy", "enforce limits.energy here", "limit input_power, its mean a sample")
-    if spec.solver.method == "alternating":
-        raise refuse("solver.method", "use the alternating method here", "use exchange or lmi")
-    if spec.signal.order is not None:
-        raise refuse("signal.order", "fit rational filters here", "remove it: noise comes from a long filter")
+def check_supported(spec: Spec, question: str = "a design of the input spectrum") -> None:
+    """Raise `SpecError` (`not-supported`) for what is not designed here, rather than ignore it."""
+    refuse_unhandled(spec, question, _UNHANDLED, {"solver.method": ("exchange", "lmi")})
     if not spec.plant.sampled:
         _check_interpolated(spec)
     if spec.uncertainty is not None:
@@ -152,7 +138,7 @@ def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
         what, hint = "calibrate an exact confidence at several plants", "write confidence: 0.95"
     else:
         return
-    raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key="uncertainty")
+    raise refuse("uncertainty", what, hint)
 
 
 def check_pairs(spec: Spec, known: Sequence[str]) -> None:
@@ -165,10 +151,10 @@ def check_pairs(spec: Spec, known: Sequence[str]) -> None:
 def _check_interpolated(spec: Spec) -> None:
     """In continuous time samples are interpolated within their band: between them there are no levels."""
     signal = spec.signal
-    levels = signal.type in FROM_LEVELS
+    levels = signal.type is not None and kind_of(signal.type).of_levels
     if levels or signal.hold is not None or signal.bits is not None:
         key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
-        raise spec.complain(
+        raise bad_spec(
             "not-supported",
             "a plant in s is driven by the band-limited interpolation of the samples, which has no levels "
             "and holds nothing between them",
@@ -199,7 +185,7 @@ def _grid_method(spec: Spec) -> GridMethod | None:
         and not limited
     )
     if not plain:
-        raise spec.complain(
+        raise bad_spec(
             "not-supported",
             "solver.method lmi is the papers' program: the least cost of a FIR spectrum of one input for "
             "model_error alone, without limits",
@@ -217,7 +203,7 @@ def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
     plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
     floors = any(not limit.upper for limit in build_power_limits(spec))
     if not isinstance(basis, PolynomialBasis) or not plain or floors or spec.limits.spectrum is not None:
-        raise spec.complain(
+        raise bad_spec(
             "not-supported",
             "factor_columns is for a criterion under upper limits on powers",
             hint="remove factor_columns: the default, a factor of full rank, is the true optimum",

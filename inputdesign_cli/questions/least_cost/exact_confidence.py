@@ -16,16 +16,17 @@ from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.common.confidence import (
     SETTLED,
     Confidence,
+    SimulatedEstimates,
+    Simulator,
     bounded_errors,
     settled_alpha,
     too_few,
     too_many,
 )
 from inputdesign_cli.questions.common.record import Made, RecordRequest, as_long, redrawn, worst_ratio
-from inputdesign_cli.questions.common.simulated_estimates import SimulatedEstimates, Simulator
 from inputdesign_cli.questions.least_cost.outcome import Designed
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
-from inputdesign_cli.signal import Record
+from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.spectrum import flat_basis
 
 # A record that needs a larger alpha is made anew, this often at the most.
@@ -52,11 +53,7 @@ class ExactConfidence:
     simulator: Simulator | None
 
     def designed(self, design: MakeDesign, request: RecordRequest) -> Designed:
-        """Return the design that needs just the alpha that it is for.
-
-        Raises:
-            InfeasibleError, InaccurateError: see `settled_alpha`, `SimulatedEstimates.corrected`.
-        """
+        """Return the design that needs just the alpha that it is for."""
         calibration, designs, sets = self.calibration, 0, 1
         alpha, simulated, coverage = self._first_alpha(), None, None
         for _ in range(_CORRECTIONS):
@@ -101,9 +98,6 @@ class ExactConfidence:
         """Return the record `made`, or one that keeps the confidence by its own samples.
 
         A record distributes its information otherwise than the design, so that it may need a larger alpha.
-
-        Args:
-            known: the information (k, k) of a record; None if it leaves a parameter undetermined.
         """
         design, alpha, sets = done.design, done.confidence.alpha, 1
         for _ in range(_RECORDS):

@@ -10,7 +10,6 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.cost import Weight, paid_for, weighted_sum
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem
@@ -40,7 +39,7 @@ from inputdesign_cli.outcome import (
 )
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.confidence import Confidence
-from inputdesign_cli.questions.common.robust import Plants
+from inputdesign_cli.questions.common.robust import Plants, delivered
 from inputdesign_cli.questions.common.spectrum import described_spectrum, distinct
 from inputdesign_cli.spectrum import Basis, flat_basis
 
@@ -102,10 +101,7 @@ class Designed:
     @cached_property
     def information(self) -> Array:
         """M (k, k) of the delivered spectrum over the delivered number of samples."""
-        if self.design.problem.goal != "samples":
-            return self.design.result.information
-        samples = float(self.experiment.samples)
-        return candidate_at(self.problem, samples * self.design.result.x, samples).informations[0]
+        return np.asarray(delivered(self.problem, self.design, self.experiment.samples)[0])
 
 
 def design_outcome(done: Designed) -> Outcome:
@@ -155,10 +151,7 @@ def accuracy_of(
     """Return the largest ratio of the model error, and each requirement with its own.
 
     Args:
-        confidence: with alpha of r_u.
-        requirements: what is asked; criteria have no ratio.
         information: M (k, k) in their coordinates.
-        active: frequencies at which they bind.
     """
     listed: list[RequirementMet] = []
     error = ModelError(confidence.alpha, confidence=confidence.reported)

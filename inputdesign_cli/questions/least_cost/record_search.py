@@ -18,6 +18,7 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.findings.designed_records import other_signal, other_spectrum
+from inputdesign_cli.questions.common.no_record import no_record, refuse_too_short
 from inputdesign_cli.questions.common.record import (
     Made,
     RecordRequest,
@@ -27,7 +28,6 @@ from inputdesign_cli.questions.common.record import (
     make_record,
     ratio_before,
 )
-from inputdesign_cli.questions.least_cost.no_record import refuse_too_short, too_tight
 from inputdesign_cli.questions.least_cost.shortest_record import (
     ShortestRecord,
     Way,
@@ -35,14 +35,12 @@ from inputdesign_cli.questions.least_cost.shortest_record import (
     pilot_length,
     reach,
 )
-from inputdesign_cli.signal import LONG, Record
+from inputdesign_cli.signal.selection import LONG, Record
 
 # From the design towards the least input power that meets the accuracy, with a little room there.
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
 _ROOM = 1.02
 _TOLERANCE = 1e-5
-# Where nothing meets the accuracy, this number of longer records is tried, if not too long.
-_LENGTHS, _LONGER, _TRIED, _ROUGH = 4, 1.03, 20_000, 1e-4
 # Number of candidates of a long record: luck averages out.
 _ENOUGH = 3
 # No record of a length is made if its pilot needs more than this multiple of that length.
@@ -160,9 +158,6 @@ def _longer(
 ) -> Made:
     """The longer record of a shortest experiment, or the error with what was tried besides.
 
-    Args:
-        samples: the length that was asked for.
-
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
@@ -181,7 +176,7 @@ def _longer(
     if found is not None:
         other = found.request.settings.method != request.settings.method
         return replace(found, findings=(other_signal(_words(found.request)),) if other else ())
-    longer, ended = None, False
+    longer, ended = None, ""
     if allowed is not None:
         search.longest = longest
         try:
@@ -189,22 +184,35 @@ def _longer(
                 longer = search.search(misses, max(samples, search.tried))
         except OutOfTimeError:
             seconds_left()  # that of the whole task may be over
-            ended = True
+            ended = "; longer records were not looked for further"
     if len(misses[0].samples) != samples:
         one = replace(request, settings=replace(request.settings, candidates=1, most_candidates=1))
         misses = [make_record(one, plain.design, samples) or misses[0]]
-    raise too_tight(
-        request,
-        misses[0],
-        None if longer is None else longer.record,
-        allowed,
-        tried=tried,
-        remedy=remedy,
-        needed=search.needed,
-        searched=search.longest,
-        longest_tried=search.tried,
-        ended=ended,
-    )
+    missed, best = misses[0], "excites every parameter"
+    if np.isfinite(missed.worst_ratio):
+        reached = f"r_u / r_adm = {missed.worst_ratio:.4g} with power {missed.power:.4g}"
+        best = f"meets the accuracy: the best of those tried reaches {reached}"
+    kinds = [f"{kind} of {count} {'spectrum' if count == 1 else 'spectra'}" for kind, count in tried.items()]
+    best += f"; tried besides: {', '.join(kinds)}" if kinds else ""
+    hint = _what_would_do(request, None if longer is None else longer.record, search, allowed) + ended
+    raise no_record(request, len(missed.samples), best, "; or ".join(filter(None, (hint, remedy))))
+
+
+def _what_would_do(
+    request: RecordRequest, longer: Record | None, search: ShortestRecord, allowed: int | None
+) -> str:
+    """Return which length would do, as far as it is known."""
+    if longer is not None:
+        samples = len(longer.samples)
+        length = request.units.length(samples, "limits" if allowed else "experiment")
+        return (
+            f"{samples} samples can (power {longer.power:.4g}): set {length} (and signal.samples, if "
+            "stated), raise the limits, or loosen the accuracy"
+        )
+    if search.longest < search.needed < np.inf:
+        most = f"a record of the kinds that were tried would take about {search.needed:.3g} samples"
+        return f"raise the limits: {most}"
+    return "raise the limits"
 
 
 def _ways(plain: Made, question: Question, sought: bool) -> list[Way]:
@@ -261,32 +269,3 @@ def _alike(request: RecordRequest, one: Design, other: Design) -> bool:
         return False
     shapes = [powers / np.einsum("naa->", powers).real for powers in lines]
     return float(np.abs(shapes[0] - shapes[1]).sum()) < _SAME_SHAPE
-
-
-def samples_of_record(request: RecordRequest, question: Question, samples: int) -> int | None:
-    """Return the length of a record that meets the accuracy, or None if none is found.
-
-    Args:
-        samples: the length at which a spectrum meets it.
-
-    Raises:
-        OutOfTimeError: see `seconds_left`.
-    """
-    for number in range(_LENGTHS):
-        samples = max(int(np.ceil(samples * _LONGER)), 2)
-        if samples > _TRIED:
-            return None
-        try:
-            design = solve_design(question.of_length(samples), tolerance=_ROUGH, any_spectrum_tolerance=None)
-        except UnreachableError:
-            return None
-        if number == 0 and samples > LONG:
-            record = _pilot(request, design, samples).record
-        else:
-            record = make_record(replace(request, samples=None), design, samples, first=True)
-        if record is None or not np.isfinite(record.worst_ratio):
-            return None
-        if record.met and len(record.samples) >= samples:
-            return samples
-        samples = max(int(np.ceil(len(record.samples) * record.worst_ratio**2)), samples)
-    return None

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import cycle, islice
 
 import numpy as np
 
-from inputdesign_cli.accuracy import OnModelError, model_errors
+from inputdesign_cli.accuracy import OnModelError, Requirement, model_errors, worst
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
-from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.uncertain_plants import fewer_plants, floor_findings, unstable_draws
 from inputdesign_cli.information import Experiment
@@ -27,7 +28,9 @@ from inputdesign_cli.outcome.robust import (
     BeyondLimits,
     DearestPlant,
     DrawnEstimates,
+    FloorUse,
     FreshPlants,
+    LostPlant,
     Risk,
     SearchedPlant,
 )
@@ -38,6 +41,7 @@ from inputdesign_cli.questions.common.robust import (
     Batch,
     Kept,
     Plants,
+    Searched,
     Tried,
     delivered,
     estimate_from,
@@ -45,8 +49,8 @@ from inputdesign_cli.questions.common.robust import (
     tried_on,
 )
 from inputdesign_cli.questions.common.spectrum import axis
-from inputdesign_cli.questions.least_cost.floor import Floor, floor_at, floor_of, floor_use
 from inputdesign_cli.questions.least_cost.outcome import Designed, costs_of
+from inputdesign_cli.questions.least_cost.worst_case import worst_plant
 
 # A plant binds when it is within this share of its limit.
 _BINDS = 1e-5
@@ -54,6 +58,56 @@ _LISTED = 12
 # Estimates that are foreseen, and the share of them that counts.
 _ESTIMATES, _MOST_OF_THEM = 100, 0.95
 _GRID_POINTS = 300
+
+
+@dataclass(frozen=True)
+class Floor:
+    """How a plant stands to its own r_adm.
+
+    Attributes:
+        raised: whether the floor counts at some frequency.
+        lost: whether nothing keeps what is asked there, since its own r_adm vanishes.
+        peak: of |S| with that plant if all is lost; None if no loop is asked about.
+        share: of r_adm of the plant of the spec, which is the floor.
+    """
+
+    raised: bool
+    lost: bool
+    peak: float | None
+    share: float
+
+
+def floor_at(requirements: Iterable[Requirement]) -> Floor:
+    """Return how a plant stands to its own r_adm, by what is required there."""
+    errors = model_errors(requirements)
+    floors = [(floor, error.grid) for error in errors if (floor := error.admissible.floored) is not None]
+    lost = any(floor.lost(grid) for floor, grid in floors)
+    raised = lost or any(floor.raised(grid) for floor, grid in floors)
+    share = max((floor.share for floor, _ in floors), default=0.0)
+    loops = [(kept, error.grid) for error in errors if (kept := error.admissible.kept) is not None]
+    peak = max((float(np.max(kept.nominal(grid))) for kept, grid in loops), default=None)
+    return Floor(raised, lost, peak if lost else None, share)
+
+
+def floor_of(plant: Alternative) -> Floor:
+    """Return how a plant that the design was not made for stands to its own r_adm."""
+    return floor_at(make(plant.experiment) for make in (*plant.requirements, *plant.side))
+
+
+def floor_use(plants: Plants, kept: Sequence[int], floors: Sequence[Floor]) -> FloorUse | None:
+    """Return which of the plants that count are held to the floor; None if each has an r_adm of its own."""
+    raised = [place for place, one in enumerate(floors) if one.raised]
+    if not raised:
+        return None
+    lost = sorted((p for p in raised if floors[p].lost), key=lambda p: -(floors[p].peak or 0.0))
+    worst = [
+        LostPlant(kept[p] + 1, _named(plants, plants.batch.thetas[kept[p]]), floors[p].peak)
+        for p in lost[:_LISTED]
+    ]
+    share, numbers = floors[raised[0]].share, np.array(kept) + 1
+    return FloorUse(
+        share, tuple(numbers[raised].tolist()), tuple(numbers[sorted(lost)].tolist()), tuple(worst) or None
+    )
 
 
 @dataclass(frozen=True)
@@ -89,18 +143,18 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
         costs = costs_of(done, done.design.result.basis, done.design.result.x)
         dearest = int(np.argmax(costs))
         entry = replace(entry, dearest=DearestPlant(numbers[dearest], costs[dearest]))
+    promised = done.design.result.objective if dearest_counts else None
+    tried = partial(tried_on, done.design, done.experiment.samples)
+    fresh, fewer = fresh_plants(plants, tried, peak, promised)
     if plants.afresh is not None:
-        entry = replace(entry, risk=_risk(plants, support, len(kept)))
-        promised = done.design.result.objective if dearest_counts else None
-        tried = partial(tried_on, done.design, done.experiment.samples)
-        fresh = fresh_plants(plants, plants.afresh(), tried, peak, promised)
-        entry = replace(entry, fresh=fresh, estimates=_estimates(done, plants, binding))
+        risk, estimates = _risk(plants, support, len(kept)), _estimates(done, plants, binding)
+        entry = replace(entry, risk=risk, fresh=fresh, estimates=estimates)
     fan = fan_curves(done, numbers, binding) if done.excites else None
     return RobustResult(
         entry,
         found.tables if fan is None else found.tables | {"fan": fan[0]},
         {} if fan is None else {"fan": fan[1]},
-        (*found.findings, *fresh_findings(plants, entry.fresh)),
+        (*found.findings, *fewer),
     )
 
 
@@ -115,14 +169,12 @@ def plants_kept(
     """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
 
     Args:
-        kept: the numbers of the plants that count.
         at_each: what these keep, the plant of the spec first.
         binding: places among them.
-        floors: of the plants that count.
     """
     numbers = [0, *(number + 1 for number in kept)]
     worst = int(np.argmax([one.share for one in at_each]))
-    floor = floor_use(floors, numbers[1:], plants.names, plants.batch.thetas[list(kept)])
+    floor = floor_use(plants, kept, floors)
     batch = plants.batch
     entry = Robust(
         source=plants.source,
@@ -200,22 +252,20 @@ def _risk(plants: Plants, support: int, kept: int) -> Risk | None:
 
 def fresh_plants(
     plants: Plants,
-    afresh: Iterator[Batch],
     try_on: Callable[[Batch, float], Sequence[Tried]],
     peak: Peak | None = None,
     promised: float | None = None,
-) -> FreshPlants | None:
-    """Return how many of other plants from the same distribution are missed; None if there is no time.
+) -> tuple[FreshPlants | None, list[Finding]]:
+    """Return how many of other plants from the same distribution are missed, as far as there is time.
 
     Args:
-        plants: that count.
-        afresh: the others; as many are tried as there is time for.
         try_on: what they keep; a share up to the number may be returned as 0.
-        peak: see `robust_result`.
         promised: the cost that a design promises at every plant.
     """
+    if plants.afresh is None:
+        return None, []
     tried, peaks, rejected, largest, floors = list[Kept](), list[float](), 0, 0.0, list[Floor]()
-    for batch in afresh:
+    for batch in plants.afresh():
         try:
             at_each = try_on(batch, min(largest, 1.0))
         except OutOfTimeError:
@@ -226,12 +276,13 @@ def fresh_plants(
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
+    fewer = fewer_plants(len(tried), plants.fresh)
     if not tried:
-        return None
+        return None, fewer
     less = np.array([one.share for one in tried]) > MET
     dearer = np.array([promised is not None and one.cost > MET * promised for one in tried])
     missed = int(np.sum(less | dearer))
-    return FreshPlants(
+    found = FreshPlants(
         draws=len(tried),
         rejected=rejected,
         missed=missed,
@@ -244,20 +295,13 @@ def fresh_plants(
         less=None if promised is None else int(np.sum(less)),
         dearer=None if promised is None else int(np.sum(dearer)),
     )
-
-
-def fresh_findings(plants: Plants, fresh: FreshPlants | None) -> list[Finding]:
-    """Return a finding if fewer fresh plants were tried than were asked for."""
-    return [] if plants.afresh is None else fewer_plants(0 if fresh is None else fresh.draws, plants.fresh)
+    return found, fewer
 
 
 def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> DrawnEstimates | None:
     """Return how near the best accuracy comes to being missed at estimates of the plants that bind.
 
     Data are judged at their estimate, so that some are drawn.
-
-    Args:
-        binding: places among the plants that are kept, the plant of the spec being 0.
     """
     worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
     if done.problem.goal != "factor" or plants.at is None or not worst:
@@ -298,10 +342,6 @@ def fan_curves(
     """Return fan.csv and its figure: r_u / r_adm at the plant of the spec, the largest, and at active ones.
 
     None if no model error is bounded.
-
-    Args:
-        numbers: what the scenarios are called, in their order; the plant of the spec is 0.
-        active: the places of binding plants, in that order.
     """
     problem, units = done.problem, done.units
     bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]
@@ -323,3 +363,77 @@ def fan_curves(
 def _largest(errors: Sequence[OnModelError], information: Array, w: Array) -> Array:
     """Return (n,): the largest ratio of several entries of G."""
     return np.max([error.ratios(information, w) for error in errors], axis=0)
+
+
+@dataclass(frozen=True)
+class AtPlants:
+    """An excitation of this `power` over these `samples`; `information` gives M in any coordinates."""
+
+    information: Callable[[Experiment], Array]
+    power: float
+    samples: int
+
+    def on(self, plant: Alternative) -> Tried:
+        """Return how near a plant comes to being missed: infinitely if its parameters are undetermined."""
+        seconds_left()
+        own = replace(plant.experiment, samples=self.samples)
+        asked = tuple(make(own) for make in (*plant.requirements, *plant.side))
+        try:
+            coordinates = own.whitened(self.power)
+            there = plant.at(coordinates)
+            return Tried(kept_of((*there.requirements, *there.side), self.information(coordinates)), asked)
+        except OutOfTimeError:
+            raise
+        except (np.linalg.LinAlgError, IdesignError):
+            return Tried(Kept(np.inf), asked)
+
+    def on_each(self, batch: Batch, above: float = 0.0) -> list[Tried]:
+        """Return this for every plant of a batch, to the last digit also up to `above`."""
+        return [self.on(plant) for plant in batch.plants]
+
+
+def kept_of(requirements: Sequence[Requirement], information: Array) -> Kept:
+    """Return the largest ratio of an error to what is admitted, and where it is."""
+    found = worst([one for requirement in requirements for one in requirement.violations(information)])
+    return Kept(found.ratio, found.frequency)
+
+
+def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, units: Units) -> RobustResult:
+    """Return what the excitation keeps at the plants of `uncertainty`.
+
+    Args:
+        plants: all but the plant of the spec. The worst are left out, as many as may be discarded.
+        nominal: what it keeps at the plant of the spec, whose parameters are `centre` (k,).
+
+    Raises:
+        SpecError: `not-exciting` if parameters of a plant are undetermined.
+    """
+    batch = plants.batch
+    tried = at.on_each(batch)
+    shares = np.array([one.kept.share for one in tried])
+    rising = np.argsort(shares, kind="stable").tolist()
+    kept = sorted(rising[: len(rising) - plants.discard])
+    at_each = [nominal, *(tried[place].kept for place in kept)]
+    looked_at = list(at_each)
+    if plants.region is not None:
+        starts = [centre, *(batch.thetas[place] for place in reversed(rising))]
+        found = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
+        sought = Searched(plants.region.name, found.theta, found.kept, found.tried, added=0)
+        plants, looked_at = replace(plants, searched=sought), [*looked_at, found.kept]
+    if not all(np.isfinite(one.share) for one in looked_at):
+        raise bad_spec(
+            "not-exciting",
+            "the given excitation does not determine the parameters of every plant of uncertainty",
+            hint="excite more frequencies, or state the uncertainty more tightly",
+            key="uncertainty",
+        )
+    binding = [int(np.argmax([one.share for one in at_each]))]
+    floors = [floor_at(tried[place].asked) for place in kept]
+    found_there = plants_kept(units, plants, kept, at_each, binding, floors)
+    fresh, fewer = fresh_plants(plants, at.on_each)
+    missed = sum(one.share > MET for one in looked_at)
+    return replace(
+        found_there,
+        entry=replace(found_there.entry, missed=missed, fresh=fresh),
+        findings=(*found_there.findings, *fewer),
+    )

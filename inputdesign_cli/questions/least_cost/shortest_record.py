@@ -11,7 +11,7 @@ import scipy
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.questions.common.record import Made
-from inputdesign_cli.signal import LONG, Record
+from inputdesign_cli.signal.selection import LONG, Record
 
 # Lengths that are looked into: times the one that was asked for, or that many samples.
 _LONGEST, _AT_LEAST = 64, 20_000
@@ -64,12 +64,7 @@ def pilot_length(samples: int, block: int) -> int:
 
 
 def longest_search(asked: int, most: int | None, longest: int) -> int:
-    """Return the longest length that is tried if records of `asked` samples miss.
-
-    Args:
-        most: samples of the longest experiment, where there is a limit.
-        longest: samples of the longest record that is computed at all.
-    """
+    """Return the longest length that is tried if records of `asked` samples miss."""
     return min(max(_LONGEST * asked, _AT_LEAST, most or 0), longest)
 
 

@@ -33,11 +33,14 @@ from inputdesign_cli.questions.common.bound import Informed, equal_white
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import (
     Delivered,
-    Report,
     Shown,
+    adding,
     begun_anywhere,
+    foreseeing,
     record_findings,
+    results_of,
     searching,
+    with_record,
 )
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.record import (
@@ -55,37 +58,26 @@ from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
 from inputdesign_cli.questions.least_cost.robust_outcome import robust_result
-from inputdesign_cli.questions.least_cost.sought import Method, Sought
-from inputdesign_cli.signal import Record
+from inputdesign_cli.questions.least_cost.sought import Sought
+from inputdesign_cli.signal.selection import Record
 
 
 @dataclass(frozen=True)
 class ConvexTask:
-    """A convex design: what is asked, how it is found, what is done with its record, what is reported."""
+    """A convex design: what is asked, what is done with its record, what is reported."""
 
     asked: Sought
-    method: Method
     record: RecordRequest
     shown: Shown
     simulation: Simulation
     foresight: Foresight | None = None
 
     def solve(self) -> Results:
-        """Return the design, its proof, its signal and its curves.
-
-        Raises:
-            InfeasibleError: nothing within the limits meets the requirements.
-            InaccurateError: the proof did not close, or nothing that meets everything was found in time.
-        """
+        """Return the design, its proof, its signal and its curves."""
         return self._delivered().results
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Return this with the design tried many times on the true system; see `common.simulation`.
-
-        Raises:
-            SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
-            InfeasibleError, InaccurateError: see `solve`.
-        """
+        """Return this with the design tried many times on the true system; see `common.simulation`."""
         delivered = self._delivered()
         if delivered.record is None:
             seconds_left()  # or else its time is the reason
@@ -93,42 +85,37 @@ class ConvexTask:
 
     def designed(self) -> Designed:
         """Return the design, see `Sought.designed`."""
-        return self.asked.designed(self.method, self.record)
+        return self.asked.designed(self.record)
 
     def _delivered(self) -> Delivered:
         started = time.perf_counter()
         done = self.designed()
         outcome = self._designed_outcome(done)
-        self.asked.check_length(done, self.method.tolerance, of_record=self.record.bounds.hard)
+        self.asked.check_length(done, of_record=self.record.bounds.hard)
         solved = time.perf_counter()
         self._audited(done, outcome)
         checked = time.perf_counter()
         made = self._made(done)
         record, known = made.record, _known(done, made.record, self.record.step)
-        report = self._illustrated(done, outcome, record, known)
+        results = self._illustrated(done, outcome, record, known)
         if done.plants is not None:
             peak = None if record is None else peak_at(made.request, done.design, record)
             robust = robust_result(done, done.plants, peak)
-            report = Report(
-                replace(report.outcome, robust=robust.entry).saying(robust.findings),
-                report.tables | robust.tables,
-                report.curves | robust.curves,
-                {},
-            )
+            outcome = replace(results.outcome, robust=robust.entry)
+            results = adding(results, outcome, robust.findings, robust.tables, robust.curves)
         if record is not None:
-            signal = self._signal(done, made, record, known)
-            report = report.with_record(made.request, self.shown, done.experiment, record, signal)
+            signal, units = self._signal(done, made, record, known), self.shown.header.units
+            results = with_record(results, made.request, units, done.experiment, record, signal)
         if done.excites:
-            report = replace(report, outcome=self._of_record(done, report.outcome, made, known))
+            results = replace(results, outcome=self._of_record(done, results.outcome, made, known))
             if record is not None:
-                requirements = done.problem.requirements
-                report = report.foreseeing(self.foresight, record.samples, requirements)
-        timing = {
+                results = foreseeing(results, self.foresight, record.samples, done.problem.requirements)
+        seconds = {
             "design": solved - started,
             "check": checked - solved,
             "signal": time.perf_counter() - checked,
         }
-        results, alpha = report.results(self.shown.header, timing), done.confidence.alpha
+        results, alpha = adding(results, replace(results.outcome, timing_s=seconds)), done.confidence.alpha
         if record is None:
             return Delivered(results, None, None, alpha)
         samples, inputs = record.samples.shape
@@ -149,7 +136,7 @@ class ConvexTask:
     def _designed_outcome(self, done: Designed) -> Outcome:
         """Return the outcome of the design with what was left out of its proof."""
         outcome = design_outcome(done)
-        columns, reach, grid = self.method.columns, self.method.reach, self.method.grid
+        columns, reach, grid = self.asked.columns, self.asked.reach, self.asked.grid
         if columns is not None and outcome.spectrum is not None:
             details = {**outcome.spectrum.details, "factor_columns": columns.columns}
             outcome = replace(outcome, spectrum=replace(outcome.spectrum, details=details))
@@ -166,10 +153,10 @@ class ConvexTask:
 
     def _audited(self, done: Designed, outcome: Outcome) -> None:
         """Evaluate what is about to be written by other means, see `audit`."""
-        reach = self.method.reach
-        loose = 0.0 if reach.attained else self.method.tolerance
+        reach = self.asked.reach
+        loose = 0.0 if reach.attained else self.asked.tolerance
         try:
-            audit(done, outcome, on_grid=self.method.grid is not None, loose=loose)
+            audit(done, outcome, on_grid=self.asked.grid is not None, loose=loose)
         except InaccurateError as error:
             if not reach.note:
                 raise
@@ -205,7 +192,7 @@ class ConvexTask:
 
     def _illustrated(
         self, done: Designed, outcome: Outcome, record: Record | None, known: Array | None
-    ) -> Report:
+    ) -> Results:
         """Return the outcome with tables and curves; of a design without excitation the spectrum alone."""
         units, design = self.shown.header.units, done.design
         found, problem = design.result, design.problem
@@ -216,7 +203,7 @@ class ConvexTask:
         tables: dict[str, Table] = {"spectrum": spectrum[0]}
         curves: dict[str, Curves] = {"spectrum": spectrum[1]}
         if not done.excites:
-            return Report(outcome, tables, curves, {})
+            return results_of(self.shown.header, outcome, tables, curves)
         informed = self._informed(done)
         white = White() if outcome.baseline is None else outcome.baseline.white or White()
         if not informed.stated:
@@ -233,7 +220,7 @@ class ConvexTask:
         optimality = optimality_curves(units, design)
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
-        return Report(outcome, tables, curves, {})
+        return results_of(self.shown.header, outcome, tables, curves)
 
     def _signal(self, done: Designed, made: Made, record: Record, known: Array | None) -> Signal:
         design, exact = made.design, self.asked.exact

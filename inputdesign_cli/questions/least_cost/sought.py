@@ -5,54 +5,121 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
+from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import out_of_time, what_ended
 from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.design.convex.designs import UnfinishedDesignError, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
+from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import PowerKind
 from inputdesign_cli.outcome import Solver
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.questions.common.delivery import proof_status
+from inputdesign_cli.questions.common.infeasible import Bought, StatedBound, explain
 from inputdesign_cli.questions.common.reach import Reach
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.robust import Plants, delivered_samples, without_dearest
-from inputdesign_cli.questions.common.status import proof_status
-from inputdesign_cli.questions.common.within_limits import Bought, StatedBound
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
-from inputdesign_cli.questions.least_cost.infeasible import explain
-from inputdesign_cli.questions.least_cost.methods import FewColumns, GridMethod
 from inputdesign_cli.questions.least_cost.outcome import Answer, Designed
-from inputdesign_cli.questions.least_cost.record_search import samples_of_record
 from inputdesign_cli.questions.least_cost.worst_case import with_worst_plants
+from inputdesign_cli.spectrum import PolynomialBasis, flat_basis, hvec, svec
+
+# The second frequency of a grid that begins at zero, as a share of the last.
+_ABOVE_ZERO = 1e-3
+_STARTS = 3
 
 
 @dataclass(frozen=True)
-class Method:
-    """How a design is found.
+class GridMethod:
+    """The papers' own program: the number of frequencies of its grid, and how positivity is written."""
 
-    Attributes:
-        tolerance: the relative gap that is proved.
-        any_spectrum_tolerance: of the bound over every spectrum; None leaves it out.
-        reach: how far spectra reach.
-        grid: the program of the papers in place of the exchange.
-        columns: a factor of few columns, see `FewColumns`.
-    """
+    lines: int
+    positivity: Literal["gram", "kyp"]
 
-    tolerance: float
-    any_spectrum_tolerance: float | None
-    reach: Reach
-    grid: GridMethod | None = None
-    columns: FewColumns | None = None
+    def design(self, question: Question, *, tolerance: float, any_spectrum_tolerance: float | None) -> Answer:
+        """Return the design. The baseline and the bound over every spectrum are exact."""
+        white = replace(question, basis=flat_basis(question.experiment))
+        baseline = solve_design(white, tolerance=tolerance, any_spectrum_tolerance=any_spectrum_tolerance)
+        basis = question.basis
+        problem = replace(baseline.problem, basis=basis)
+        stated = [r for r in problem.requirements if isinstance(r, ModelError)]
+        frequencies = self.frequencies(*stated[0].band)
+        start = baseline.white_power * basis.even
+        answer = solve_on_grid(problem, stated, frequencies, start, positivity=self.positivity)
+        on_grid = replace(
+            baseline.result,
+            basis=basis,
+            x=answer.x,
+            objective=answer.cost,
+            informations=problem.informations(answer.x),
+            certificate=answer.certificate,
+            active=(),
+        )
+        solver = Solver("lmi", tolerance, details={"grid": self.lines})
+        return Answer(replace(baseline, problem=problem, result=on_grid), "optimal_on_grid", solver)
+
+    def frequencies(self, lo: float, hi: float) -> Array:
+        """Return (lines,): the ends of the band, and frequencies evenly spread in log w between them."""
+        if lo > 0.0:
+            return np.geomspace(lo, hi, self.lines)
+        return np.append(0.0, hi * np.geomspace(1.0, _ABOVE_ZERO, self.lines - 1)[::-1])
+
+
+@dataclass(frozen=True)
+class FewColumns:
+    """`spectrum.factor_columns`, as in [mohan-spectral]: a number, and the seed of the random starts."""
+
+    columns: int
+    seed: int
+
+    def climbed(self, answer: Answer) -> Answer:
+        """Return the best of climbs from the optimum cut to few columns, and from random factors.
+
+        The bound of the design over all factors stays: it is the upper bound of [mohan-spectral].
+        """
+        design = answer.design
+        problem, x = design.problem, design.result.x
+        basis, criterion = problem.basis, problem.demands.criterion
+        if not isinstance(basis, PolynomialBasis) or criterion is None:
+            raise ValueError("a factor of few columns is for a criterion and a polynomial spectrum")
+        columns = min(self.columns, basis.gram_order)
+        values, vectors = np.linalg.eigh(basis.matrix(x))
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        functionals = zip(problem.limits, problem.limit_functionals, strict=True)
+        maps = np.moveaxis(problem.information_map, 0, -1)
+        quadratic = QuadraticDesign(
+            np.array([[basis.gram(entry) for entry in row] for row in maps]),
+            problem.baseline_information,
+            tuple((basis.gram(functional.vector), limit.bound) for limit, functional in functionals),
+            criterion.letter,
+            criterion.scaling,
+        )
+        rng = np.random.default_rng(self.seed)
+        found = hill_climb(quadratic, columns, starts=_STARTS, rng=rng, guesses=[root])
+        S = found.factor @ found.factor.conj().T
+        climbed = hvec(S) if basis.hermitian else svec(S.real)
+        informations = problem.informations(climbed)
+        objective = 1.0 / criterion.level(informations[0])
+        result = replace(
+            design.result, x=climbed, informations=informations, objective=objective, s=objective
+        )
+        reached = [history[-1] for history in found.histories]
+        solver = replace(answer.solver, method="hill_climb", details={"starts": reached})
+        return Answer(replace(design, result=result), "lower_bound", solver)
 
 
 @dataclass(frozen=True)
 class Sought:
-    """What is asked of a design.
+    """What is asked of a design, and how it is found.
 
     Attributes:
         question: in it the experiment has one sample if the length is sought.
@@ -60,7 +127,10 @@ class Sought:
         exact: None for the alpha as stated.
         most_samples: the longest experiment allowed.
         plants: that the design is for, beside the plant of the spec.
-        stated: the numbers of the spec that bound errors.
+        tolerance: the relative gap that is proved.
+        any_spectrum_tolerance: of the bound over every spectrum; None leaves it out.
+        grid: the program of the papers in place of the exchange.
+        columns: a factor of few columns, see `FewColumns`.
     """
 
     header: Header
@@ -71,29 +141,30 @@ class Sought:
     most_samples: int | None
     plants: Plants | None
     stated: Sequence[StatedBound]
+    tolerance: float
+    any_spectrum_tolerance: float | None
+    reach: Reach
+    grid: GridMethod | None = None
+    columns: FewColumns | None = None
 
-    def designed(self, method: Method, request: RecordRequest) -> Designed:
+    def designed(self, request: RecordRequest) -> Designed:
         """Return the design with its experiment, its status and what the solver did.
 
         Raises:
             InfeasibleError: nothing within the limits meets the requirements.
             InaccurateError: the proof did not close, or nothing that meets everything was found in time.
         """
-        design = partial(self._designed, method, request)
         if self.exact is None:
-            return design(self.question, Confidence(self.alpha, self.alpha))
-        return self.exact.designed(design, request)
+            return self._designed(self.question, Confidence(self.alpha, self.alpha))
+        return self.exact.designed(self._designed, request)
 
-    def _designed(
-        self, method: Method, request: RecordRequest, question: Question, confidence: Confidence
-    ) -> Designed:
-        solve = partial(self._by_exchange, method, request)
-        if method.grid is None:
-            answer = solve(question)
-        else:
-            answer = method.grid.design(
-                question, tolerance=method.tolerance, any_spectrum_tolerance=method.any_spectrum_tolerance
-            )
+    def _designed(self, question: Question, confidence: Confidence) -> Designed:
+        solve = partial(
+            self._by_exchange if self.grid is None else self.grid.design,
+            tolerance=self.tolerance,
+            any_spectrum_tolerance=self.any_spectrum_tolerance,
+        )
+        answer = solve(question)
         plants, kept = self.plants, list(range(len(question.others)))
         if plants is not None and plants.discard:
             kept = without_dearest(question, answer.design, plants.discard)
@@ -102,25 +173,21 @@ class Sought:
         if plants is not None and plants.region is not None:
             plants, question, answer = with_worst_plants(plants, plants.region, question, answer, solve)
             kept = list(range(len(question.others)))
-        if method.columns is not None:
-            answer = method.columns.climbed(answer)
+        if self.columns is not None:
+            answer = self.columns.climbed(answer)
         experiment = replace(answer.design.problem.experiment, samples=delivered_samples(answer.design))
         return Designed(self.header, question, answer, experiment, self.cost, confidence, kept, plants)
 
-    def _by_exchange(self, method: Method, request: RecordRequest, question: Question) -> Answer:
-        tolerance, ended = method.tolerance, None
+    def _by_exchange(
+        self, question: Question, *, tolerance: float, any_spectrum_tolerance: float | None
+    ) -> Answer:
+        ended = None
         try:
             design = solve_design(
-                question, tolerance=tolerance, any_spectrum_tolerance=method.any_spectrum_tolerance
+                question, tolerance=tolerance, any_spectrum_tolerance=any_spectrum_tolerance
             )
         except UnreachableError as unreachable:
-            raise explain(
-                self.header.units,
-                question,
-                unreachable,
-                self.stated,
-                samples_of_record=partial(samples_of_record, request, question),
-            ) from unreachable
+            raise explain(self.header.units, question, unreachable, self.stated) from unreachable
         except UnfinishedDesignError as unfinished:
             if self.exact is not None:  # it need not keep the confidence that alpha is sought for
                 raise
@@ -146,11 +213,10 @@ class Sought:
         )
         return Answer(design, "nothing_needed" if found.objective == 0.0 else status, solver)
 
-    def check_length(self, done: Designed, tolerance: float, *, of_record: bool) -> None:
+    def check_length(self, done: Designed, *, of_record: bool) -> None:
         """Raise `InfeasibleError` (`too-long`) if the shortest experiment is longer than limits.samples.
 
         Args:
-            tolerance: of the design of the longest experiment, for the message.
             of_record: whether single samples are limited, so that a record may take more.
         """
         most, takes = self.most_samples, done.experiment.samples
@@ -162,7 +228,7 @@ class Sought:
         if least <= most and done.answer.solver.ended_by is not None:
             raise out_of_time(f"the best design so far takes {takes} samples, more than {limit} allows")
         longest = replace(self.question.of_length(most), goal="factor")
-        best = solve_design(longest, tolerance=tolerance)
+        best = solve_design(longest, tolerance=self.tolerance)
         problem = best.problem.on(best.result.basis)
         bought = Bought(units, self.stated, self.question.limits, problem, best.result)
         more = " (of the spectrum; within limits on single samples a record may take more)"

@@ -101,8 +101,6 @@ def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> Found:
     """Return the worst plant of the region that ascents find.
 
     Args:
-        region: where it is searched.
-        keeps: what a plant with parameters (k,) keeps.
         starts: parameters (k,) of plants to begin with, the worst known first.
     """
     search = _Ascent(region, keeps)

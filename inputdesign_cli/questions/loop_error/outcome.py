@@ -36,8 +36,8 @@ from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.simulation import ExactLoss, Improvement, TriedInput
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
+from inputdesign_cli.questions.common.delivery import proof_status
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
-from inputdesign_cli.questions.common.status import proof_status
 from inputdesign_cli.signal.lines import Lines
 
 # Frequencies of the plots, and what share of the band they reach down to.
@@ -52,9 +52,6 @@ class LoopErrorTerms:
     Attributes:
         law: the control law as the spec calls it.
         covariance: of the estimate, in the limit of a high model order or exact for the model structure.
-        samples: of the experiment.
-        tolerance: relative gap to be proved.
-        cost: weights of the powers.
         grid: number of frequencies of spectrum.csv.
     """
 
@@ -223,12 +220,7 @@ def loss_results(
     inputs: Mapping[str, Lines],
     samples: int,
 ) -> tuple[dict[str, TriedInput], Improvement | None, dict[str, Curves]]:
-    """Return what each input gave, the improvement over white noise, and the histogram where runs count.
-
-    Args:
-        criterion: of the true system.
-        inputs: the spectra that were tried.
-    """
+    """Return what each input gave, the improvement over white noise, and the histogram where runs count."""
     theory, entries = {}, {}
     for name, lines in inputs.items():
         information = criterion.information(lines.frequencies, lines.powers, np.ones(len(lines.powers)))

@@ -14,8 +14,7 @@ from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.regression.outcome import RegressionTerms
-from inputdesign_cli.questions.regression.regressors import RegressorSettings
-from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
+from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, RegressorSettings
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.

@@ -32,7 +32,7 @@ from inputdesign_cli.outcome import (
 from inputdesign_cli.outcome.curves import ErrorCurves
 from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
 from inputdesign_cli.outcome.units import Header
-from inputdesign_cli.questions.common.status import proof_status
+from inputdesign_cli.questions.common.delivery import proof_status
 
 _POINTS = 400
 
@@ -43,7 +43,6 @@ class RegressionTerms:
 
     Attributes:
         toeplitz: whether the regressors are delayed copies of one input.
-        samples: of the experiment.
         target: the mean-squared error that is allowed; the energy is minimised.
         energy: trace R; the error is minimised.
     """
@@ -72,7 +71,6 @@ class MomentsDesign:
         rho: (n,) autocorrelations, if one input has these moments.
         bound: no R of the structure does better.
         tolerance: relative gap up to which the design counts as optimal.
-        how: how it was found.
     """
 
     R: Array

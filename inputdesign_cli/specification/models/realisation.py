@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
+from inputdesign_cli.plugins import names
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.fields import (
     Count,
@@ -27,13 +29,35 @@ from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
 
 Samples = Annotated[Count, SIZES["signal.samples"]]
-SignalType = Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white"]
+_GROUP = "idesign.signals"
+
+
+class _Added:
+    """Lets names of kinds that other packages add stand in a spec and its schema as well."""
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        def known(value: object, inner: core_schema.ValidatorFunctionWrapHandler) -> object:
+            return value if isinstance(value, str) and value in names(_GROUP) else inner(value)
+
+        return core_schema.no_info_wrap_validator_function(known, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, object]:
+        found = handler(core)
+        return {**found, "enum": [*found["enum"], *sorted(names(_GROUP))]}
+
+
+SignalType = Annotated[
+    Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white", "chirp", "steps"],
+    _Added(),
+]
 
 # Settings that mean something for some types of signal only.
 _ONLY_FOR = {
     "phases": ("multisine",),
     "lines": ("multisine", "binary", "slewed", "ternary"),
-    "ramp": ("filtered_noise", "multisine", "white"),
+    "ramp": ("filtered_noise", "multisine", "white", "chirp"),
     "bits": ("prbs",),
     "order": ("filtered_noise",),
 }

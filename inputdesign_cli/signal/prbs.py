@@ -5,8 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.signal.kind import Draft, SignalKind
 
 _LONGEST_REGISTER = 32
+
+
+class Prbs(SignalKind):
+    """A maximum length sequence, shifted by equal parts of it from input to input."""
+
+    few_levels = True
+    flat = True
+
+    def draw(self, draft: Draft, rng: np.random.Generator) -> Array:
+        """See `SignalKind`."""
+        samples, lines = draft.samples, draft.lines
+        bits = draft.settings.bits or register_length(samples)
+        return shifted_sequences(bits, samples, lines.inputs, rng) * np.sqrt(lines.mean_squares)
 
 
 def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:

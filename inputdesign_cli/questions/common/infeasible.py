@@ -1,0 +1,322 @@
+"""Why nothing meets the requirements within the limits, and what would."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.time_limit import OutOfTimeError, time_for_hints
+from inputdesign_cli.design.convex.demands import Asked
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
+from inputdesign_cli.design.convex.feasible import UnreachableError
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.spectrum import LinesBasis
+
+_TOLERANCE, _EXACT = 1e-5, 1e-6
+_ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare
+_STEPS = 30
+_LONGEST_STEP, _MOST = 1e3, 1e9
+_NO_SHARE = 1e-5
+# A limit takes part in the conflict when its share of the proof's weight is above this.
+_TAKES_PART = 1e-4
+_MOST_PLACES = 3
+
+
+@dataclass(frozen=True)
+class StatedBound:
+    """A number of the spec that bounds an error, so that what is bought can be said in its words.
+
+    An error `factor` times as large as asked stands for `value` times factor ** `power`. A `fraction` is
+    shown in per cent.
+    """
+
+    key: str
+    label: str
+    value: float
+    power: int = 1
+    fraction: bool = False
+
+    def loosened(self, factor: float) -> float:
+        """What the spec would have to say for an error `factor` times as large."""
+        return self.value * factor**self.power
+
+    def shown(self, value: float) -> str:
+        """Return a number for a sentence, rounded towards less accuracy: what is printed can be met."""
+        number = 100.0 * value if self.fraction else value
+        return f"{rounded_up(number, 4) if self.power > 0 else rounded_down(number, 4)}" + (
+            " %" if self.fraction else ""
+        )
+
+
+@dataclass(frozen=True)
+class Bought:
+    """The best accuracy within limits: `nearest` solves `problem` (goal "factor"), which was asked.
+
+    Args:
+        stated: the numbers of the spec that are loosened alike; none if that has no words.
+        limits: of the spec; others of the problem are implied by them.
+    """
+
+    units: Units
+    stated: Sequence[StatedBound]
+    limits: Sequence[PowerLimit]
+    problem: Problem
+    nearest: ExchangeResult
+
+    @property
+    def factor(self) -> float:
+        """The least factor on all errors that are asked for with which they are met."""
+        return float(np.sqrt(self.nearest.objective))
+
+    @property
+    def sentence(self) -> str:
+        """What the limits buy, and where that is worst."""
+        if self.stated:
+            parts = [
+                f"{one.label} {one.shown(one.loosened(self.factor))} (asked: {one.shown(one.value)})"
+                for one in self.stated
+            ]
+            buys = " and ".join(parts)
+        else:
+            buys = f"standard deviations {rounded_up(self.factor, 4)} times as large as it takes"
+        places = [text for text in map(self._place, self._binding) if text]
+        shown = list(dict.fromkeys(places))
+        more = ", .." if len(shown) > _MOST_PLACES else ""
+        worst = f", worst {' and '.join(shown[:_MOST_PLACES])}{more}" if shown else ""
+        return f"the limits buy {buys}{worst}"
+
+    @property
+    def involved(self) -> list[PowerLimit]:
+        """The limits that take part in the proof."""
+        return [limit for limit, _ in self._shares]
+
+    @property
+    def details(self) -> dict[str, object]:
+        """Return this as data, with frequencies in the user's unit."""
+        return {
+            "factor": self.factor,
+            "factor_bound": float(np.sqrt(max(self.nearest.certificate.bound, 1.0))),
+            "bought": [
+                {"key": bound.key, "asked": bound.value, "bought": bound.loosened(self.factor)}
+                for bound in self.stated
+            ],
+            "worst": [self._listed(asked, w) for asked, w in self._binding],
+            "limits": [_entry(limit, share) for limit, share in self._shares],
+        }
+
+    @property
+    def _shares(self) -> list[tuple[PowerLimit, float]]:
+        """Each limit of the spec with its share of the weight of the proof."""
+        listed = self.problem.limits
+        weights = self.nearest.certificate.limits * np.array([limit.bound for limit in listed])
+        least = _TAKES_PART * max(weights.max(initial=0.0), 1e-300)
+        stated = listed[: len(self.limits)]
+        known = [(limit, float(weights[limit.everywhere(listed)].sum())) for limit in stated]
+        return [(limit, share) for limit, share in known if share > least]
+
+    @property
+    def _binding(self) -> list[tuple[Asked, float | None]]:
+        """Where the requirements bind, the place of the largest multiplier first."""
+        return [(self.problem.demands.asked[index], w) for index, w in self.nearest.active]
+
+    def _place(self, place: tuple[Asked, float | None]) -> str:
+        requirement, w = place[0].requirement, place[1]
+        parts = []
+        if requirement.entry is not None and not self.units.single:
+            parts.append(f"in entry {self.units.entry(*requirement.entry)}")
+        if w is not None:
+            parts.append(f"at {self.units.named(w)}")
+        return " ".join(parts)
+
+    def _listed(self, asked: Asked, w: float | None) -> dict[str, object]:
+        requirement = asked.requirement
+        item: dict[str, object] = {"name": requirement.name}
+        if requirement.entry is not None and not self.units.single:
+            item["entry"] = self.units.entry(*requirement.entry)
+        if w is not None:
+            item["frequency"] = w / self.units.frequency
+        at = np.array([0.0 if w is None else w])
+        item["worst_ratio"] = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
+        return item
+
+
+def named(limit: PowerLimit) -> str:
+    """Return what a limit bounds, for a sentence: input 2 power, or power of the moves of input 2."""
+    number = "" if limit.channel is None else f" {limit.channel + 1}"
+    return f"power of the moves of input{number}" if limit.kind == "moves" else f"{limit.kind}{number} power"
+
+
+def _entry(limit: PowerLimit, share: float) -> dict[str, object]:
+    entry: dict[str, object] = {"name": limit.key.removeprefix("limits.")}
+    if limit.channel is not None:
+        entry["channel"] = limit.channel + 1
+    return entry | {"max" if limit.upper else "min": limit.bound, "share": share}
+
+
+def explain(
+    units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound] = ()
+) -> InfeasibleError:
+    """Say the proof that came with the failure, by the numbers of the spec that can be loosened."""
+    problem, nearest = unreachable.problem, unreachable.nearest
+    bought = Bought(units, stated, question.limits, problem, nearest)
+    involved = bought.involved
+    if unreachable.limits_alone:
+        times = f"{nearest.certificate.bound:.4g} times as large for the lower ones to be reached"
+        why = f"contradict each other: the upper ones would have to be {times}"
+        return contradictory(sorted(involved, key=lambda limit: limit.upper), why)
+    missed = (problem.demands.requirement(index) for index, _ in nearest.active)
+    names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
+    hint = (
+        "raise the limit, or loosen the accuracy: a spectrum can keep errors "
+        f"{rounded_up(bought.factor * _ROOM, 4)} times as large as asked, a record somewhat larger ones"
+    )
+    parts: list[str] = []
+    remedies = [hint]
+    try:  # that it is infeasible is proved, whatever else is found out
+        with time_for_hints():
+            parts += _what_would_do(unreachable, question, involved)
+            remedies += _remedies(question, nearest.objective)
+    except OutOfTimeError:
+        remedies.append("what else would do was not looked for further")
+    message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
+    hint = "; ".join(remedies)
+    if problem.densities and question.limits:
+        hint += "; limits.spectrum takes part"
+    key = involved[0].key if involved else "limits"
+    return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
+
+
+def _remedies(question: Question, times: float) -> Iterator[str]:
+    """Yield what meets the accuracy within the limits."""
+    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(times):
+        # Within the same limits information grows in proportion to the length.
+        longer = int(np.ceil(question.experiment.samples * times))
+        yield f"with {longer} samples a spectrum can, and a record with somewhat more"
+    if _within_reach_of_any(question):
+        yield "spectrum: {type: free} can meet it"
+
+
+def _what_would_do(
+    unreachable: UnreachableError, question: Question, involved: Sequence[PowerLimit]
+) -> list[str]:
+    """Return which limits are exhausted, and what each would have to be with the others kept."""
+    parts, alone = list[str](), False
+    for limit in involved:
+        factor = needed_factor(unreachable, [limit]) if limit.upper else None
+        if factor is not None:
+            alone = True
+            parts.append(_needed(limit, factor * limit.bound))
+        elif limit.upper:
+            parts.insert(0, f"the {named(limit)} is exhausted")
+    return parts if alone else [*parts, _together(unreachable, question)]
+
+
+def _needed(limit: PowerLimit, least: float) -> str:
+    needs = f"needs {named(limit)} >= {rounded_up(least)}"
+    if not limit.implied:
+        return f"{needs}, limit is {limit.bound:.6g}"
+    peak, sample = np.sqrt(limit.bound), limit.of_samples
+    return (
+        f"{needs}, so {sample} of {rounded_up(float(np.sqrt(least)))} at least; the limit, {sample} of "
+        f"{peak:.6g}, allows {limit.bound:.6g}"
+    )
+
+
+def _together(unreachable: UnreachableError, question: Question) -> str:
+    """Return what all upper limits would have to be; the square root of the factor if they bound samples."""
+    raised = [limit for limit in question.limits if limit.upper]
+    upper = {limit.key: limit.implied for limit in raised}
+    densities = [density.key for density in question.densities if density.upper]
+    # The optimum of the goal "factor" meets the accuracy if limits and densities are multiplied by it.
+    factor = unreachable.nearest.objective if densities else needed_factor(unreachable, raised)
+    if factor is None:
+        return "no change of the upper limits is enough"
+    times = f"would have to be {rounded_up(factor)} times as large"
+    if not upper:
+        return f"limits.spectrum {times}"
+    if any(upper.values()):
+        own = {key: float(np.sqrt(factor)) if implied else factor for key, implied in upper.items()}
+        own |= dict.fromkeys(densities, factor)
+        listed = " and ".join(f"{key} {rounded_up(each)} times" for key, each in own.items())
+        times = f"would have to be as large as a spectrum needs, {listed}, and larger for a record"
+    return f"no change of a single limit is enough; all of them together {times}"
+
+
+def _within_reach_of_any(question: Question) -> bool:
+    """Whether some spectrum of another type meets what this type cannot (densities are left out)."""
+    if question.densities or question.basis.free:
+        return False
+    experiment = question.experiment
+    anything = LinesBasis.anywhere(*experiment.band, experiment.inputs)
+    try:
+        solve_design(replace(question, basis=anything), tolerance=_TOLERANCE)
+    except (UnreachableError, np.linalg.LinAlgError):
+        return False
+    return True
+
+
+def contradictory(limits: Sequence[PowerLimit], why: str) -> InfeasibleError:
+    """Return the error that no spectrum keeps to these limits, whatever is asked."""
+    names = ", ".join(dict.fromkeys(limit.key for limit in limits)) or "limits.spectrum"
+    key = limits[0].key if limits else "limits"
+    return InfeasibleError.because(
+        "contradictory-limits", f"{names} {why}", "lower min of these limits, or raise max", key
+    )
+
+
+def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -> float | None:
+    """Return the least factor on these limits together that allows the accuracy; None if none does.
+
+    The multipliers of the limits are the slope of the square of the best ratio: Newton's method, in
+    logarithms, between values that are proved too small and values that are known to do. Information of noise
+    or of a prior does not grow with the powers: the square of the ratio is not the factor.
+    """
+    stated = unreachable.problem.limits
+    bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}
+    places, found = list(bounds), unreachable.nearest
+    low, high, at = 1.0, np.inf, 1.0
+    for _ in range(_STEPS):
+        share = float(found.certificate.limits[places] @ np.array(list(bounds.values()))) * at
+        if found.certificate.bound > 1.0 + _EXACT:
+            low = at
+            if share < _NO_SHARE or low > _MOST:
+                return None
+            step = min(np.log(found.certificate.bound) / share, np.log(_LONGEST_STEP))
+            at = low * float(np.exp(step))
+        elif found.objective < 1.0 - _EXACT:
+            high = at
+        else:
+            return at
+        if high - low <= _EXACT * low:
+            return low
+        if at >= high:
+            at = float(np.sqrt(low * high))
+        problem = _raised(unreachable.problem.on(found.basis), bounds, at)
+        found = exchange(
+            problem,
+            found.x,
+            tolerance=0.3 * _EXACT,
+            interior=_padded(unreachable.within, problem.basis.size),
+            enough=lambda objective, _: objective < 1.0 - 1e-3,
+        )
+    return low if np.isfinite(high) else None
+
+
+def _raised(problem: Problem, bounds: Mapping[int, float], factor: float) -> Problem:
+    limits = list(problem.limits)
+    for index, bound in bounds.items():
+        limits[index] = replace(limits[index], bound=factor * bound)
+    return replace(problem, limits=tuple(limits), finer=None)
+
+
+def _padded(x: Array | None, size: int) -> Array | None:
+    return None if x is None else np.pad(x, (0, size - x.size))
