@@ -215,7 +215,7 @@ def _parametric(
         lower_bound=lines.lower_bound,
         noise_part=0.0,
         information=lines.information,
-        powers=lines.powers,
+        powers=np.einsum("pkab,kba->p", problem.metrics(lines.frequencies), lines.spectrum).real,
         multipliers=None,
         scale=1.0,
         white=WhiteInput(level, criterion.value(information), information),
