@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
-from inputdesign_cli.information.noise import told_by_noise
 from inputdesign_cli.information.products import WeightedProducts
-from inputdesign_cli.information.quadrature import Quadrature, band_quadrature
+from inputdesign_cli.information.quadrature import Quadrature, Values, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
@@ -48,7 +47,7 @@ class Experiment(Coordinates):
     factor: Array | None = None
     loop: Loop | None = None
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Number of inputs r."""
         return self.model.inputs
@@ -270,3 +269,21 @@ def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
     row = response[..., channel : channel + 1, :]
     largest = np.abs(response).max(axis=(-3, -2, -1), keepdims=True, initial=0.0)
     return np.where(np.abs(row) > _NOTHING * largest, row, 0.0)
+
+
+def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
+    """Return the information (S, k, k) of a sample of each of S plants without any excitation.
+
+    Args:
+        gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.
+        singularities: of all of them.
+    """
+
+    def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
+        weighted = np.moveaxis(values, 0, -1) * np.sqrt(rule.weights)
+        flat = weighted.reshape(*weighted.shape[:2], -1)
+        rows = np.concatenate([flat.real, flat.imag], axis=2)
+        return np.asarray(rows @ rows.swapaxes(1, 2))
+
+    # Sums of a few hundred nodes, added up, round less than one of them all.
+    return integrate(gradients, sums, singularities, several=True)

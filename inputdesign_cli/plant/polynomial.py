@@ -32,11 +32,6 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
     return q
 
 
-def power(q: ComplexArray, exponent: int) -> ComplexArray:
-    """`q` to a whole power; by far the most parameters are first or second coefficients."""
-    return q if exponent == 1 else q**exponent
-
-
 def frequencies_last(*shape: int) -> ComplexArray:
     """Zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
     return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))

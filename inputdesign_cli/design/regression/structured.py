@@ -10,10 +10,17 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import finishing, seconds_left
-from inputdesign_cli.design.regression.alternating import alternate
 from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
-from inputdesign_cli.design.regression.local import STEP_TOLERANCE, Counter, Goal, best, descend, starts
+from inputdesign_cli.design.regression.local import (
+    STEP_TOLERANCE,
+    Counter,
+    Goal,
+    alternate,
+    best,
+    descend,
+    starts,
+)
 from inputdesign_cli.design.regression.model import ErrorSplit, Regression
 from inputdesign_cli.design.regression.steps import Region, all_shapes, extend
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight

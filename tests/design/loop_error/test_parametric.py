@@ -11,7 +11,7 @@ from inputdesign_cli.design.loop_error import (
     PowerLimit,
 )
 from inputdesign_cli.design.loop_error.laws import sensitivity
-from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
+from inputdesign_cli.design.loop_error.parametric import error_eigenvalues, root_moments
 from inputdesign_cli.plant import Rational, TransferMatrix
 from tests.support.loop_error import column, matrix_plant, random_hermitian, random_plant
 
