@@ -9,7 +9,7 @@ from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.laws import complement
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.plant import TransferMatrix
-from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, multiply
 from inputdesign_cli.plant.transfer import product_of
 
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.loop_error.closed_form import adjoint
 from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
-from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter

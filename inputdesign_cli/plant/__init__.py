@@ -15,7 +15,7 @@ from inputdesign_cli.plant.frequencies import (
     local_maxima as local_maxima,
     logarithmic_distance as logarithmic_distance,
 )
-from inputdesign_cli.plant.intersample import Intersample as Intersample
+from inputdesign_cli.plant.held import Intersample as Intersample
 from inputdesign_cli.plant.loop import (
     Loop as Loop,
     close_loop as close_loop,

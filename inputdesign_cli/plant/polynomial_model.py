@@ -29,8 +29,15 @@ from inputdesign_cli.plant.model import (
     row_parameters,
     tables_at,
 )
-from inputdesign_cli.plant.polynomial import evaluate, frequencies_last, join_roots, roots_in_z, unit_circle
-from inputdesign_cli.plant.polynomial_matrix import at, stack
+from inputdesign_cli.plant.polynomial import (
+    at,
+    evaluate,
+    frequencies_last,
+    join_roots,
+    roots_in_z,
+    stack,
+    unit_circle,
+)
 from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix, product_of
 
 

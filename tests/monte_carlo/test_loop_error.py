@@ -12,7 +12,7 @@ from inputdesign_cli.identification.least_squares import estimated_polynomials, 
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.plant import Rational, TransferMatrix
-from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial import determinant_and_adjugate, multiply
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.periodic import harmonics
 from tests.support.loop_error import column, matrix_plant, random_plant

@@ -98,15 +98,22 @@ class Entries:
 
 
 class Cone(ABC):
-    """One block. `degree` is the number of its complementarity products; `curved` where S is not linear."""
+    """One block with slack S and multiplier Z, and the step dS and dZ of both.
+
+    `degree` is the number of its complementarity products; `curved` where S is not linear.
+    """
 
     degree: int
     curved = False
+    S: NDArray[np.float64]
+    Z: NDArray[np.float64]
+    dS: NDArray[np.float64]
+    dZ: NDArray[np.float64]
 
     @property
-    @abstractmethod
     def gap(self) -> float:
         """<S, Z>."""
+        return float(np.sum(self.S * self.Z))
 
     @abstractmethod
     def look(self, at: Array) -> float:
@@ -136,13 +143,14 @@ class Cone(ABC):
     def lengths(self) -> tuple[float, float]:
         """How far along dS and dZ the cone reaches, at most one."""
 
-    @abstractmethod
     def gap_after(self, up: float, down: float) -> float:
         """<S + up dS, Z + down dZ>."""
+        return float(np.sum((self.S + up * self.dS) * (self.Z + down * self.dZ)))
 
-    @abstractmethod
     def move(self, up: float, down: float) -> None:
         """Take the step."""
+        self.S = self.S + up * self.dS
+        self.Z = self.Z + down * self.dZ
 
     @abstractmethod
     def multipliers(self) -> list[Array]:
@@ -156,11 +164,6 @@ class Orthant(Cone):
         self.rows, self.offset, self.S, self.Z = rows, offset, slack, weight
         self.dS, self.dZ = np.zeros_like(slack), np.zeros_like(weight)
         self.degree = slack.size
-
-    @property
-    def gap(self) -> float:
-        """See `Cone`."""
-        return float(self.S @ self.Z)
 
     def look(self, at: Array) -> float:
         """See `Cone`."""
@@ -188,15 +191,6 @@ class Orthant(Cone):
     def lengths(self) -> tuple[float, float]:
         """See `Cone`."""
         return reach(self.S, self.dS), reach(self.Z, self.dZ)
-
-    def gap_after(self, up: float, down: float) -> float:
-        """See `Cone`."""
-        return float((self.S + up * self.dS) @ (self.Z + down * self.dZ))
-
-    def move(self, up: float, down: float) -> None:
-        """See `Cone`."""
-        self.S = self.S + up * self.dS
-        self.Z = self.Z + down * self.dZ
 
     def multipliers(self) -> list[Array]:
         """All in one."""
@@ -243,11 +237,6 @@ class Semidefinite(Cone):
         self.S, self.Z = slack * unit, weight * unit
         self.dS, self.dZ = np.zeros_like(self.S), np.zeros_like(self.Z)
 
-    @property
-    def gap(self) -> float:
-        """See `Cone`."""
-        return float(np.sum(self.S * self.Z))
-
     def factor(self) -> None:
         """Inverses of S and of the Cholesky factors."""
         self.root = np.linalg.inv(np.linalg.cholesky(self.S))
@@ -274,15 +263,6 @@ class Semidefinite(Cone):
         """See `Cone`."""
         up = furthest(self.root @ self.dS @ self.root.swapaxes(1, 2))
         return up, furthest(self.dual_root @ self.dZ @ self.dual_root.swapaxes(1, 2))
-
-    def gap_after(self, up: float, down: float) -> float:
-        """See `Cone`."""
-        return float(np.sum((self.S + up * self.dS) * (self.Z + down * self.dZ)))
-
-    def move(self, up: float, down: float) -> None:
-        """See `Cone`."""
-        self.S = self.S + up * self.dS
-        self.Z = self.Z + down * self.dZ
 
     def multipliers(self) -> list[Array]:
         """Z, one matrix each."""

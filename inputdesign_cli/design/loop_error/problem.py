@@ -12,12 +12,16 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex import limits as convex
-from inputdesign_cli.design.loop_error.closed_form import best_spectrum, power_of
+from inputdesign_cli.design.loop_error.closed_form import (
+    adjoint,
+    best_spectrum,
+    power_of,
+    weight as weight_from,
+)
 from inputdesign_cli.design.loop_error.laws import ControlLaw, kronecker, propagation, sensitivity
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
 from inputdesign_cli.design.loop_error.parametric import LineDesign, ParametricCriterion, least_error
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
-from inputdesign_cli.design.loop_error.weight import adjoint, weight as weight_from
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import logarithmic_distance
