@@ -31,9 +31,8 @@ from inputdesign_cli.design.loop_error import (
     design_loop_error,
     design_within,
 )
-from inputdesign_cli.design.loop_error.closed_form import power_of
+from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of, weight
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
-from inputdesign_cli.design.loop_error.weight import adjoint, weight
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.questions.loop_error.build import build_loop_error_task

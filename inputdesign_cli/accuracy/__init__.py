@@ -9,7 +9,11 @@ from inputdesign_cli.accuracy.admissible import (
     Table as Table,
     Weighted as Weighted,
 )
-from inputdesign_cli.accuracy.criteria import Criterion as Criterion, criterion_of as criterion_of
+from inputdesign_cli.accuracy.criteria import (
+    Criterion as Criterion,
+    InformationTarget as InformationTarget,
+    criterion_of as criterion_of,
+)
 from inputdesign_cli.accuracy.cut import (
     ConcaveFunction as ConcaveFunction,
     Cut as Cut,
@@ -19,7 +23,6 @@ from inputdesign_cli.accuracy.cut import (
 )
 from inputdesign_cli.accuracy.cuts import MatrixCut as MatrixCut
 from inputdesign_cli.accuracy.ellipsoid import EllipsoidError as EllipsoidError
-from inputdesign_cli.accuracy.information_target import InformationTarget as InformationTarget
 from inputdesign_cli.accuracy.model_error import (
     ModelError as ModelError,
     OnModelError as OnModelError,

@@ -1,4 +1,4 @@
-"""The classical criteria as requirements: D, A, E and T of the information matrix reach the level one.
+"""Requirements on the information matrix as a whole: it exceeds another, or D, A, E or T reach the level one.
 
 The best criterion within limits and the least multiple of the limits at which the criterion reaches one
 are the same problem, since all four grow in proportion when M does (in the forms below).
@@ -19,8 +19,36 @@ import scipy
 
 from inputdesign_cli.accuracy.cut import Cut
 from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut
-from inputdesign_cli.accuracy.requirement import OneCondition, Requirement
+from inputdesign_cli.accuracy.requirement import OneCondition, Requirement, inverse_factor
 from inputdesign_cli.arrays import Array
+
+
+@dataclass(frozen=True)
+class InformationTarget(OneCondition):
+    """M >= `target` (k, k, symmetric), in the coordinates of the experiment.
+
+    This covers `information` itself, the standard deviation s of a parameter (e e^T / s^2) and
+    application-oriented accuracy, (chi2 gamma / 2) V'': then the confidence ellipsoid lies where the cost of
+    the application, to second order, is below 1 / gamma ([annergren-larsson-2016]).
+    """
+
+    target: Array
+    label: str = "information"
+
+    @property
+    def name(self) -> str:
+        """`information`, `application` or `standard_deviation of` a parameter."""
+        return self.label
+
+    def ratio(self, information: Array) -> float:
+        """sqrt of the largest eigenvalue of the target relative to M."""
+        K = inverse_factor(information)
+        return float(np.sqrt(max(np.linalg.eigvalsh(K @ self.target @ K.T)[-1], 0.0)))
+
+    def cut(self, frequency: float | None) -> MatrixCut:
+        """The requirement itself."""
+        return MatrixCut(self.target)
+
 
 Letter = Literal["D", "A", "E", "T"]
 

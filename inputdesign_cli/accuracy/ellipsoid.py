@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.ellipsoid_cut import EllipsoidCut
+from inputdesign_cli.accuracy.cuts import EllipsoidCut
 from inputdesign_cli.accuracy.model_error import OnModelError
 from inputdesign_cli.accuracy.over_frequency import real_rows
 from inputdesign_cli.arrays import Array, ComplexArray

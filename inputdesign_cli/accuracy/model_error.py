@@ -61,10 +61,6 @@ class ModelError(OnModelError):
         """(n, q, k): V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T."""
         return self.plant_rows(w) * (self.alpha / self.admissible.at(w))[:, None, None]
 
-    def measure(self, half: NDArray[np.float64], w: Array) -> Array:
-        """r_u / r_adm."""
-        return largest_singular(half)
-
     def cut(self, frequency: float | None) -> MatrixCut:
         """M >= R_adm at this frequency."""
         rows = self.rows(np.array([frequency]))[0]

@@ -47,7 +47,7 @@ class OverFrequency(Requirement):
     """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
 
     It is about one `entry` of G, or about all of them together; `band` is in the unit of the experiment.
-    Subclasses give `rows` and `measure`, and the points of the frequency plane near which they change
+    Subclasses give `rows`, often `measure`, and the points of the frequency plane near which they change
     fast (`own_singularities`) or have a kink (`knots`).
     """
 
@@ -74,9 +74,9 @@ class OverFrequency(Requirement):
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, q, k): T(w)."""
 
-    @abstractmethod
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
-        """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1."""
+        """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm unless it is another."""
+        return largest_singular(half)
 
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """Real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k)."""

@@ -12,11 +12,12 @@ from typing import Literal
 import clarabel
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.spectrum import svec_length
+from inputdesign_cli.spectrum import svec, svec_length
 
 ConeKind = Literal["zero", "nonnegative", "psd", "exponential"]
 
@@ -33,6 +34,12 @@ class Block:
     matrix: sp.csc_matrix
     offset: Array
     order: int = 0
+
+    @classmethod
+    def of(cls, kind: ConeKind, parts: NDArray[np.float64]) -> Block:
+        """parts[0] + sum_i x_i parts[i + 1] in the cone: (1 + n, d, d) for "psd", else (1 + n, rows)."""
+        rows = svec(parts) if kind == "psd" else parts
+        return cls(kind, sp.csc_matrix(rows[1:].T), rows[0], parts.shape[1] if kind == "psd" else 0)
 
     def __post_init__(self) -> None:
         if self.kind == "psd" and self.offset.size != svec_length(self.order):

@@ -5,6 +5,7 @@ from inputdesign_cli.information.experiment import (
     POWER_KINDS as POWER_KINDS,
     Experiment as Experiment,
     PowerKind as PowerKind,
+    WeightedProducts as WeightedProducts,
 )
 from inputdesign_cli.information.finite_record import (
     FiniteRecord as FiniteRecord,
@@ -16,7 +17,6 @@ from inputdesign_cli.information.joint import (
     jointly_whitened as jointly_whitened,
     mean_cost as mean_cost,
 )
-from inputdesign_cli.information.products import WeightedProducts as WeightedProducts
 from inputdesign_cli.information.quadrature import (
     Quadrature as Quadrature,
     Values as Values,

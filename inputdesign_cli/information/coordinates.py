@@ -36,7 +36,7 @@ class Coordinates:
         def model(self) -> Model:
             """What is to be identified."""
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of parameters k."""
         return len(self.model.names)

@@ -8,6 +8,7 @@ Criteria do not depend on the measure, as long as powers and information share i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -17,10 +18,57 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
-from inputdesign_cli.information.noise import told_by_noise
-from inputdesign_cli.information.products import WeightedProducts
-from inputdesign_cli.information.quadrature import Quadrature, band_quadrature
+from inputdesign_cli.information.quadrature import Quadrature, Values, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
+
+_AT_ONCE = 256
+_ROUNDING = 1e-15  # shares of the largest gradient of an output
+
+
+@dataclass(frozen=True)
+class WeightedProducts:
+    """In parts of the frequencies, by output: the parameters (c,) that matter to it, and F^T (n, r, c)."""
+
+    parts: list[list[tuple[NDArray[np.intp], ComplexArray]]]
+
+    @classmethod
+    def of(cls, gradient: Callable[[Array], ComplexArray], w: Array) -> WeightedProducts:
+        """Build the products of F = `gradient` (n, k, p, r) at frequencies `w`."""
+        return cls(
+            [
+                _by_output(gradient(w[start : start + _AT_ONCE]))
+                for start in range(0, max(w.size, 1), _AT_ONCE)
+            ]
+        )
+
+    def at(self, weight: Array) -> ComplexArray:
+        """(n, r, r): sum over outputs of F^* Y F, Y = `weight` (k, k) symmetric."""
+        return np.concatenate([_summed(part, weight) for part in self.parts])
+
+
+def _by_output(F: ComplexArray) -> list[tuple[NDArray[np.intp], ComplexArray]]:
+    found: list[tuple[NDArray[np.intp], ComplexArray]] = []
+    if F.shape[2] == 1:  # all parameters matter to the only output
+        return [(np.arange(F.shape[1]), np.ascontiguousarray(F[:, :, 0].swapaxes(1, 2)))]
+    for output in range(F.shape[2]):
+        rows = F[:, :, output]
+        size = np.abs(rows).max(axis=(0, 2), initial=0.0)
+        used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
+        found.append((used, np.ascontiguousarray(rows[:, used].swapaxes(1, 2))))
+    return found
+
+
+def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array) -> ComplexArray:
+    n, r, _ = outputs[0][1].shape
+    total = np.zeros((n, r, r), dtype=complex)
+    for used, rows in outputs:
+        turned = rows @ (weight if used.size == len(weight) else weight[np.ix_(used, used)])
+        if r == 1:
+            total[:, 0, 0] += np.einsum("nk,nk->n", rows[:, 0].conj(), turned[:, 0])
+        else:
+            total += rows.conj() @ turned.swapaxes(1, 2)
+    return total
+
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
@@ -48,7 +96,7 @@ class Experiment(Coordinates):
     factor: Array | None = None
     loop: Loop | None = None
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Number of inputs r."""
         return self.model.inputs
@@ -270,3 +318,21 @@ def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
     row = response[..., channel : channel + 1, :]
     largest = np.abs(response).max(axis=(-3, -2, -1), keepdims=True, initial=0.0)
     return np.where(np.abs(row) > _NOTHING * largest, row, 0.0)
+
+
+def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
+    """Return the information (S, k, k) of a sample of each of S plants without any excitation.
+
+    Args:
+        gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.
+        singularities: of all of them.
+    """
+
+    def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
+        weighted = np.moveaxis(values, 0, -1) * np.sqrt(rule.weights)
+        flat = weighted.reshape(*weighted.shape[:2], -1)
+        rows = np.concatenate([flat.real, flat.imag], axis=2)
+        return np.asarray(rows @ rows.swapaxes(1, 2))
+
+    # Sums of a few hundred nodes, added up, round less than one of them all.
+    return integrate(gradients, sums, singularities, several=True)

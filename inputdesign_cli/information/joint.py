@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
-from inputdesign_cli.information.noise import told_by_noise
+from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel, told_by_noise
 from inputdesign_cli.plant import (
     disturbance_gradients,
     excitation_gradients,

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.loop_error.closed_form import adjoint
 from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.laws import complement
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
-from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, multiply
 from inputdesign_cli.plant.transfer import product_of
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise

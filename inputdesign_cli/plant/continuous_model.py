@@ -15,8 +15,7 @@ from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray, Rows
-from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
-from inputdesign_cli.plant.intersample import Intersample
+from inputdesign_cli.plant.held import HeldEntry, Intersample, polynomial_roots
 from inputdesign_cli.plant.model import (
     DELAY,
     Fraction,

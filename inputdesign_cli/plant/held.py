@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 from numpy.polynomial import polynomial as ascending
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.model import DELAY
@@ -305,3 +306,39 @@ def polynomial_roots(coefficients: Array) -> ComplexArray:
     zeros = np.trim_zeros(coefficients, "b").size - trimmed.size
     others = ascending.polyroots(trimmed) if trimmed.size else trimmed
     return np.concatenate([np.zeros(zeros), others]).astype(complex)
+
+
+# Rounding grows by e to this power over a record.
+_DECAY = 4.0
+
+
+@dataclass(frozen=True)
+class Intersample:
+    """Instants `sample_time` apart between which signals are held (`hold`), or band-limited."""
+
+    sample_time: float
+    hold: bool
+
+    def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
+        """The columns (.., N, columns) of an entry that samples (.., N) drive from rest.
+
+        Measured outputs are never held, whatever the input is.
+        """
+        samples = signal.shape[-1]
+        length = 2 * scipy.fft.next_fast_len(samples, real=True)
+        angles = 2.0 * np.pi * np.arange(length // 2 + 1) / length
+        if not integrators(entry.denominator):
+            weights, w = np.ones(samples), angles.astype(complex)
+        else:  # they have no response at zero: signals are weighted with e^(-rho t)
+            decay = _DECAY / samples
+            weights, w = np.exp(-decay * np.arange(samples)), angles - 1j * decay
+        z = np.exp(1j * w)
+        columns = entry.responses(z) if hold else entry.interpolated(w / self.sample_time)
+        columns = entry.forgetting(columns, z, samples)
+        transform = scipy.fft.rfft(signal * weights, length, axis=-1)
+        driven = scipy.fft.irfft(transform[..., None] * columns, length, axis=-2)
+        return np.asarray(driven[..., :samples, :] / weights[:, None])
+
+    def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
+        """The output (.., N) of an entry that samples u (.., N) drive."""
+        return np.asarray(self.responses(entry, u, hold=self.hold) @ entry.gain)

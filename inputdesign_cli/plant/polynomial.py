@@ -1,13 +1,13 @@
-"""Polynomials in the delay operator q^-1, coefficients ascending."""
+"""Polynomials in the delay operator q^-1, coefficients ascending, and matrices (rows, columns, l) of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.arrays import ComplexArray
+from inputdesign_cli.arrays import Array, ComplexArray
 
 _latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
 _WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared
@@ -30,11 +30,6 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
     q.setflags(write=False)
     _latest[0] = (at.copy(), q)
     return q
-
-
-def power(q: ComplexArray, exponent: int) -> ComplexArray:
-    """`q` to a whole power; by far the most parameters are first or second coefficients."""
-    return q if exponent == 1 else q**exponent
 
 
 def frequencies_last(*shape: int) -> ComplexArray:
@@ -88,3 +83,78 @@ def join_roots(parts: Iterable[ComplexArray]) -> ComplexArray:
     """All roots of several polynomials in one array."""
     listed = [np.asarray(p, dtype=complex) for p in parts]
     return np.concatenate(listed) if listed else np.zeros(0, dtype=complex)
+
+
+# A coefficient this small beside the largest one is rounding of the transforms below.
+_ROUNDING = 1e-13
+
+
+def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
+    """Rows of columns of coefficient lists as one array (rows, columns, longest)."""
+    longest = max(len(p) for row in entries for p in row)
+    full = np.zeros((len(entries), len(entries[0]), longest))
+    for i, row in enumerate(entries):
+        for j, polynomial in enumerate(row):
+            full[i, j, : len(polynomial)] = polynomial
+    return full
+
+
+def at(matrix: Array, q: ComplexArray) -> ComplexArray:
+    """Return the values (.., K, rows, columns) of (.., rows, columns, l) at `q` (K,), which stands for q^-1.
+
+    In memory the values of an entry stand side by side.
+    """
+    value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
+    value[:] = matrix[..., -1:]
+    for lag in range(matrix.shape[-1] - 2, -1, -1):
+        value *= q
+        value.real += matrix[..., lag, None]
+    *leading, rows, columns, last = range(value.ndim)
+    return value.transpose(*leading, last, rows, columns)
+
+
+def multiply(left: Array, right: Array) -> Array:
+    """The product of two matrices of polynomials (.., a, b, l) and (.., b, c, m)."""
+    size = left.shape[-1] + right.shape[-1] - 1
+    shape = np.broadcast_shapes(left.shape[:-3], right.shape[:-3])
+    product = np.zeros((*shape, left.shape[-3], right.shape[-2], size))
+    # Coefficient by coefficient, so that zeros stay zeros: they are delays.
+    for lag in range(left.shape[-1]):
+        part = np.einsum("...ab,...bcm->...acm", left[..., lag], right)
+        product[..., lag : lag + right.shape[-1]] += part
+    return product
+
+
+def determinant_and_adjugate(matrix: Array) -> tuple[Array, Array]:
+    """det (.., l) and adj (.., n, n, l) of square matrices of polynomials, by interpolation on the circle.
+
+    The entries of the adjugate are minors, so no entry is divided by a determinant that may vanish.
+    """
+    n = matrix.shape[-2]
+    size = n * (matrix.shape[-1] - 1) + 1
+    values = np.moveaxis(np.fft.fft(matrix, size), -1, -3)
+    det = np.fft.ifft(np.linalg.det(values), axis=-1).real
+    minors = np.empty_like(values)
+    for i in range(n):
+        for j in range(n):
+            rest = np.delete(np.delete(values, i, axis=-2), j, axis=-1)
+            minors[..., j, i] = (-1) ** (i + j) * (np.linalg.det(rest) if n > 1 else 1.0)
+    adj = np.fft.ifft(np.moveaxis(minors, -3, -1), axis=-1).real
+    rows = np.abs(matrix).sum(axis=(-2, -1))
+    largest = np.prod(rows, axis=-1)
+    others = np.prod(rows, axis=-1, keepdims=True) / np.where(rows > 0, rows, 1.0)
+    return _rounded(det, largest[..., None]), _rounded(adj, others[..., None, :, None])
+
+
+def _rounded(coefficients: Array, scale: Array) -> Array:
+    """The coefficients with rounding of the transforms set to zero: zeros mean delays, or no inverse.
+
+    `scale` bounds what they could be, the product of the sums of the rows that enter.
+    """
+    return np.where(np.abs(coefficients) > _ROUNDING * scale, coefficients, 0.0)
+
+
+def delay_of(coefficients: Array) -> int:
+    """The number of leading coefficients that vanish in every entry; of a zero polynomial, all."""
+    nonzero = np.flatnonzero(np.any(coefficients.reshape(-1, coefficients.shape[-1]) != 0, axis=0))
+    return int(nonzero[0]) if nonzero.size else coefficients.shape[-1]

@@ -5,7 +5,7 @@ B and F are matrices of polynomials, an entry for each output and input.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -30,14 +30,14 @@ from inputdesign_cli.plant.model import (
     tables_at,
 )
 from inputdesign_cli.plant.polynomial import (
+    at,
     evaluate,
     frequencies_last,
     join_roots,
-    power,
     roots_in_z,
+    stack,
     unit_circle,
 )
-from inputdesign_cli.plant.polynomial_matrix import at, stack
 from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix, product_of
 
 
@@ -79,12 +79,12 @@ class PolynomialModel(Parametrised):
         a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
         return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
 
-    @property
+    @cached_property
     def outputs(self) -> int:
         """Number of outputs p."""
         return len(self.B)
 
-    @property
+    @cached_property
     def inputs(self) -> int:
         """Number of inputs r."""
         return len(self.B[0])
@@ -198,7 +198,8 @@ class PolynomialModel(Parametrised):
         q = unit_circle(w)
         G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
-            G[:, i, j] = evaluate(self.B[i][j], q) / self._denominator(q, i, j)
+            A, B, F = self._entry(q, i, j)
+            G[:, i, j] = B / (A * F)
         return G
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
@@ -224,26 +225,35 @@ class PolynomialModel(Parametrised):
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf" and (output, input) in parameter.places:
                 gradient = above if parameter.letter == "b" else below
-                gradient[:, index] = power(q, parameter.power)
-        numerator = evaluate(self.B[output][input], q)
-        return Fraction(numerator, self._denominator(q, output, input), above, below)
+                gradient[:, index] = q**parameter.power
+        A, B, F = self._entry(q, output, input)
+        return Fraction(B, A * F, above, below)
 
-    def _denominator(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
-        return evaluate(self.row(self.A, i), q) * evaluate(self.F[i][j], q)
+    def _entry(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
+        """(3, n): A_i, B_ij and F_ij."""
+        return evaluate(stack([[self.row(self.A, i), self.B[i][j], self.F[i][j]]])[0], q)
+
+    def _shifts(self, q: ComplexArray) -> list[ComplexArray]:
+        """The powers of q up to the highest of a parameter."""
+        found = [np.ones_like(q), q]
+        for _ in range(max((parameter.power for parameter in self.parameters), default=0) - 1):
+            found.append(found[-1] * q)
+        return found
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
         q = unit_circle(w)
         gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
+        shifts = self._shifts(q)
         for i, j in self.active:
-            A, B, F = (evaluate(p, q) for p in (self.row(self.A, i), self.B[i][j], self.F[i][j]))
+            A, B, F = self._entry(q, i, j)
             AF = A * F
             factors["b", i, j] = 1.0 / AF
             factors |= {(x, i, j): -B / (own * AF) for x, own in (("a", A), ("f", F)) if x in self.letters}
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf":
-                shift = power(q, parameter.power)
+                shift = shifts[parameter.power]
                 for i, j in parameter.places:
                     if (parameter.letter, i, j) in factors:
                         gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
@@ -371,14 +381,14 @@ def _gradients(
     first, q = models[0], unit_circle(w)
     gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)
 
-    def values(polynomials: Iterable[Array]) -> ComplexArray:
-        coefficients = np.array(list(polynomials))
-        if coefficients.shape[1] == 1:  # the same at every frequency: (S, 1, 1)
-            return coefficients[:, None].astype(complex)
-        return evaluate(coefficients, q)[:, None]
-
-    C = [values(m.per_output(m.C)[i] for m in models) for i in range(first.outputs)]
-    D = [values(m.per_output(m.D)[i] for m in models) for i in range(first.outputs)]
+    active = first.active if u is not None else ()
+    wanted = {("c", i, 0): [m.row(m.C, i) for m in models] for i in range(first.outputs)}
+    wanted |= {("d", i, 0): [m.row(m.D, i) for m in models] for i in range(first.outputs)}
+    wanted |= {("f", i, j): [m.F[i][j] for m in models] for i, j in active}
+    if "f" in first.letters:
+        wanted |= {("b", i, j): [m.B[i][j] for m in models] for i, j in active}
+    at_q = _values(wanted, q)
+    C, D = ([at_q[letter, i, 0] for i in range(first.outputs)] for letter in "cd")
     y, u, e = (x if x is None else x.transpose(0, 2, 3, 1) for x in (y, u, e))
     noise: dict[tuple[str, int], ComplexArray] = {}
     for i in range(first.outputs):
@@ -389,21 +399,36 @@ def _gradients(
         if e is not None and "d" in first.letters:
             noise["d", i] = -e[:, i] / D[i]
     plant: dict[tuple[str, int, int], ComplexArray] = {}
-    for i, j in first.active:
-        if u is None:
-            break
-        F = values(m.F[i][j] for m in models)
+    for i, j in active:
+        assert u is not None
+        F = at_q["f", i, j]
         filtered = D[i] / (C[i] * F)
         plant["b", i, j] = filtered * u[:, j]
         if "f" in first.letters:
-            plant["f", i, j] = (-filtered * values(m.B[i][j] for m in models) / F) * u[:, j]
+            plant["f", i, j] = (-filtered * at_q["b", i, j] / F) * u[:, j]
+    shifts = first._shifts(q)
     for index, parameter in enumerate(first.parameters):
         if parameter.letter in "bf":
             i, j = parameter.places[0]
             if (parameter.letter, i, j) in plant:
-                gradient[:, index, i] = power(q, parameter.power) * plant[parameter.letter, i, j]
+                gradient[:, index, i] = shifts[parameter.power] * plant[parameter.letter, i, j]
             continue
         for i in {place[0] for place in parameter.places}:
             if (parameter.letter, i) in noise:
-                gradient[:, index, i] = power(q, parameter.power) * noise[parameter.letter, i]
+                gradient[:, index, i] = shifts[parameter.power] * noise[parameter.letter, i]
     return gradient.transpose(0, 4, 1, 2, 3)
+
+
+def _values(
+    polynomials: dict[tuple[str, int, int], list[Array]], q: ComplexArray
+) -> dict[tuple[str, int, int], ComplexArray]:
+    """Return values (S, 1, n) at `q` of polynomials of S models each; of constants (S, 1, 1)."""
+    tables = {key: np.array(one) for key, one in polynomials.items()}
+    found = {key: one[:, None].astype(complex) for key, one in tables.items() if one.shape[1] == 1}
+    varying = [key for key, one in tables.items() if one.shape[1] > 1]
+    if varying:
+        longest = max(tables[key].shape[1] for key in varying)
+        rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
+        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), -1, 1, q.size)
+        found |= dict(zip(varying, at_q, strict=True))
+    return found

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.held import HeldEntry, integrators
-from inputdesign_cli.plant.intersample import Intersample
+from inputdesign_cli.plant.held import HeldEntry, Intersample, integrators
 from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, WhiteNoise
 from inputdesign_cli.plant.transfer import StateSpace
 

@@ -19,8 +19,15 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import evaluate, join_roots, roots_in_z, unit_circle
-from inputdesign_cli.plant.polynomial_matrix import at, delay_of, stack
+from inputdesign_cli.plant.polynomial import (
+    at,
+    delay_of,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    stack,
+    unit_circle,
+)
 
 Coefficients = Sequence[float] | Array
 
@@ -42,10 +49,11 @@ class ScalarTransfer(Protocol):
     @property
     def singularities(self) -> ComplexArray:
         """Both."""
+        return np.concatenate([self.zero_points, self.pole_points])
 
 
 @dataclass(frozen=True)
-class Rational:
+class Rational(ScalarTransfer):
     """numerator / (product of the denominator factors), all in q^-1, ascending."""
 
     numerator: Array
@@ -84,11 +92,6 @@ class Rational:
         """Zeros as points of the frequency plane."""
         return logarithmic_distance(self.zeros)
 
-    @property
-    def singularities(self) -> ComplexArray:
-        """Poles and zeros as points of the frequency plane."""
-        return logarithmic_distance(join_roots([self.poles, self.zeros]))
-
     @cached_property
     def denominator_polynomial(self) -> Array:
         """The denominator factors multiplied out."""
@@ -96,7 +99,7 @@ class Rational:
 
 
 @dataclass(frozen=True)
-class ContinuousRational:
+class ContinuousRational(ScalarTransfer):
     """numerator / denominator in s, coefficients in descending powers."""
 
     numerator: Array
@@ -116,11 +119,6 @@ class ContinuousRational:
     def zero_points(self) -> ComplexArray:
         """Zeros as points of the frequency plane."""
         return _in_the_plane(self.numerator)
-
-    @property
-    def singularities(self) -> ComplexArray:
-        """Poles and zeros as points of the frequency plane."""
-        return np.concatenate([self.zero_points, self.pole_points])
 
 
 def _in_the_plane(polynomial: Array) -> ComplexArray:

@@ -64,13 +64,7 @@ def kept_on_grid(density: Callable[[Array], NDArray]) -> Callable[[Array], NDArr
 def weighted_mean(functionals: Sequence[Functional], weights: Array) -> Functional:
     """Return sum_i w_i f_i over nonzero weights, `weights` (n,) with the sum one."""
     parts = [(f, float(w)) for f, w in zip(functionals, weights, strict=True) if w != 0.0]
-    last: list[tuple[Array, NDArray]] = []
-
-    def density(w: Array) -> NDArray:
-        if not last or last[0][0] is not w:  # asked for again on the same grid
-            last[:] = [(w, np.asarray(sum(weight * f.density(w) for f, weight in parts)))]
-        return last[0][1]
-
+    density = kept_on_grid(lambda w: np.asarray(sum(weight * f.density(w) for f, weight in parts)))
     vector = np.asarray(sum(weight * f.vector for f, weight in parts))
     return Functional(vector, density, any(f.concentrated for f, _ in parts))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +33,7 @@ class FlatBasis(DensityFamily):
         """White noise of one input over the whole circle; otherwise there is none."""
         return x if self.inputs == 1 and self.band == (0.0, np.pi) else None
 
-    @property
+    @cached_property
     def level(self) -> float:
         """Each diagonal entry of Phi at power one."""
         return np.pi / ((self.band[1] - self.band[0]) * self.inputs)

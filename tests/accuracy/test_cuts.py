@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut
-from inputdesign_cli.accuracy.ellipsoid_cut import EllipsoidCut
+from inputdesign_cli.accuracy.cuts import DeterminantCut, EllipsoidCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.spectrum import svec, svec_length
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.information.products import WeightedProducts
+from inputdesign_cli.information.experiment import WeightedProducts
 
 
 @pytest.mark.parametrize("frequencies", [0, 1, 300])

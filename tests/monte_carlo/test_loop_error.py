@@ -11,7 +11,7 @@ from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.loop_error import error_filters, prefilter, study_losses
 from inputdesign_cli.plant import Rational, TransferMatrix
-from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial import determinant_and_adjugate, multiply
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.periodic import harmonics
 from tests.support.loop_error import column, matrix_plant, random_plant

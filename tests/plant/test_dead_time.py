@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.plant import ContinuousModel, SampledModel, TransferMatrix, close_loop
-from inputdesign_cli.plant.intersample import Intersample
+from inputdesign_cli.plant.held import Intersample
 from tests.support.plants import arrays, descending
 
 W = np.array([0.05, 0.4, 1.3, 2.9])

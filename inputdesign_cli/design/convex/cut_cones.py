@@ -6,8 +6,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ConcaveFunction, Inequality
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.design.convex.cones import Orthant, Semidefinite, furthest, reach
-from inputdesign_cli.design.convex.entries import Entries, Stack
+from inputdesign_cli.design.convex.cones import Entries, Orthant, Semidefinite, Stack, furthest, reach
 
 
 class Concave(Orthant):

@@ -16,11 +16,10 @@ from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, exc
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.coordinates import balanced_powers, suited, white_power, whitened_problem
 from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError
-from inputdesign_cli.design.convex.excitation import check_excites
-from inputdesign_cli.design.convex.faint_lines import without_faint_lines
-from inputdesign_cli.design.convex.limited import KEEPS, solve_limited
+from inputdesign_cli.design.convex.feasible import KEEPS, solve_limited
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 
 _ANY_SPECTRUM_TOLERANCE = 1e-6
@@ -176,3 +175,85 @@ def _nothing(problem: Problem) -> ExchangeResult:
         rounds=0,
         cuts=0,
     )
+
+
+_UNEXCITED = 1e-13
+_PLENTY = 1e9
+
+
+def check_excites(problem: Problem, start: Array) -> None:
+    """Raise `SpecError` (`too-few-lines`) when even all lines together leave parameters unexcited."""
+    if not problem.demands.definite:
+        return
+    eigenvalues, vectors = np.linalg.eigh(problem.information(start))
+    faint = eigenvalues <= _UNEXCITED * eigenvalues[-1]
+    if not faint.any():
+        _check_reachable(problem, start)
+        return
+    names = problem.experiment.unexcited(vectors[:, faint])
+    raise bad_spec(
+        "too-few-lines",
+        f"these lines cannot tell the parameters apart: nothing is learnt about {names}",
+        hint="each sinusoid tells at most two parameters apart (one at frequency 0 or pi): give more "
+        "frequencies, or use type: free",
+        key="spectrum",
+    )
+
+
+def _check_reachable(problem: Problem, start: Array) -> None:
+    """Raise `InfeasibleError` when no power of these lines is enough: they excite too few directions.
+
+    The noise alone then keeps the information matrix regular, but its part does not grow with power.
+    """
+    if problem.goal != "cost" or problem.basis.has_density:
+        return
+    excited = np.linalg.eigvalsh(problem.excited(start)[0])
+    if excited[0] > _UNEXCITED * excited[-1]:
+        return
+    try:
+        ratio = problem.demands.worst_ratio(problem.informations(_PLENTY * start)).ratio
+    except np.linalg.LinAlgError:
+        ratio = np.inf
+    if ratio > 1.0:
+        raise InfeasibleError.because(
+            "infeasible",
+            "no power of these lines reaches the accuracy: they excite only "
+            f"{int(np.sum(excited > _UNEXCITED * excited[-1]))} combinations of the "
+            f"{problem.experiment.size} parameters",
+            "each sinusoid tells at most two parameters apart: give more frequencies, or use type: free",
+            "spectrum",
+        )
+
+
+# Shares of the least eigenvalue of the information that lines may take with them.
+_ROUNDING, _FAINT = 1e-12, 1e-9
+
+
+def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:
+    """Return the design without the sinusoids that together hardly change its information.
+
+    The solver leaves a little power everywhere. Power alone does not show which lines can go. In a loop with
+    integral action, power near frequency zero costs almost nothing and far exceeds that of lines that matter.
+    If the cost is minimised, the other lines make up for the removed ones.
+    """
+    if found.basis.has_density or problem.has_floors or not found.x.any():
+        return found
+    at = problem.on(found.basis)
+    least = np.linalg.eigvalsh(found.informations)[:, 0]
+    if least.min() <= 0.0:
+        return found
+    samples = found.s if problem.goal == "samples" else 1.0  # of the information that was found
+    told = samples * found.x * np.max(np.linalg.norm(at.information_maps, axis=(2, 3)) / least, axis=1)
+    order = np.argsort(told)
+    lost = np.cumsum(told[order])
+    # Beside limits there is no room to make up for more than rounding.
+    tight = problem.scaled or problem.limits or problem.densities
+    faint = lost <= (_ROUNDING if tight else _FAINT)
+    if not np.any(faint):
+        return found
+    x = found.x.copy()
+    x[order[faint]] = 0.0
+    if problem.scaled:
+        return replace(found, x=x)
+    x *= 1.0 + 2.0 * lost[faint][-1]
+    return replace(found, x=x, objective=at.cost_at(x), informations=at.informations(x))

@@ -16,9 +16,8 @@ import scipy.sparse as sp
 from inputdesign_cli.accuracy import Cut
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.conic import Block, solve_conic
-from inputdesign_cli.design.convex.cones import Atoms, Cone, Gram, Orthant
+from inputdesign_cli.design.convex.cones import Atoms, Cone, Entries, Gram, Orthant
 from inputdesign_cli.design.convex.cut_cones import Concave, Inequalities
-from inputdesign_cli.design.convex.entries import Entries
 from inputdesign_cli.design.convex.interior import Seen, follow_path
 from inputdesign_cli.spectrum import Face, svec, svec_length
 

@@ -7,7 +7,7 @@ import numpy as np
 from inputdesign_cli.arrays import ComplexArray
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant.polynomial_matrix import at, delay_of, determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial import at, delay_of, determinant_and_adjugate, multiply
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 # A zero this close to the unit circle counts as on it.

@@ -9,10 +9,9 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.compute.time_limit import time_is_over
-from inputdesign_cli.design.loop_error.closed_form import error_of
+from inputdesign_cli.design.loop_error.closed_form import adjoint, error_of
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
-from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature
 
@@ -215,7 +214,7 @@ def _parametric(
         lower_bound=lines.lower_bound,
         noise_part=0.0,
         information=lines.information,
-        powers=lines.powers,
+        powers=np.einsum("pkab,kba->p", problem.metrics(lines.frequencies), lines.spectrum).real,
         multipliers=None,
         scale=1.0,
         white=WhiteInput(level, criterion.value(information), information),

@@ -27,8 +27,13 @@ from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.information.quadrature import Quadrature
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import join_roots, roots_in_z, unit_circle
-from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate
+from inputdesign_cli.plant.polynomial import (
+    delay_of,
+    determinant_and_adjugate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.loop_error.closed_form import eigen, error_of, power_of
-from inputdesign_cli.design.loop_error.weight import adjoint
+from inputdesign_cli.design.loop_error.closed_form import adjoint, eigen, error_of, power_of
 
 _MAX_STEPS = 200
 _SETTLED = 1e-13

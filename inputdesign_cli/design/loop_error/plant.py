@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.polynomial import roots_in_z
-from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, stack
+from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, roots_in_z, stack
 from inputdesign_cli.plant.polynomial_model import PolynomialModel
 from inputdesign_cli.plant.transfer import product_of
 

@@ -11,14 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.design.loop_error.closed_form import best_spectrum, power_of
+from inputdesign_cli.design.convex import limits as convex
+from inputdesign_cli.design.loop_error.closed_form import (
+    adjoint,
+    best_spectrum,
+    power_of,
+    weight as weight_from,
+)
 from inputdesign_cli.design.loop_error.laws import ControlLaw, kronecker, propagation, sensitivity
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
 from inputdesign_cli.design.loop_error.parametric import LineDesign, ParametricCriterion, least_error
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
-from inputdesign_cli.design.loop_error.weight import adjoint, weight as weight_from
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
-from inputdesign_cli.plant.frequencies import graded_grid, logarithmic_distance
+from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Model
 from inputdesign_cli.plant.transfer import Rational
 
@@ -184,6 +190,5 @@ class LoopErrorProblem:
 
     def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
         """The best input of the model structure among all spectra within the limits."""
-        lo, hi = self.band
-        grid = graded_grid(self.plant.singularities, lo, hi)
-        return least_error(criterion, self.metrics, self.most, grid, tolerance=tolerance)
+        limits = [convex.PowerLimit(one.kind, one.most, channel=one.channel) for one in self.limits]
+        return least_error(criterion, Experiment(self.structure, 1, self.band), limits, tolerance=tolerance)

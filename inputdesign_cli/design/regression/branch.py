@@ -72,7 +72,6 @@ class BranchAndBound:
         kappa: Callable[[], float],
         level: Callable[[], float],
         *,
-        largest_v: Callable[[], float],
         most_nodes: int,
         suggest: Callable[[Array], None] = lambda _: None,
     ) -> bool:
@@ -80,7 +79,7 @@ class BranchAndBound:
 
         kappa must not fall and may rise: a bound at one energy holds for every smaller one. `suggest` is
         given the autocorrelations of each relaxed optimum below the level; it may improve the incumbent,
-        and thereby kappa, level and `largest_v` (what a better shape has at most).
+        and thereby kappa and level. A better shape has v <= level / kappa.
         """
         while self.open and self.nodes < most_nodes:
             node = heapq.heappop(self.open)
@@ -92,7 +91,7 @@ class BranchAndBound:
             try:
                 for box in boxes:
                     if not _without_shapes(box):
-                        self._examine(node, box, kappa(), largest_v(), level, suggest)
+                        self._examine(node, box, kappa(), level, suggest)
             except OutOfTimeError:
                 heapq.heappush(self.open, node)  # with its halves not all examined, its own bound counts
                 break
@@ -103,10 +102,10 @@ class BranchAndBound:
         parent: Node,
         box: Box,
         kappa: float,
-        largest_v: float,
         level: Callable[[], float],
         suggest: Callable[[Array], None],
     ) -> None:
+        largest_v = level() / kappa
         allowed = box_limits(self.problem, box, largest_v)
         if allowed.least_v > largest_v:
             self.closed = min(self.closed, level())

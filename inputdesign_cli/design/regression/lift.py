@@ -20,15 +20,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import positive_part
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
-from inputdesign_cli.spectrum import smat, svec, svec_length
-from inputdesign_cli.spectrum.svec import svec_layout
+from inputdesign_cli.spectrum import smat, svec, svec_layout
 
 _TOLERANCE = 1e-9
 
@@ -80,124 +78,58 @@ class NodeBound:
 
 @dataclass(frozen=True)
 class Lift:
-    """The relaxation of a problem; one object serves all boxes and weights."""
+    """The relaxation of a problem; one object serves all boxes and weights.
+
+    Whatever is affine in the unknowns is an array whose first axis holds the constant, then the derivative
+    with respect to each unknown: the Y_ij (but E[rho_0] = 1, the constant), then svec of B >= E[b b^T].
+    """
 
     problem: ToeplitzProblem
-
-    @cached_property
-    def pairs(self) -> list[tuple[int, int]]:
-        """Blocks (i, j), i <= j; (0, 0) first."""
-        m = self.problem.m
-        return [(i, j) for i in range(m + 1) for j in range(i, m + 1)]
-
-    def index(self, i: int, j: int, lag: int) -> int:
-        """Position of E[(1, w)_i (1, w)_j rho_lag] among the unknowns; -1 for the constant E[rho_0] = 1."""
-        return self._places[i, j] * self.problem.n + abs(lag) - 1
-
-    @cached_property
-    def _places(self) -> dict[tuple[int, int], int]:
-        return {pair: k for k, (i, j) in enumerate(self.pairs) for pair in ((i, j), (j, i))}
-
-    @property
-    def products_size(self) -> int:
-        """Number of unknown products."""
-        return len(self.pairs) * self.problem.n - 1
 
     @property
     def biases(self) -> int:
         """Return the number of entries of b, which is 0 if bias does not count."""
         return self.problem.n - self.problem.m if self.problem.biased else 0
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns: the products, then svec of B >= E[b b^T]."""
-        return self.products_size + svec_length(self.biases)
+    @cached_property
+    def _unknowns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(t, m + 1, m + 1, n): Y_ij by lag. (t, biases, biases): B."""
+        n, size = self.problem.n, self.problem.m + 1
+        first, second = np.triu_indices(size)
+        rows, columns, scale = svec_layout(self.biases)
+        t, own = np.arange(first.size * n), first.size * n + np.arange(rows.size)
+        Y = np.zeros((t.size + own.size, size, size, n))
+        B = np.zeros((t.size + own.size, self.biases, self.biases))
+        i, j = first[t // n], second[t // n]
+        Y[t, i, j, t % n] = Y[t, j, i, t % n] = 1.0
+        B[own, rows, columns] = B[own, columns, rows] = 1.0 / scale
+        return Y, B
 
     @cached_property
     def products(self) -> tuple[Block, ...]:
         """Y >= 0 on the symmetric and on the skew vectors."""
-        blocks = []
-        m = self.problem.m
-        for basis in self.problem.halves:
-            lags = basis.T @ self.problem.lags @ basis
-            order = (m + 1) * basis.shape[1]
-            columns = []
-            for i, j in self.pairs:
-                place = np.zeros((m + 1, m + 1))
-                place[i, j] = place[j, i] = 1.0
-                columns += [svec(np.kron(place, lag)) for lag in lags]
-            matrix = np.zeros((columns[0].size, self.size))
-            matrix[:, : self.products_size] = np.column_stack(columns[1:])
-            blocks.append(Block("psd", sp.csc_matrix(matrix), columns[0], order))
-        return tuple(blocks)
-
-    def _equations(self, affine: Array) -> Block:
-        """P11 u = L1, as it stands and times each w_i; `affine` (m, m + 1) is [c, D]."""
-        m, first = self.problem.m, self.problem.first
-        matrix = np.zeros(((m + 1) * m, self.size))
-        offset = np.zeros((m + 1) * m)
-        offset[:m] = -first
-        for i in range(m + 1):
-            for line in range(m):
-                row = i * m + line
-                for a in range(m):
-                    for j in range(m + 1):
-                        index = self.index(i, j, line - a)
-                        if index < 0:
-                            offset[row] += affine[a, j]
-                        else:
-                            matrix[row, index] += affine[a, j]
-                if i:
-                    matrix[row, self.index(0, i, 0)] -= first[line]
-        return Block("zero", sp.csc_matrix(matrix), offset)
-
-    def _gram(self, affine: Array) -> Block:
-        """E[(1, w, b)(1, w, b)^T] >= 0 with B in the place of E[b b^T]."""
-        m, count = self.problem.m, self.biases
-        order = m + 1 + count
-        parts = np.zeros((self.size, order, order))
-        constant = np.zeros((order, order))
-        constant[0, 0] = 1.0
-        for i, j in self.pairs:
-            if (i, j) != (0, 0):
-                index = self.index(i, j, 0)
-                parts[index, i, j] = parts[index, j, i] = 1.0
-        for i in range(m + 1):
-            for row in range(count):
-                place = m + 1 + row
-                for a in range(m):
-                    for j in range(m + 1):
-                        parts[self.index(i, j, m + row - a), i, place] += affine[a, j]
-                if i:
-                    parts[self.index(0, i, 0), i, place] -= self.problem.second[row]
-        parts[:, m + 1 :, : m + 1] = parts[:, : m + 1, m + 1 :].transpose(0, 2, 1)
-        constant[0, m + 1 :] = constant[m + 1 :, 0] = -self.problem.second[:count]
-        rows, columns, scale = svec_layout(count) if count else (np.zeros(0, dtype=int),) * 3
-        own = np.arange(self.products_size, self.size)
-        parts[own, m + 1 + rows, m + 1 + columns] = 1.0 / scale
-        parts[own, m + 1 + columns, m + 1 + rows] = 1.0 / scale
-        return Block("psd", sp.csc_matrix(svec(parts).T), svec(constant), order)
+        parts = [basis.T @ self.problem.lags @ basis for basis in self.problem.halves]
+        lifted = [np.einsum("tijk,kab->tiajb", self._unknowns[0], lags) for lags in parts]
+        return tuple(
+            Block.of("psd", each.reshape(len(each), each.shape[1] * each.shape[2], -1)) for each in lifted
+        )
 
     @cached_property
-    def moments(self) -> list[tuple[NDArray[np.float64], Array]]:
-        """(svec rows, offset) of E[rho_k (1, w)(1, w)^T] for k = 0 .. m - 1."""
-        m = self.problem.m
-        found = []
-        for lag in range(m):
-            parts = np.zeros((self.size, m + 1, m + 1))
-            for i, j in self.pairs:
-                index = self.index(i, j, lag)
-                if index >= 0:
-                    parts[index, i, j] = parts[index, j, i] = 1.0
-            offset = np.zeros((m + 1, m + 1))
-            if lag == 0:
-                offset[0, 0] = 1.0
-            found.append((svec(parts).T, svec(offset)))
-        return found
+    def _multiplied(self) -> NDArray[np.float64]:
+        """(t, m + 1, m + 1, n, m): E[(1, w)_i (1, w)_j P_ra] for the first m columns of P."""
+        return np.einsum("tijk,kra->tijra", self._unknowns[0], self.problem.lags[:, :, : self.problem.m])
+
+    def _errors(self, scaling: Scaling) -> NDArray[np.float64]:
+        """(t, m + 1, n): E[(1, w)_i (P u - L)], P u from the first m columns of P: its first rows vanish."""
+        affine = np.column_stack([scaling.centre, scaling.D])
+        wanted = np.concatenate([self.problem.first, self.problem.second])
+        return np.einsum("tijra,aj->tir", self._multiplied, affine) - (
+            self._unknowns[0][:, :, 0, 0, None] * wanted
+        )
 
     def bound(self, box: Box, kappa: float, scaling: Scaling) -> NodeBound | None:
         """A lower bound on |b|^2 + kappa v over the box; None when the solver gave nothing to build on."""
-        first = self.problem.first
+        first, m = self.problem.first, self.problem.m
         blocks = self.blocks(box, scaling)
         q, scale = self.cost(kappa, scaling)
         answer = solve_conic(q, blocks, tolerance=_TOLERANCE)
@@ -208,34 +140,38 @@ class Lift:
         value += kappa * float(first @ scaling.centre)
         if answer.status not in ("solved", "almost_solved"):
             return NodeBound(value, np.zeros(0), box.upper - box.lower)
-        rho = np.concatenate([[1.0], answer.x[: self.problem.n - 1]])
-        return NodeBound(value, rho, self._spread(answer.x))
+        Y = np.tensordot(np.append(1.0, answer.x), self._unknowns[0], axes=1)
+        rho, w = Y[0, 0], Y[0, 1:, 0]
+        spread = np.abs(Y[0, 1:, 1:m] - w[:, None] * rho[1:m]).sum(axis=0)
+        return NodeBound(value, rho, spread)
 
     def cost(self, kappa: float, scaling: Scaling) -> tuple[Array, float]:
         """|b|^2 + kappa L1^T D w, divided by the second value returned."""
-        q = np.zeros(self.size)
+        Y, B = self._unknowns
         scale = max(1.0, kappa)
-        for i, weight in enumerate(self.problem.first @ scaling.D):
-            q[self.index(0, i + 1, 0)] = kappa * weight / scale
-        q[self.products_size :] = svec(np.eye(self.biases)) / scale
-        return q, scale
+        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ scaling.D))
+        return (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale, scale
 
     def blocks(self, box: Box, scaling: Scaling) -> list[Block]:
         """The products come first, then the Gram matrix and the limit: `_repaired` goes by their places."""
-        order = self.problem.m + 1
-        affine = np.column_stack([scaling.centre, scaling.D])
-        row = np.zeros((1, self.size))
-        for i in range(1, order):
-            row[0, self.index(i, i, 0)] = -1.0 / scaling.limit
-        bounded = Block("nonnegative", sp.csc_matrix(row), np.ones(1))
-        blocks = [*self.products, self._gram(affine), bounded, self._equations(affine)]
-        one, one_offset = self.moments[0]
+        Y, B = self._unknowns
+        size, m = len(Y), self.problem.m
+        errors = self._errors(scaling)
+        gram = np.zeros((size, m + 1 + self.biases, m + 1 + self.biases))
+        gram[:, : m + 1, : m + 1], gram[:, m + 1 :, m + 1 :] = Y[..., 0], B
+        gram[:, : m + 1, m + 1 :] = errors[:, :, m : m + self.biases]
+        gram[:, m + 1 :, : m + 1] = gram[:, : m + 1, m + 1 :].swapaxes(1, 2)
+        room = (np.arange(size) == 0) - np.einsum("tii->t", Y[:, 1:, 1:, 0]) / scaling.limit
+        blocks = [
+            *self.products,
+            Block.of("psd", gram),
+            Block.of("nonnegative", room[:, None]),
+            Block.of("zero", errors[:, :, :m].reshape(size, -1)),
+        ]
         for k, (lower, upper) in enumerate(zip(box.lower, box.upper, strict=True), 1):
-            matrix, offset = self.moments[k]
             for sign, edge in ((1.0, lower), (-1.0, upper)):
-                unit = 2.0 * sign / (upper - lower)
-                rows = sp.csc_matrix(unit * (matrix - edge * one))
-                blocks.append(Block("psd", rows, unit * (offset - edge * one_offset), order))
+                inside = Y[..., k] - edge * Y[..., 0]
+                blocks.append(Block.of("psd", 2.0 * sign / (upper - lower) * inside))
         return blocks
 
     def _repaired(
@@ -243,40 +179,22 @@ class Lift:
     ) -> float:
         """The value of a dual point made feasible from the solver's multipliers.
 
-        q^T x >= - sum offset_i^T z_i whenever q = sum matrix_i^T z_i and every z_i lies in its cone. The
-        cones come first: each z_i is projected, that of the Gram matrix with exactly the `weight` of
-        B. What then misses in the equation is paid by the multiplier of Y, whose Toeplitz blocks are
-        orthogonal to one another; where that pushes it out of its cone a multiple of the identity
-        lifts it back, which the limit on |w|^2 pays for.
+        q^T x >= residual^T x - sum offset_i^T z_i with the residual q - sum matrix_i^T z_i, whenever every
+        z_i lies in its cone. Each is projected, that of the Gram matrix with exactly the `weight` of B, so
+        that B has no residual. No E[(1, w)_i (1, w)_j rho_k] exceeds the limit on |w|^2, or its root, or one.
         """
-        z = list(multipliers)
-        many = len(self.products)
+        z, many = list(multipliers), len(self.products)
         z[many] = self._with_weight(z[many], weight)
-        z[many + 1] = np.maximum(z[many + 1], 0.0)
-        for i in range(many + 3, len(blocks)):
-            z[i] = svec(positive_part(smat(z[i])))
-        missing = q.copy()
-        for block, multiplier in zip(blocks, z, strict=True):
-            missing -= block.matrix.T @ multiplier
-        missing[self.products_size :] = 0.0
-        share = missing / self._norms
-        for i in range(many):
-            z[i] = z[i] + self.products[i].matrix @ share
-        lowest = min(float(np.linalg.eigvalsh(smat(z[i]))[0]) for i in range(many))
-        if lowest < 0.0:
-            for i in range(many):
-                z[i] = z[i] - lowest * svec(np.eye(blocks[i].order))
-            z[many + 1] = z[many + 1] - lowest * self.problem.n * limit
-        return -float(sum(b.offset @ zi for b, zi in zip(blocks, z, strict=True)))
-
-    @cached_property
-    def _norms(self) -> Array:
-        """Squared norm of the place that each unknown takes in Y."""
-        total = np.zeros(self.size)
-        for block in self.products:
-            total += np.asarray(block.matrix.multiply(block.matrix).sum(axis=0)).ravel()
-        total[self.products_size :] = 1.0
-        return total
+        for i, block in enumerate(blocks):
+            if block.kind == "nonnegative":
+                z[i] = np.maximum(z[i], 0.0)
+            elif block.kind == "psd" and i != many:
+                z[i] = svec(positive_part(smat(z[i])))
+        residual = q - sum(block.matrix.T @ own for block, own in zip(blocks, z, strict=True))
+        size = np.append(1.0, np.full(self.problem.m, np.sqrt(limit)))
+        most = np.max(np.outer(size, size)[..., None] * self._unknowns[0][1:], axis=(1, 2, 3))
+        lost = float(np.abs(residual) @ most)
+        return -lost - float(sum(block.offset @ own for block, own in zip(blocks, z, strict=True)))
 
     def _with_weight(self, z: Array, weight: float) -> Array:
         """A multiplier [[T, G], [G^T, weight I]] >= 0 of the Gram matrix, as near as can be to z."""
@@ -286,13 +204,3 @@ class Lift:
         matrix[:head, :head] = least + positive_part(matrix[:head, :head] - least)
         matrix[head:, head:] = weight * np.eye(self.biases)
         return svec(matrix)
-
-    def _spread(self, x: Array) -> Array:
-        m = self.problem.m
-        spread = np.zeros(m - 1)
-        for k in range(1, m):
-            rho = x[self.index(0, 0, k)]
-            for j in range(1, m + 1):
-                product = x[self.index(0, j, k)]
-                spread[k - 1] += abs(product - rho * x[self.index(0, j, 0)])
-        return spread

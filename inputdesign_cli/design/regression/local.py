@@ -6,16 +6,18 @@ trust region. The variance is convex in the shape; only the bias makes the probl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
-from inputdesign_cli.design.regression.steps import Region, step
+from inputdesign_cli.design.regression.steps import Region, extend, rescale, step
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 
 _MAX_STEPS = 60
+STEP_TOLERANCE = 1e-10
+"""The relative gain below which a search ends."""
 _SMALLEST_RADIUS = 1e-9
 # Where the target cannot be met at the present energy, variance is made cheaper in these steps.
 _RELAXED = (1.0, 1e-2, 1e-4, 1e-6, 1e-9)
@@ -55,61 +57,33 @@ class Counter:
 
 
 def descend(
-    problem: ToeplitzProblem,
-    region: Region,
-    goal: Goal,
-    start: Autocorrelations,
-    *,
-    tolerance: float,
-    counter: Counter,
+    problem: ToeplitzProblem, region: Region, goal: Goal, start: Autocorrelations, counter: Counter
 ) -> Autocorrelations:
     """A local minimum of the goal from `start`; it may miss the target if no feasible shape was met."""
     shape = start
-    if not np.isfinite(goal.value(shape)):
+    for relaxed in _RELAXED:
+        if np.isfinite(goal.value(shape)):
+            break
         assert goal.target is not None
-        for relaxed in _RELAXED:
-            weight = Weight(relaxed * goal.target / shape.v, goal.biased)
-            shape = _trust_region(
-                problem,
-                region,
-                shape,
-                lambda _: weight,  # noqa: B023 (called before the loop goes on)
-                lambda s: weight(s),  # noqa: B023 (likewise)
-                tolerance=tolerance,
-                counter=counter,
-                until=lambda s: np.isfinite(goal.value(s)),
-            )
-            if np.isfinite(goal.value(shape)):
-                break
-        else:
-            return shape
-    return _trust_region(
-        problem,
-        region,
-        shape,
-        lambda s: goal.weight(goal.value(s)),
-        goal.value,
-        tolerance=tolerance,
-        counter=counter,
-    )
+        cheaper = Goal(relaxed * goal.target / shape.v, biased=goal.biased)
+        shape = _trust_region(problem, region, shape, cheaper, counter, until=goal)
+    return _trust_region(problem, region, shape, goal, counter) if np.isfinite(goal.value(shape)) else shape
 
 
 def _trust_region(
     problem: ToeplitzProblem,
     region: Region,
     shape: Autocorrelations,
-    weight_at: Callable[[Autocorrelations], Weight],
-    value: Callable[[Autocorrelations], float],
-    *,
-    tolerance: float,
+    goal: Goal,
     counter: Counter,
-    until: Callable[[Autocorrelations], bool] = lambda _: False,
+    *,
+    until: Goal | None = None,
 ) -> Autocorrelations:
     radius = 0.5
     for _ in range(_MAX_STEPS):
-        if until(shape):
+        if until is not None and np.isfinite(until.value(shape)):
             break
-        weight = weight_at(shape)
+        weight = goal.weight(goal.value(shape))
         counter.solves += 1
         try:
             found = step(problem, region, weight, shape, radius)
@@ -123,11 +97,11 @@ def _trust_region(
         rho, model = found
         now = weight(shape)
         predicted = now - model
-        if predicted <= tolerance * now:
+        if predicted <= STEP_TOLERANCE * now:
             break
         trial = problem.evaluate(rho)
         gained = now - weight(trial) if trial is not None else -np.inf
-        if trial is not None and gained > 0.0 and value(trial) < value(shape):
+        if trial is not None and gained > 0.0 and goal.value(trial) < goal.value(shape):
             shape = trial
         if gained < 0.25 * predicted:
             radius /= 4.0
@@ -152,3 +126,40 @@ def starts(problem: ToeplitzProblem, count: int, rng: np.random.Generator) -> li
 def best(shapes: Sequence[Autocorrelations], goal: Goal) -> Autocorrelations:
     """Return the shape of least value; among shapes that miss the target, the one of least bias."""
     return min(shapes, key=lambda s: (goal.value(s), s.bias_squared))
+
+
+_MAX_ROUNDS = 50
+_SETTLED = 1e-9
+
+
+def alternate(
+    problem: ToeplitzProblem, goal: Goal, start: Autocorrelations, counter: Counter
+) -> Autocorrelations:
+    """Where the alternation of [eckhard-mse], Section 4.2, ends: fix R11 and solve, fix Z and solve, repeat.
+
+    With Z = R11^-1 R12 fixed, R is generally only free to scale: for m >= 2 the shape of R11 never leaves its
+    start. It is here so that one can see that; its gap comes from the proof of the others.
+
+    A target that the present shape misses is approached by reducing the bias alone.
+    """
+    shape = start
+    for _ in range(_MAX_ROUNDS):
+        before = shape
+        for half in (extend, rescale):
+            value = goal.value(shape)
+            weight = goal.weight(value) if value < float("inf") else Weight(0.0, goal.biased)
+            counter.solves += 1
+            try:
+                if half is extend:
+                    rho = extend(problem, weight, shape.rho[: problem.m])
+                else:
+                    rho = rescale(problem, weight, shape)
+            except OutOfTimeError:  # the best so far is an answer
+                return shape
+            trial = None if rho is None else problem.evaluate(rho)
+            if trial is not None and weight(trial) < weight(shape):
+                shape = trial
+        now, then = goal.value(shape), goal.value(before)
+        if shape is before or then - now <= _SETTLED * now:
+            break
+    return shape

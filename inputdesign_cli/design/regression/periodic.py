@@ -24,7 +24,6 @@ _ALL_LINES = 400  # up to this many lines all of them take part
 _COARSE = 100
 _NEIGHBOURS = 3
 _HEAVY = 1e3  # weight of the equation that the powers add up to one
-_STEP_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def design_periodic(
     start = problem.evaluate(fitted)
     shape = None
     if start is not None:
-        shape = descend(problem, region, goal, start, tolerance=_STEP_TOLERANCE, counter=Counter())
+        shape = descend(problem, region, goal, start, Counter())
     if shape is None:
         return PeriodicDesign(shares, fitted, energy, False)
     full = np.zeros(lines.size)

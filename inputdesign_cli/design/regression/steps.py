@@ -10,49 +10,43 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
-from inputdesign_cli.spectrum import svec
 
 _TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
 class Region:
-    """The shapes rho = origin + span @ x, with `blocks` that keep x where rho is a shape."""
+    """The shapes rho = origin + span x: all with P >= 0, or (`lines`) those of powers x >= 0 with sum one."""
 
     origin: Array
     span: NDArray[np.float64]
-    blocks: tuple[Block, ...]
+    lines: bool = False
 
     @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return self.span.shape[1]
+    def affine(self) -> NDArray[np.float64]:
+        """(n, 1 + size): origin and span side by side."""
+        return np.column_stack([self.origin, self.span])
 
 
 def all_shapes(problem: ToeplitzProblem) -> Region:
-    """Every rho with P >= 0, one cone for the symmetric and one for the skew vectors."""
-    n = problem.n
-    blocks = []
-    for basis in problem.halves:
-        parts = svec(basis.T @ problem.lags @ basis)
-        blocks.append(Block("psd", sp.csc_matrix(parts[1:].T), parts[0], basis.shape[1]))
-    span = np.vstack([np.zeros((1, n - 1)), np.eye(n - 1)])
-    return Region(np.eye(n)[0], span, tuple(blocks))
+    """Every rho with P >= 0."""
+    return _beginning_with(problem, np.ones(1))
 
 
 def line_shapes(problem: ToeplitzProblem, frequencies: Array) -> Region:
     """The rho of nonnegative powers at `frequencies` (L,) (rad/sample) that add up to one."""
-    span = np.cos(np.arange(problem.n)[:, None] * frequencies[None, :])
-    count = frequencies.size
-    positive = Block("nonnegative", sp.identity(count, format="csc"), np.zeros(count))
-    total = Block("zero", sp.csc_matrix(np.ones((1, count))), np.array([-1.0]))
-    return Region(np.zeros(problem.n), span, (positive, total))
+    return Region(np.zeros(problem.n), np.cos(np.arange(problem.n)[:, None] * frequencies), True)
+
+
+def _beginning_with(problem: ToeplitzProblem, head: Array) -> Region:
+    """The shapes whose first autocorrelations are `head`."""
+    n, held = problem.n, head.size
+    return Region(np.append(head, np.zeros(n - held)), np.eye(n)[:, held:])
 
 
 def step(
@@ -63,9 +57,11 @@ def step(
     minimise |b + J (rho - rho_at)|^2 + kappa q subject to [[P11, L1], [L1^T, q]] >= 0.
     """
     J = problem.bias_jacobian(at.rho)
-    extra = [_near(region, at.rho, radius), _variance_block(problem, region)]
-    origin = at.bias + J @ (region.origin - at.rho)[1:]
-    return _solve(problem, region, weight, extra, J @ region.span[1:], origin)
+    near = region.affine[1:].copy()
+    near[:, 0] -= at.rho[1:]
+    bias = J @ near
+    bias[:, 0] += at.bias
+    return _solve(problem, region, weight, bias, np.concatenate([near, -near]), radius)
 
 
 def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | None:
@@ -77,11 +73,10 @@ def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | Non
     u = problem.weights(scipy.linalg.toeplitz(head))
     if u is None:
         return None
-    slope = (problem.lags[:, m:, :m] @ u).T  # (n - m, n): b = slope @ rho - L2
     region = _beginning_with(problem, head)
-    still = _nonnegative(region.size, region.size + 2)
-    origin = slope @ region.origin - problem.second
-    found = _solve(problem, region, weight, [still], slope @ region.span, origin)
+    bias = (problem.lags[:, m:, :m] @ u).T @ region.affine
+    bias[:, 0] -= problem.second
+    found = _solve(problem, region, weight, bias, varies=False)
     return None if found is None else found[0]
 
 
@@ -98,104 +93,68 @@ def rescale(problem: ToeplitzProblem, weight: Weight, at: Autocorrelations) -> A
     freedom = scipy.linalg.null_space(equations[:, 1:], rcond=1e-10)
     if freedom.shape[1] == 0:
         return at.rho
-    every = all_shapes(problem)
-    blocks = tuple(
-        Block(b.kind, b.matrix @ freedom, b.offset + b.matrix @ at.rho[1:], b.order) for b in every.blocks
-    )
-    region = Region(at.rho, every.span @ freedom, blocks)
-    found = _solve(
-        problem,
-        region,
-        weight,
-        [_variance_block(problem, region)],
-        np.zeros((problem.n - m, region.size)),
-        at.bias,
-    )
+    region = Region(at.rho, np.eye(problem.n)[:, 1:] @ freedom)
+    bias = np.column_stack([at.bias, np.zeros((problem.n - m, freedom.shape[1]))])
+    found = _solve(problem, region, weight, bias)
     return None if found is None else found[0]
-
-
-def _beginning_with(problem: ToeplitzProblem, head: Array) -> Region:
-    """The shapes whose first autocorrelations are `head` (m,)."""
-    every, held = all_shapes(problem), head.size - 1
-    blocks = tuple(
-        Block(b.kind, b.matrix[:, held:], b.offset + b.matrix[:, :held] @ head[1:], b.order)
-        for b in every.blocks
-    )
-    return Region(every.origin + every.span[:, :held] @ head[1:], every.span[:, held:], blocks)
 
 
 def _solve(
     problem: ToeplitzProblem,
     region: Region,
     weight: Weight,
-    extra: list[Block],
-    bias_span: NDArray[np.float64],
-    bias_origin: Array,
+    bias: NDArray[np.float64],
+    near: NDArray[np.float64] | None = None,
+    radius: float = 0.0,
+    *,
+    varies: bool = True,
 ) -> tuple[Array, float] | None:
-    """minimise t + kappa q over (x, q, t), t >= |bias|^2; `extra` bounds q from below.
+    """minimise t + kappa q over (x, q, t), t >= |bias|^2, q at least the variance where that varies.
 
-    rho and the value of the model; None when the solver found nothing.
+    Args:
+        bias: (n - m, 1 + size), its value at x = 0 and its derivatives; `near` of what is at most `radius`.
+
+    Returns:
+        rho and the value of the model; None when the solver found nothing.
     """
-    size = region.size
-    q = np.zeros(size + 2)
+    affine, m, size = region.affine, problem.m, region.span.shape[1]
+    known = slice(0, size + 1)  # the constant and x; then q and t
+
+    def rows(number: int) -> NDArray[np.float64]:
+        return np.zeros((size + 3, number))
+
+    def matrices(order: int) -> NDArray[np.float64]:
+        return np.zeros((size + 3, order, order))
+
+    blocks = []
+    if region.lines:
+        positive, total = rows(size), rows(1)
+        positive[1 : size + 1] = np.eye(size)
+        total[: size + 1, 0] = np.append(-1.0, np.ones(size))
+        blocks += [Block.of("nonnegative", positive), Block.of("zero", total)]
+    for basis in () if region.lines else problem.halves:
+        shapes = matrices(basis.shape[1])
+        shapes[known] = np.einsum("kx,kab->xab", affine, basis.T @ problem.lags @ basis)
+        blocks.append(Block.of("psd", shapes))
+    if near is not None:
+        inside = rows(len(near))
+        inside[known] = -near.T
+        inside[0] += radius
+        blocks.append(Block.of("nonnegative", inside))
+    variance = matrices(m + 1 if varies else 1)
+    if varies:
+        variance[known, :m, :m] = np.einsum("kx,kab->xab", affine, problem.lags[:, :m, :m])
+        variance[0, :m, m] = variance[0, m, :m] = problem.first
+    variance[size + 1, -1, -1] = 1.0
+    count = len(bias) if weight.biased else 0
+    error = matrices(count + 1)
+    error[0, :count, :count] = np.eye(count)
+    error[known, :count, count] = error[known, count, :count] = bias.T[:, :count]
+    error[size + 2, count, count] = 1.0
     scale = max(1.0, weight.kappa)
-    q[size:] = weight.kappa / scale, 1.0 / scale
-    blocks = [_widen(block, size + 2) for block in (*region.blocks, *extra)]
-    if weight.biased and bias_origin.size:
-        blocks.append(_bias_block(bias_span, bias_origin, size))
-    else:
-        blocks.append(_nonnegative(size + 1, size + 2))
+    q = np.append(np.zeros(size), [weight.kappa / scale, 1.0 / scale])
+    blocks += [Block.of("psd", variance), Block.of("psd", error)]
     answer = solve_conic(q, blocks, tolerance=_TOLERANCE)
     if answer.status not in ("solved", "almost_solved"):
         return None
-    return region.origin + region.span @ answer.x[:size], float(scale * (q @ answer.x))
-
-
-def _nonnegative(index: int, size: int) -> Block:
-    return Block("nonnegative", sp.csc_matrix(([1.0], ([0], [index])), shape=(1, size)), np.zeros(1))
-
-
-def _variance_block(problem: ToeplitzProblem, region: Region) -> Block:
-    """[[P11, L1], [L1^T, q]] >= 0 over (x, q)."""
-    m = problem.m
-    stack = np.zeros((problem.n, m + 1, m + 1))
-    stack[:, :m, :m] = problem.lags[:, :m, :m]
-    rows = svec(stack)
-    offset = np.zeros((m + 1, m + 1))
-    offset[:m, m] = offset[m, :m] = problem.first
-    corner = np.zeros((m + 1, m + 1))
-    corner[m, m] = 1.0
-    matrix = np.column_stack([rows.T @ region.span, svec(corner)])
-    return Block("psd", sp.csc_matrix(matrix), svec(offset) + rows.T @ region.origin, m + 1)
-
-
-def _bias_block(span: NDArray[np.float64], origin: Array, size: int) -> Block:
-    """[[I, b], [b^T, t]] >= 0 over (x, q, t)."""
-    count = origin.size
-    parts = np.zeros((size + 2, count + 1, count + 1))
-    parts[:size, :count, count] = parts[:size, count, :count] = span.T
-    parts[size + 1, count, count] = 1.0
-    offset = np.eye(count + 1)
-    offset[count, count] = 0.0
-    offset[:count, count] = offset[count, :count] = origin
-    return Block("psd", sp.csc_matrix(svec(parts).T), svec(offset), count + 1)
-
-
-def _near(region: Region, centre: Array, radius: float) -> Block:
-    """|rho_k - centre_k| <= radius for every k."""
-    span, offset = region.span[1:], (region.origin - centre)[1:]
-    return Block(
-        "nonnegative", sp.csc_matrix(np.vstack([span, -span])), radius + np.concatenate([offset, -offset])
-    )
-
-
-def _widen(block: Block, size: int) -> Block:
-    rows, columns = block.matrix.shape
-    if columns == size:
-        return block
-    return Block(
-        block.kind,
-        sp.hstack([block.matrix, sp.csc_matrix((rows, size - columns))], format="csc"),
-        block.offset,
-        block.order,
-    )
+    return affine @ np.append(1.0, answer.x[:size]), float(scale * (q @ answer.x))

@@ -10,17 +10,22 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import finishing, seconds_left
-from inputdesign_cli.design.regression.alternating import alternate
 from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
-from inputdesign_cli.design.regression.local import Counter, Goal, best, descend, starts
+from inputdesign_cli.design.regression.local import (
+    STEP_TOLERANCE,
+    Counter,
+    Goal,
+    alternate,
+    best,
+    descend,
+    starts,
+)
 from inputdesign_cli.design.regression.model import ErrorSplit, Regression
 from inputdesign_cli.design.regression.steps import Region, all_shapes, extend
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 
-_STEP_TOLERANCE = 1e-10
-_NODES = {1: 400, 2: 400, 3: 400}
-_NODES_BEYOND = 100  # the boxes of m >= 4 are many and dear, and more of them close little
+_NODES, _NODES_BEYOND = 400, 100  # the boxes of m >= 4 are many and dear, and more of them close little
 _FAINT = 1e-5  # powers of lines below this share, in a design that is flat there
 # A target is out of reach if no energy up to this many n sigma^2 |L1|^2 / gamma is enough; the largest
 # of these for which the proof closes counts.
@@ -112,7 +117,7 @@ def design_toeplitz(
     """
     problem, norm = ToeplitzProblem.of(regression), Normalisation(regression)
     if most_nodes is None:
-        most_nodes = _NODES.get(problem.m, _NODES_BEYOND)
+        most_nodes = _NODES if problem.m <= 3 else _NODES_BEYOND
     goal = Goal(
         kappa=None if energy is None else norm.kappa(energy),
         target=None if target is None else target / norm.error,
@@ -123,10 +128,7 @@ def design_toeplitz(
         found = [alternate(problem, goal, starts(problem, 0, rng)[0], counter)]
     else:
         region = all_shapes(problem)
-        found = [
-            descend(problem, region, goal, start, tolerance=_STEP_TOLERANCE, counter=counter)
-            for start in starts(problem, count, rng)
-        ]
+        found = [descend(problem, region, goal, start, counter) for start in starts(problem, count, rng)]
     shape = best(found, goal)
     if not np.isfinite(goal.value(shape)):
         raise _out_of_reach(problem, goal, shape, most_nodes)
@@ -172,7 +174,7 @@ def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Au
     if residual > _FAINT or not powers.any():
         return shape
     trial = problem.evaluate(columns @ powers / powers.sum())
-    if trial is None or not goal.value(trial) <= goal.value(shape) * (1.0 + _STEP_TOLERANCE):
+    if trial is None or not goal.value(trial) <= goal.value(shape) * (1.0 + STEP_TOLERANCE):
         return shape
     return trial
 
@@ -211,12 +213,7 @@ class _Proof:
         return self.goal.value(self.challenger)
 
     def _prove(self, kappa: Callable[[], float], level: Callable[[], float], most_nodes: int) -> bool:
-        def largest_v() -> float:
-            return level() / kappa()
-
-        return self.tree.prove(
-            kappa, level, largest_v=largest_v, most_nodes=most_nodes, suggest=self._suggest
-        )
+        return self.tree.prove(kappa, level, most_nodes=most_nodes, suggest=self._suggest)
 
     def _suggest(self, rho: Array) -> None:
         weight = self.goal.weight(self._value())
@@ -228,9 +225,7 @@ class _Proof:
         trial = None if extended is None else self.problem.evaluate(extended)
         if trial is None or weight(trial) >= weight(self.challenger) * (1.0 - 1e-12):
             return
-        self.challenger = descend(
-            self.problem, self.region, self.goal, trial, tolerance=_STEP_TOLERANCE, counter=self.counter
-        )
+        self.challenger = descend(self.problem, self.region, self.goal, trial, self.counter)
         if not self.keep:
             self.shape = self.challenger
 
@@ -246,14 +241,12 @@ def _out_of_reach(
         seconds_left()
         proof = BranchAndBound.start(problem)
         if proof.prove(
-            _always(target / multiple), _always(target), largest_v=_always(multiple), most_nodes=most_nodes
+            lambda: target / multiple,  # noqa: B023 (called before the loop goes on)
+            lambda: target,
+            most_nodes=most_nodes,
         ):
             return OutOfReachError(bias, multiple, proof.assumed)
     return OutOfReachError(bias, 0.0, False)
-
-
-def _always(value: float) -> Callable[[], float]:
-    return lambda: value
 
 
 def least_variance(problem: ToeplitzProblem) -> float:
@@ -265,14 +258,7 @@ def least_variance(problem: ToeplitzProblem) -> float:
     head = ToeplitzProblem(problem.first, np.zeros(0), biased=False)
     white = head.evaluate(np.eye(head.n)[0])
     assert white is not None
-    shape = descend(
-        head,
-        all_shapes(head),
-        Goal(kappa=1.0, biased=False),
-        white,
-        tolerance=_STEP_TOLERANCE,
-        counter=Counter(),
-    )
+    shape = descend(head, all_shapes(head), Goal(kappa=1.0, biased=False), white, Counter())
     y = np.linalg.lstsq(scipy.linalg.toeplitz(shape.rho), head.first, rcond=1e-9)[0]
     points = 4096
     peak = float(np.max(np.abs(np.fft.rfft(y, points)) ** 2))

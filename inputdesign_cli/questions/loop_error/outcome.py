@@ -11,10 +11,8 @@ import numpy as np
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem
-from inputdesign_cli.design.loop_error.closed_form import power_of
-from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
-from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
-from inputdesign_cli.design.loop_error.weight import adjoint
+from inputdesign_cli.design.loop_error.closed_form import adjoint, power_of
+from inputdesign_cli.design.loop_error.parametric import LossTheory, ParametricCriterion, loss_theory
 from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.loop_error import LossStudy
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues

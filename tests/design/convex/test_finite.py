@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut
-from inputdesign_cli.accuracy.ellipsoid_cut import EllipsoidCut
+from inputdesign_cli.accuracy.cuts import DeterminantCut, EllipsoidCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, by_cones, by_interior
 from inputdesign_cli.spectrum import Face, svec, svec_length
 

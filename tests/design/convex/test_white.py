@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.design.convex.white import least_white_power
+from inputdesign_cli.design.convex.coordinates import least_white_power
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.questions.least_cost.build import build_convex
 

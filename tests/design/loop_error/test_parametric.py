@@ -11,9 +11,9 @@ from inputdesign_cli.design.loop_error import (
     PowerLimit,
 )
 from inputdesign_cli.design.loop_error.laws import sensitivity
-from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
+from inputdesign_cli.design.loop_error.parametric import error_eigenvalues, root_moments
 from inputdesign_cli.plant import Rational, TransferMatrix
-from tests.support.loop_error import adjoint, column, matrix_plant, random_hermitian, random_plant
+from tests.support.loop_error import column, matrix_plant, random_hermitian, random_plant
 
 W = np.array([0.05, 0.4, 1.3, 2.8])
 
@@ -193,20 +193,6 @@ def test_the_optimum_meets_its_limits_and_no_mixture_beats_its_bound():
         Phi = random_hermitian(rng, 12, 2)
         scale = np.max(np.einsum("pkab,kba->p", problem.metrics(w), Phi).real / problem.most)
         assert criterion.value(criterion.information(w, Phi / scale, np.ones(12))) > best.lower_bound
-
-
-def test_worth_is_the_gradient_of_the_criterion():
-    problem = column()
-    criterion = problem.parametric()
-    rng = np.random.default_rng(3)
-    w = np.array([0.02, 0.3, 1.0])
-    Phi, change = random_hermitian(rng, 3, 2), random_hermitian(rng, 3, 2)
-    ones, step = np.ones(3), 1e-4
-    up, down = (criterion.value(criterion.information(w, Phi + s * change, ones)) for s in (step, -step))
-    M = criterion.information(w, Phi, ones)
-    expected = -np.einsum("kab,kba->", criterion.worth(M, w), change).real
-    assert (up - down) / (2 * step) == pytest.approx(expected, rel=1e-6)
-    assert np.all(np.abs(criterion.worth(M, w) - adjoint(criterion.worth(M, w))) < 1e-18)
 
 
 def test_the_moments_of_the_loss():

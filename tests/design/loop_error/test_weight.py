@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.design.loop_error import ModelReference
-from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of
+from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of, weight
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
-from inputdesign_cli.design.loop_error.weight import weight
 from inputdesign_cli.plant import TransferMatrix
 from tests.support.loop_error import (
     GAINS,
