@@ -61,16 +61,16 @@ UNASKED = FindingKind(
 
 def started(estimate: Estimate) -> list[Finding]:
     """Return a finding where levels and starts of the records were estimated, with the largest residual."""
-    if not estimate.free:
+    if not estimate.start.free:
         return []
     along = "the level of every output and the state at the start were estimated along"
-    single = len(estimate.first) == 1
-    if not estimate.rest_refuted:
+    single = len(estimate.start.first) == 1
+    if not estimate.start.rest_refuted:
         begins = "the record begins" if single else "the records begin"
         return [START.found(f"whether {begins} at rest was not asked: {along}")]
-    ratio = np.abs(estimate.first) / np.sqrt(np.diag(estimate.noise))
+    ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
-    first, noise = float(estimate.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
+    first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
     records = "the record does" if single else "the records do"
     seen = (
         f"a first residual of {first:.3g} where the noise has {noise:.3g}"
@@ -133,7 +133,7 @@ def near_zero(model: Model, estimate: Estimate) -> list[Finding]:
 
 def band_limited(model: Model, estimate: Estimate) -> list[Finding]:
     """Return a finding where the input between samples may explain why tests refute a continuous model."""
-    if not model.continuous or not estimate.failed:
+    if not model.continuous or not estimate.tests.failed:
         return []
     return [
         BAND_LIMITED.found(

@@ -111,7 +111,7 @@ def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
     """Return the stretches in which outputs stand still while an input moves."""
     if data.recorded is None:
         return {}
-    known, simulated = data.recorded, estimate.simulated
+    known, simulated = data.recorded, estimate.simulation.outputs
     found = frozen(
         known.held, known.resolution, data.u, estimate.errors, data.y - simulated, simulated, data.lengths
     )

@@ -20,7 +20,7 @@ LARGER_NOISE = FindingKind(
 
 def noise_probability(estimate: Estimate) -> float:
     """Return the probability of residuals as coloured, if the noise model were right."""
-    return min(test.probability for test in estimate.tests if test.fault == "noise")
+    return min(test.probability for test in estimate.tests.scores if test.fault == "noise")
 
 
 def larger_noise(model: Model, probability: float | None) -> list[Finding]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
-import numpy as np
+from collections.abc import Sequence
 
 from inputdesign_cli.finding import Finding, FindingKind, Severity
 from inputdesign_cli.identification import Estimate
@@ -53,9 +51,8 @@ SAMPLES_REPEATED = FindingKind(
     "samples-repeated",
     Severity.REFUTED,
     "samples seem to be given twice",
-    "Residuals of one part follow those of another as noise does not, or two files have rows in common. "
-    "Samples that count twice make an estimate look surer than it is.",
-    "Give each sample once. If the input comes again, raise the orders of the model.",
+    "Two files have rows in common. Samples that count twice make an estimate look surer than it is.",
+    "Give each sample once.",
 )
 
 
@@ -63,7 +60,7 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
     """Return what a prior that the spec `stated` has to do with the estimate."""
     if not stated:
         return []
-    if estimate.agreement is None:
+    if estimate.prior is None:
         message = (
             "experiment.prior does not count for this estimate: it is information without the parameters "
             "that it belongs to; write parameters: {b1: 3.6, ..} beside a matrix, name the model.yaml of the "
@@ -82,27 +79,28 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     Args:
         looks: how often it is asked as data come in; they share the level (Bonferroni).
     """
-    if estimate.agreement is None or estimate.likeness is None:
+    if estimate.prior is None:
         return []
-    if estimate.agreement * looks < level("prior"):
+    differing, alike = estimate.prior.differing, estimate.prior.alike
+    if differing * looks < level("prior"):
         return [
             PRIOR_CONTRADICTED.found(
                 "experiment.prior and these data contradict each other (probability "
-                f"{chance(estimate.agreement)} for one system): remove the prior, or look for what has "
+                f"{chance(differing)} for one system): remove the prior, or look for what has "
                 "changed since",
                 where="experiment.prior",
-                probability=estimate.agreement,
+                probability=differing,
             )
         ]
-    if estimate.likeness * looks < level("prior"):
+    if alike * looks < level("prior"):
         return [
             PRIOR_REPEATED.found(
                 "experiment.prior and these data agree more closely than others do (probability "
-                f"{chance(estimate.likeness)}): the prior seems to be made of this record, or of a part or "
+                f"{chance(alike)}): the prior seems to be made of this record, or of a part or "
                 "copy of it, which would count twice; leave it out, or give only records that it was not "
                 "made of",
                 where="experiment.prior",
-                probability=estimate.likeness,
+                probability=alike,
             )
         ]
     return []
@@ -116,8 +114,8 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
     """
     found = [
         (probability, name)
-        for probability, name in zip(estimate.alike, files, strict=False)
-        if probability * len(estimate.alike) * looks < level("one system")
+        for probability, name in zip(estimate.tests.alike, files, strict=False)
+        if probability * len(estimate.tests.alike) * looks < level("one system")
     ]
     if not found:
         return []
@@ -132,37 +130,5 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
             where=name,
             probability=probability,
             against=against,
-        )
-    ]
-
-
-def repetitions(
-    estimate: Estimate, files: Sequence[tuple[str, int]], copies: Iterable[Finding] = ()
-) -> list[Finding]:
-    """Return a finding where samples seem to be given twice.
-
-    Args:
-        files: names and samples, if known.
-        copies: findings of files that have samples in common.
-    """
-    repeated = estimate.repeated
-    if repeated is None:
-        return list(copies)
-    files = files or [("the record", repeated.second + repeated.length)]
-    ends = np.cumsum([samples for _, samples in files])
-    # By their middle: the ends are not sharp.
-    first, second = (
-        files[int(np.searchsorted(ends, at + repeated.length // 2, side="right"))][0]
-        for at in (repeated.first, repeated.second)
-    )
-    where = "others there" if first == second else f"those of {first}"
-    return [
-        SAMPLES_REPEATED.found(
-            f"the residuals of about {repeated.length} samples of {second} follow {where} as noise does not: "
-            "either samples are given twice, which makes the estimate look surer than it is (give each "
-            "once), or the model lacks something that comes again with the same input (raise its orders)",
-            where=second,
-            samples=repeated.length,
-            of=first,
         )
     ]

@@ -104,8 +104,8 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
 
     Of an output that shifts see `level_shifts.py`.
     """
-    directed = {one.test: one.alternatives for one in estimate.directed}
-    failing = estimate.failed_besides
+    directed = {one.test: one.alternatives for one in estimate.tests.directed}
+    failing = estimate.tests.failed_besides
     strongest: dict[str, ScoreTest] = {}
     for test in failing:
         if test not in directed:

@@ -200,7 +200,7 @@ def _beyond(
     measure: str,
 ) -> list[Apart]:
     found = []
-    for rival in estimate.rivals:
+    for rival in estimate.search.rivals:
         other = model.at(rival.theta)
         ratio, w = max((_furthest(model, other, error, size) for error in errors), default=(0.0, 0.0))
         if ratio > 1.0:

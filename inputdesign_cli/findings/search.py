@@ -40,14 +40,15 @@ def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
         model: the estimate as a model.
     """
     found = []
-    if not estimate.converged:
-        begun = "its only start" if estimate.starts == 1 else f"the best of {estimate.starts} starts"
+    search = estimate.search
+    if not search.converged:
+        begun = "its only start" if search.starts == 1 else f"the best of {search.starts} starts"
         found.append(
             NOT_SETTLED.found(
-                f"the search did not settle after {estimate.steps} steps from {begun}: "
+                f"the search did not settle after {search.steps} steps from {begun}: "
                 "the estimate may be far from the minimum; the orders may be too high for these data",
-                steps=estimate.steps,
-                starts=estimate.starts,
+                steps=search.steps,
+                starts=search.starts,
             )
         )
     return found + stopped_at_ends(model, estimate)

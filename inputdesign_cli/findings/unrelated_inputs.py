@@ -66,7 +66,7 @@ def answering(units: Units, estimate: Estimate) -> list[Finding]:
         _late(units.inputs, units.outputs, test)
         if test.statistic > _MOSTLY * samples
         else _answers(units, test)
-        for test in estimate.answering
+        for test in estimate.tests.answering
     ]
 
 
@@ -129,7 +129,7 @@ def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> 
 
 def hardly_explained(units: Units, model: Model, estimate: Estimate) -> list[Finding]:
     """Return a finding for outputs that are farther from the simulation than from their mean."""
-    far = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
+    far = [i for i, fit in enumerate(estimate.simulation.fit) if fit is not None and fit < 0.0]
     unrelated = driven_by_nothing(model, estimate, units.step) if far else []
     found = []
     for kind, sentence, listed in (

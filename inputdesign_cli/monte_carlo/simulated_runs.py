@@ -85,7 +85,7 @@ def _again_where_lost(job: TrialJob, u: Array, y: Array, found: BatchEstimate) -
         except SpecError:  # the noise of this run leaves some parameter without an estimate
             continue
         theta[run], noise[run], information[run] = other.theta, other.noise, other.information
-        converged[run], steps[run] = other.converged, other.steps
+        converged[run], steps[run] = other.search.converged, other.search.steps
     return BatchEstimate(theta, noise, information, converged, steps)
 
 

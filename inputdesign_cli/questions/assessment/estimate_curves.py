@@ -35,13 +35,13 @@ def data_curves(
     columns |= {**_columns(units, "u", u), **_columns(units, "y", y)}
     columns |= _columns(units, "y", predicted, "_predicted")
     panels = []
-    for i, fit in enumerate(estimate.fit):
-        curve = None if fit is None else estimate.simulated[:, i]
+    for i, fit in enumerate(estimate.simulation.fit):
+        curve = None if fit is None else estimate.simulation.outputs[:, i]
         if curve is not None:
             columns[f"y{_number(units, i)}_simulated"] = curve
         panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i, units.label(f"y{i + 1}")))
     columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
-    white, cross = estimate.whiteness, estimate.independence
+    white, cross = estimate.tests.whiteness, estimate.tests.independence
     shared = min(white.lags.size, cross.lags.size)
     residuals = {"autocorrelation_lag": white.lags[:shared]}
     residuals |= _pairs(units, "autocorrelation", white.correlation[:shared])
