@@ -252,8 +252,8 @@ class Judged:
     @property
     def undecided(self) -> bool:
         """Whether the verdict is neither met nor missed."""
-        refuted = bool(self.found.failed) or self.answering
-        return refuted or not self.found.converged or (self.met and self.missed)
+        refuted = bool(self.found.tests.failed) or self.answering
+        return refuted or not self.found.search.converged or (self.met and self.missed)
 
 
 def estimated(made: Trial) -> tuple[PolynomialModel, Estimate]:
@@ -261,10 +261,10 @@ def estimated(made: Trial) -> tuple[PolynomialModel, Estimate]:
     u, y = made.u[:, None], made.y[:, None]
     found = identify(made.model, u, y)
     model = made.model.at(found.theta)
-    for ((C, D),) in noises_of_residuals(found.errors, found.lengths) if found.coloured else ():
+    for ((C, D),) in noises_of_residuals(found.errors, found.lengths) if found.tests.coloured else ():
         larger = replace(model, C=(np.convolve(model.C[0], C),), D=(np.convolve(model.D[0], D),))
         other = identify(larger, u, y, start=larger.theta, near=True)
-        if other.converged and not other.coloured:
+        if other.search.converged and not other.tests.coloured:
             return larger, other
     return made.model, found
 
@@ -290,7 +290,7 @@ def judged(made: Trial, rng: np.random.Generator) -> Judged:
     _, true = scipy.signal.freqz(*made.true, w)
     known = np.minimum(np.sqrt(spread[asked]) / admissible, 1.0 / alpha)
     moves = []
-    for one in found.directed:
+    for one in found.tests.directed:
         move, slope = (
             np.max(np.abs(G[..., 0, 0]), axis=0) / admissible
             for G in (one.moves(model, w[asked]), one.slope(model, w[asked]))
@@ -300,8 +300,8 @@ def judged(made: Trial, rng: np.random.Generator) -> Judged:
         found,
         bool(np.all(alpha * np.sqrt(spread[asked]) <= admissible * (1.0 + 1e-9))),
         bool(np.any(np.abs(G - true)[asked] > admissible)),
-        bool(that_matter(found.directed, moves)),
-        bool(found.answering),
+        bool(that_matter(found.tests.directed, moves)),
+        bool(found.tests.answering),
         any(float(np.max(one.estimated + 2.0 * one.deviation)) > 1.0 for one in moves),
     )
 
@@ -319,13 +319,14 @@ def counted(trials: Iterable[tuple[Trial, np.random.Generator]]) -> Counter[str]
         counts["beyond"] += one.beyond
         counts["met though beyond"] += one.met and one.beyond and not one.undecided
         counts["met without a note"] += one.met and not one.undecided and not one.noted
-        counts["not settled"] += not one.found.converged
-        counts["free start"] += one.found.free
+        counts["not settled"] += not one.found.search.converged
+        counts["free start"] += one.found.start.free
         counts["a parameter missed"] += one.missed
         counts["an input that answers"] += one.answering
-        counts.update({test.name for test in one.found.tests} & {test.name for test in one.found.failed})
-        counts["level_shift"] += any(test.name == "level_shift" for test in one.found.failed)
-        counts["directed"] += any(tried.test in one.found.failed for tried in one.found.directed)
+        tests = one.found.tests
+        counts.update({test.name for test in tests.scores} & {test.name for test in tests.failed})
+        counts["level_shift"] += any(test.name == "level_shift" for test in tests.failed)
+        counts["directed"] += any(tried.test in tests.failed for tried in tests.directed)
     return counts
 
 

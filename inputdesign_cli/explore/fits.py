@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametrised, SampledModel
 
 Parts = Sequence[tuple[Array, Array]]
@@ -58,10 +58,9 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
         TypeError: see `output_error_form`.
     """
     simulation, simulated, counted, varying, unexplained = _simulated(model, parts, late)
-    kind = estimator(model, 1.0).kind
+    kind = estimator(model, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-        records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
-        free = [record.begun_freely(record.lateness(model.theta)) for record in records]
+        free = [Records(kind, (part,)).begun_freely(kind.lateness(model.theta)) for part in centred(parts)]
         errors = np.concatenate([record.at(model.theta).errors for record in free])
         errors[unexplained] = varying[unexplained[counted]]
     return Fits(simulation, percent(errors[counted], varying), simulated, errors, counted)
@@ -131,12 +130,11 @@ def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
     With it the number of samples on which inputs from before act through a delay: these are made up.
     """
     error_form = output_error_form(model)
-    record = estimator(error_form, 1.0).kind.record(u, y)
-    late = record.lateness(error_form.theta)
+    kind, theta = estimator(error_form, 1.0), error_form.theta
+    late = kind.lateness(theta)
     with np.errstate(over="ignore", invalid="ignore"):
         caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
-        starts = record.remembering(late).starts(error_form.theta, free=True)
-        for i, start in enumerate(starts):
+        for i, start in enumerate(kind.starts(theta, len(y), late, free=True)):
             caused[:, i] += begun(start.free, y[:, i] - caused[:, i])
     return caused, late
 

@@ -121,13 +121,12 @@ class _Records:
 
 def _estimated(structure: Model, parts: Parts, start: Array) -> tuple[Array, Array, float, bool]:
     """Return parameters (k,), their deviations, the variance of the errors, and whether a search settled."""
-    kind = estimator(structure, 1.0).kind
+    kind = estimator(structure, 1.0)
     check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
-    records = Records(tuple(kind.record(*part) for part in centred(parts)))
-    records = records.begun_freely(records.lateness(start))
+    records = Records(kind, tuple(centred(parts))).begun_freely(kind.lateness(start))
     found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
     noise = noise_of(found.point, kind.own())
-    factor = factor_at(kind.names, records, found.point, noise)
+    factor = factor_at(records, found.point, noise)
     half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
     return found.point.theta, np.linalg.norm(half, axis=0), float(noise[0, 0]), found.converged
 

@@ -74,13 +74,14 @@ LARGER_NOISE = note(
 
 def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
     """Return findings on a search for `model` that did not settle, or that an expression's end stopped."""
-    begun = "its only start" if estimate.starts == 1 else f"the best of {estimate.starts} starts"
+    search = estimate.search
+    begun = "its only start" if search.starts == 1 else f"the best of {search.starts} starts"
     message = (
-        f"the search did not settle after {estimate.steps} steps from {begun}: the estimate may be far from "
-        "the minimum; the orders may be too high for these data"
+        f"the search did not settle after {search.steps} steps from {begun}: the estimate may be far from the "
+        "minimum; the orders may be too high for these data"
     )
-    found = [NOT_SETTLED.found(message, steps=estimate.steps, starts=estimate.starts)]
-    return [*([] if estimate.converged else found), *stopped_at_ends(model, estimate)]
+    found = [NOT_SETTLED.found(message, steps=search.steps, starts=search.starts)]
+    return [*([] if search.converged else found), *stopped_at_ends(model, estimate)]
 
 
 def stopped_at_ends(model: Model, estimate: Estimate) -> list[Finding]:
@@ -103,16 +104,16 @@ def stopped_at_ends(model: Model, estimate: Estimate) -> list[Finding]:
 
 def started(estimate: Estimate) -> list[Finding]:
     """Return a finding where levels and starts of the records were estimated, with the largest residual."""
-    if not estimate.free:
+    if not estimate.start.free:
         return []
     along = "the level of every output and the state at the start were estimated along"
-    single = len(estimate.first) == 1
-    if not estimate.rest_refuted:
+    single = len(estimate.start.first) == 1
+    if not estimate.start.rest_refuted:
         begins = "the record begins" if single else "the records begin"
         return [START.found(f"whether {begins} at rest was not asked: {along}")]
-    ratio = np.abs(estimate.first) / np.sqrt(np.diag(estimate.noise))
+    ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
-    first, noise = float(estimate.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
+    first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
     seen = (
         f"a first residual of {first:.3g} where the noise has {noise:.3g}"
         if np.max(ratio) > _SEEN_AT_ONCE
@@ -168,7 +169,7 @@ def band_limited(model: Model, estimate: Estimate) -> list[Finding]:
         "the input was taken for the band-limited interpolation of its samples; where it is held between "
         "them, write plant.sample: zoh"
     )
-    refuted = model.continuous and estimate.failed
+    refuted = model.continuous and estimate.tests.failed
     return [BAND_LIMITED.found(message, where="plant.sample")] if refuted else []
 
 
@@ -179,7 +180,7 @@ def unasked(why: str) -> list[Finding]:
 
 def noise_probability(estimate: Estimate) -> float:
     """Return the probability of residuals as coloured, if the noise model were right."""
-    return min(test.probability for test in estimate.tests if test.fault == "noise")
+    return min(test.probability for test in estimate.tests.scores if test.fault == "noise")
 
 
 def larger_noise(model: Model, probability: float | None) -> list[Finding]:

@@ -132,7 +132,7 @@ def _explains_little(found: Found) -> Iterator[Finding]:
 
 def _unrelated(found: Found) -> Iterator[Finding]:
     idle = set(driven_by_nothing(found.model, found.estimate)) | set(unhelpful(found.model, found.used))
-    worse = {i for i, fit in enumerate(found.estimate.fit) if fit is not None and fit <= 0.0}
+    worse = {i for i, fit in enumerate(found.estimate.simulation.fit) if fit is not None and fit <= 0.0}
     for i in sorted(idle | {i for i in worse if not found.wanders[i]}):
         output = signal_name("y", i, found.model.outputs)
         message = (
@@ -149,7 +149,7 @@ def _unexplained(found: Found) -> Iterator[Finding]:
     Tests alone do not take trust away: with samples enough they refute every model of a real plant, also one
     that explains almost everything. Nor does a poor fit alone: the noise may be strong.
     """
-    failed = {test.name: test for test in found.estimate.failed}
+    failed = {test.name: test for test in found.estimate.tests.failed}
     if not all(failed.keys() & kind for kind in _TESTS):
         return
     worst = min(failed.values(), key=lambda test: test.probability)
@@ -209,7 +209,7 @@ def _rivalled(found: Found) -> list[Finding]:
     w = np.linspace(1e-6, np.pi, 100)
     G, estimate = found.model.plant_at(w), found.estimate
     peaks = np.maximum(np.abs(G).max(axis=0), 1e-300)
-    for rival in estimate.rivals:
+    for rival in estimate.search.rivals:
         other = found.model.at(rival.theta, found.model.covariance).plant_at(w)
         apart = float(np.max(np.abs(other - G) / peaks))
         if rival.excess <= _AS_LIKELY and not apart <= _ELSEWHERE:

@@ -92,7 +92,7 @@ def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
     """Return the stretches in which outputs stand still while an input moves, by output."""
     if data.recorded is None:
         return {}
-    known, simulated = data.recorded, estimate.simulated
+    known, simulated = data.recorded, estimate.simulation.outputs
     found: dict[int, list[Frozen]] = {}
     for one in frozen(
         known.held, known.resolution, data.u, estimate.errors, data.y - simulated, simulated, data.lengths

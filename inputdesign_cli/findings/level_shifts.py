@@ -24,17 +24,17 @@ LEVEL_SHIFT = refuted(
 
 def shifted_levels(estimate: Estimate, data: Samples, time_unit: str) -> list[Finding]:
     """Return a finding where outputs shift, if that explains more than what other tests found."""
-    if not estimate.shifted or data.recorded is None:
+    if not estimate.tests.shifted or data.recorded is None:
         return []
     every = np.arange(len(data.y))
-    what, runs = _described(estimate.shifted, data, data.recorded.rows, every, time_unit)
+    what, runs = _described(estimate.tests.shifted, data, data.recorded.rows, every, time_unit)
     message = (
         f"{what}: did a load change, or the gain? The model takes it for what the inputs do. Leave it out, "
         f"which gives each part a level of its own: {without_option(runs)}; or log what changed as one more "
         "input"
     )
     rows = [[first, last] for _, first, last in runs]
-    return [LEVEL_SHIFT.found(message, probability=chance_of_shifts(estimate.shifted)[0], rows=rows)]
+    return [LEVEL_SHIFT.found(message, probability=chance_of_shifts(estimate.tests.shifted)[0], rows=rows)]
 
 
 def left_out(

@@ -70,8 +70,8 @@ def neglected(
     Args:
         information: (k, k), by which r_u is judged.
     """
-    refuted = {test.name for test in estimate.failed}
-    tried = [directed for directed in estimate.directed if directed.test.name not in refuted]
+    refuted = {test.name for test in estimate.tests.failed}
+    tried = [directed for directed in estimate.tests.directed if directed.test.name not in refuted]
     return [
         max((_largest(model, directed, error, information) for error in errors), key=lambda one: one.may_move)
         for directed in (tried if errors else [])

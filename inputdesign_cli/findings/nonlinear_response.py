@@ -9,8 +9,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding, Severity, doubt, unsure
-from inputdesign_cli.identification.cubes import Cubes
-from inputdesign_cli.identification.silent_lines import SilentLines
+from inputdesign_cli.identification.nonlinearity import Cubes, SilentLines
 from inputdesign_cli.outcome.units import Units
 
 # Silent lines are worth a finding below this probability, times the number of tests.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 
@@ -49,9 +49,8 @@ RECORDS_DIFFER = refuted(
 )
 SAMPLES_REPEATED = refuted(
     "samples-repeated",
-    "Samples seem to be given twice. Residuals of one part follow those of another as noise does not, or "
-    "two files have rows in common. Samples that count twice make an estimate look surer than it is.",
-    "Give each sample once. If the input comes again, raise the orders of the model.",
+    "Two files have rows in common. Samples that count twice make an estimate look surer than it is.",
+    "Give each sample once.",
 )
 
 
@@ -66,7 +65,7 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
     """Return what a prior that the spec `stated` has to do with the estimate."""
     if not stated:
         return []
-    if estimate.agreement is None:
+    if estimate.prior is None:
         message = (
             "experiment.prior does not count for this estimate: it is information without the parameters "
             "that it belongs to; write parameters: {b1: 3.6, ..} beside a matrix, name the model.yaml of "
@@ -85,20 +84,22 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     Args:
         looks: how often it is asked as data come in; they share the level (Bonferroni).
     """
-    agreement, likeness = estimate.agreement, estimate.likeness
-    if agreement is not None and agreement * looks < level("prior"):
+    if estimate.prior is None:
+        return []
+    differing, alike = estimate.prior.differing, estimate.prior.alike
+    if differing * looks < level("prior"):
         message = (
-            f"experiment.prior and these data contradict each other (probability {chance(agreement)} for "
+            f"experiment.prior and these data contradict each other (probability {chance(differing)} for "
             "one system): remove the prior, or look for what has changed since"
         )
-        return [PRIOR_CONTRADICTED.found(message, where=_PRIOR, probability=agreement)]
-    if likeness is not None and likeness * looks < level("prior"):
+        return [PRIOR_CONTRADICTED.found(message, where=_PRIOR, probability=differing)]
+    if alike * looks < level("prior"):
         message = (
             "experiment.prior and these data agree more closely than others do (probability "
-            f"{chance(likeness)}): the prior seems to be made of this record, or of a part or copy of it, "
+            f"{chance(alike)}): the prior seems to be made of this record, or of a part or copy of it, "
             "which would count twice; leave it out, or give only records that it was not made of"
         )
-        return [PRIOR_REPEATED.found(message, where=_PRIOR, probability=likeness)]
+        return [PRIOR_REPEATED.found(message, where=_PRIOR, probability=alike)]
     return []
 
 
@@ -108,8 +109,8 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
     Args:
         looks: see `contradictions`.
     """
-    probability, name = min(zip(estimate.alike, files, strict=False), default=(1.0, ""))
-    if not estimate.alike or probability * len(estimate.alike) * looks >= level("one system"):
+    probability, name = min(zip(estimate.tests.alike, files, strict=False), default=(1.0, ""))
+    if not estimate.tests.alike or probability * len(estimate.tests.alike) * looks >= level("one system"):
         return []
     others = [other for other in files if other != name]
     against = others[0] if len(others) == 1 else "the other records"
@@ -118,33 +119,6 @@ def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> lis
         "parameters differ as much by chance): assess each alone, and look for what has changed between them"
     )
     return [RECORDS_DIFFER.found(message, where=name, probability=probability, against=against)]
-
-
-def repetitions(
-    estimate: Estimate, files: Sequence[tuple[str, int]], copies: Iterable[Finding] = ()
-) -> list[Finding]:
-    """Return a finding where samples seem to be given twice.
-
-    Args:
-        files: names and samples, if known.
-        copies: findings of files that have samples in common.
-    """
-    repeated = estimate.repeated
-    if repeated is None:
-        return list(copies)
-    size = repeated.length
-    files = files or [("the record", repeated.second + size)]
-    ends = np.cumsum([samples for _, samples in files])
-    # By their middle: the ends are not sharp.
-    middles = np.array([repeated.first, repeated.second]) + size // 2
-    first, second = (files[at][0] for at in np.searchsorted(ends, middles, side="right"))
-    where = "others there" if first == second else f"those of {first}"
-    message = (
-        f"the residuals of about {size} samples of {second} follow {where} as noise does not: either "
-        "samples are given twice, which makes the estimate look surer than it is (give each once), or the "
-        "model lacks something that comes again with the same input (raise its orders)"
-    )
-    return [SAMPLES_REPEATED.found(message, where=second, samples=size, of=first)]
 
 
 def shared(one: Array, other: Array) -> NDArray[np.bool_]:

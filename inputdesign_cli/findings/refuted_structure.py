@@ -96,8 +96,8 @@ def refutations(model: Model, estimate: Estimate) -> list[Finding]:
 
     Of an output that shifts see `level_shifts.py`.
     """
-    directed = {one.test: one.alternatives for one in estimate.directed}
-    failing = sorted(estimate.failed_besides, key=lambda test: test.probability)
+    directed = {one.test: one.alternatives for one in estimate.tests.directed}
+    failing = sorted(estimate.tests.failed_besides, key=lambda test: test.probability)
     remedies, found = remedies_of(model), []
     for fault, (kind, sentence) in OF_MANY.items():
         test = next((test for test in failing if test.fault == fault and test not in directed), None)

@@ -79,7 +79,7 @@ def beyond(
         information: (k, k); with it, further than the error bound r_u.
     """
     found, measure = [], "the admissible error" if information is None else "r_u"
-    for rival in estimate.rivals:
+    for rival in estimate.search.rivals:
         ratio, frequency, other = 0.0, 0.0, model.at(rival.theta)
         for error in errors:
             w = error.grid

@@ -10,8 +10,8 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.finding import Finding, unsure
 from inputdesign_cli.findings.nonlinear_response import MATTERS
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.period_drift import PeriodDrift
-from inputdesign_cli.identification.spikes import Spikes
+from inputdesign_cli.identification.faults import Spikes
+from inputdesign_cli.identification.periodic_response import PeriodDrift
 from inputdesign_cli.outcome.units import Units
 
 SPIKES = unsure(

@@ -55,7 +55,7 @@ NOISE_PREVAILS = note(
 def answering(units: Units, estimate: Estimate) -> list[Finding]:
     """Return a finding for each input that answers outputs, or comes after their answer; none in a loop."""
     found = []
-    for test in estimate.answering:
+    for test in estimate.tests.answering:
         name = signal_name("u", test.source, units.inputs)
         message = (
             f"prediction errors help to predict {name} (probability {chance(test.probability)}), and no "
@@ -109,7 +109,7 @@ def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> 
 
 def hardly_explained(units: Units, model: Model, estimate: Estimate) -> Iterator[Finding]:
     """Yield a finding for outputs that are farther from the simulation than from their mean."""
-    far = {i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0}
+    far = {i for i, fit in enumerate(estimate.simulation.fit) if fit is not None and fit < 0.0}
     unrelated = set(driven_by_nothing(model, estimate, units.step)) if far else set()
     for kind, sentence, listed in (
         (

@@ -8,7 +8,15 @@ from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstima
 from inputdesign_cli.identification.estimators import (
     fit_batch as fit_batch,
     identify as identify,
+    information_begun_anywhere as information_begun_anywhere,
     information_of_data as information_of_data,
+)
+from inputdesign_cli.identification.faults import (
+    Frozen as Frozen,
+    Spikes as Spikes,
+    frozen as frozen,
+    resolution_of as resolution_of,
+    spikes as spikes,
 )
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
@@ -16,29 +24,19 @@ from inputdesign_cli.identification.frequency_response import (
     response_delays as response_delays,
     silent_in as silent_in,
 )
-from inputdesign_cli.identification.frozen import (
-    Frozen as Frozen,
-    frozen as frozen,
-    resolution_of as resolution_of,
-)
 from inputdesign_cli.identification.level_shifts import (
     LevelShift as LevelShift,
     chance_of_shifts as chance_of_shifts,
 )
 from inputdesign_cli.identification.mattering import Moves as Moves, that_matter as that_matter
+from inputdesign_cli.identification.minima import Rival as Rival
 from inputdesign_cli.identification.noise_first import (
     Noise as Noise,
     noises_of_residuals as noises_of_residuals,
 )
-from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (
     ResidualTest as ResidualTest,
     cross_correlations as cross_correlations,
     whiteness as whiteness,
-)
-from inputdesign_cli.identification.rivals import Rival as Rival
-from inputdesign_cli.identification.spikes import Spikes as Spikes, spikes as spikes
-from inputdesign_cli.identification.unknown_start import (
-    information_begun_anywhere as information_begun_anywhere,
 )
 from inputdesign_cli.identification.variations import RISING as RISING

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.noise_first import Whitening
-from inputdesign_cli.identification.record_problem import Point
+from inputdesign_cli.identification.problem import Point
 from inputdesign_cli.identification.records import Records, shifted
-from inputdesign_cli.identification.white import DEPENDENT, Echoes, White
+from inputdesign_cli.identification.white import DEPENDENT, White
 from inputdesign_cli.levels import level
 
 _LAGS = 25
@@ -108,38 +108,28 @@ def score(white: White, columns: Array, means: Array) -> Score:
 
 
 def score_tests(
-    records: Records,
-    point: Point,
-    white: White,
-    *,
-    recent: int,
-    feedback: bool = False,
-    echoes: Echoes | None = None,
-    robust: White | None = None,
+    records: Records, theta: Array, white: White, *, feedback: bool, robust: White | None
 ) -> tuple[ScoreTest, ...]:
     """Return the score tests of past inputs, past residuals and trends.
 
     Args:
-        white: the estimate in the units of its noise.
-        recent: the lag up to which the structure looks at the inputs.
+        theta: (k,), the estimate; `white`, in the units of its noise.
         feedback: whether u(t) depends on y(t); then past inputs begin with u(t - 1).
-        echoes: what past errors add to the gradients of parameters, if anything. None: unknown; scores are
-            then compared with zero.
         robust: the estimate with whitened residuals, for all regressors but past residuals.
     """
     tests = []
-    of_inputs = caused(records, point.theta, recent, feedback=feedback)
-    for tried in [*of_inputs, *past_residuals(records, white), _trend(records, point.theta)]:
+    of_inputs = caused(records, theta, feedback=feedback)
+    for tried in [*of_inputs, *past_residuals(records, white), _trend(records, theta)]:
         own = white if robust is None or tried.of_residuals else robust
-        found = _tested(records, own, tried, echoes)
+        found = _tested(records, own, tried)
         tests += [] if found is None else [found]
     return tuple(tests)
 
 
-def _tested(records: Records, white: White, tried: Regressors, echoes: Echoes | None) -> ScoreTest | None:
+def _tested(records: Records, white: White, tried: Regressors) -> ScoreTest | None:
     columns = tried.white(white)
     means = np.zeros(columns.shape[1])
-    if tried.of_residuals and echoes is not None:
+    if tried.of_residuals and white.foreseen:
         means = _mean_scores(records, white, tried.lags)
     found = score(white, columns, means)
     freedom = found.directions.shape[1]
@@ -184,9 +174,7 @@ def robust_white(
     white: White,
     *,
     less: White,
-    recent: int,
     feedback: bool,
-    echoes: Echoes | None,
     more: Sequence[NDArray[np.float64]],
 ) -> White | None:
     """Return the estimate with whitened residuals, or None if the stated noise model is not refuted.
@@ -195,64 +183,54 @@ def robust_white(
     noise is judged. The part that inputs explain is taken off before the noise is estimated.
 
     Args:
-        less: `white` once level shifts are taken off; for the rest see `score_tests`.
+        less: `white` once level shifts are taken off.
         more: columns (N, p) of single parameters.
     """
 
     def white_enough(judged: White) -> bool:
-        tests = [_tested(records, judged, tried, echoes) for tried in past_residuals(records, judged)]
+        tests = [_tested(records, judged, tried) for tried in past_residuals(records, judged)]
         return not failed([test for test in tests if test is not None])
 
     if white_enough(white) or white_enough(less):
         return None
-    of_inputs = caused(records, point.theta, recent, feedback=feedback)
+    of_inputs = caused(records, point.theta, feedback=feedback)
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
     trend = _trend(records, point.theta).white(white)
     # Few regressors first: many explain a part of right residuals, which correlates the rest.
     if any(white_enough(less.without(x)) for x in (trend, columns, np.column_stack([columns, trend]))):
         return None
-    whitening = Whitening.of(white.without(columns).errors, records.lengths)
-    return White.of(records, point, whitening=whitening)
+    return White.of(records, point, Whitening.of(white.without(columns).errors, records.lengths))
 
 
-def future_tests(
-    records: Records, theta: Array, white: White, recent: int, echoes: Echoes | None
-) -> tuple[ScoreTest, ...]:
+def future_tests(records: Records, theta: Array, white: White) -> tuple[ScoreTest, ...]:
     """Return for every input the test whether its future explains prediction errors.
 
     In open loop no input knows them beforehand. One does that answers the outputs, or that was logged late.
     Whatever past inputs explain is taken off, since an input is foretold by its own past.
     """
-    lags = min(
-        _AHEAD,
-        max(records.samples // (_SAMPLES_A_DIRECTION * sum(records.u.shape[1:] + records.y.shape[1:])), 1),
-    )
-    past = [tried.white(white) for tried in caused(records, theta, recent, feedback=False)]
-    white = white.without(np.column_stack(past))
-    turned = records.lengths[::-1]
-    u = records.whitened(theta, records.u)
+    channels = records.u.shape[1] + records.y.shape[1]
+    lags = _each(1, min(_AHEAD, max(records.samples // (_SAMPLES_A_DIRECTION * channels), 1)))
+    past = [tried.white(white) for tried in caused(records, theta, feedback=False)]
+    white, turned = white.without(np.column_stack(past)), replace(records, parts=records.parts[::-1])
+    u = records.whitened(theta, records.u)[:, ::-1]
     found = []
     for j in range(u.shape[2]):
-        own = u[:, ::-1, j].T
-        ahead = [shifted(own, lag, turned)[::-1].T for lag in range(1, lags + 1)]
-        tried = Regressors(
-            f"future of u{j + 1}", "feedback", np.stack(ahead, axis=2), tuple(range(1, lags + 1))
-        )
-        test = _tested(records, white, tried, echoes)
+        ahead, at = _summed(turned, u[:, :, j : j + 1], lags)
+        test = _tested(records, white, Regressors(f"future of u{j + 1}", "feedback", ahead[:, ::-1], at))
         found += [] if test is None else [replace(test, source=j)]
     return tuple(found)
 
 
-def caused(records: Records, theta: Array, recent: int, *, feedback: bool) -> list[Regressors]:
+def caused(records: Records, theta: Array, *, feedback: bool) -> list[Regressors]:
     """Return past inputs at lags of the structure, and sums of them over ever longer runs of lags."""
     n, first = records.samples, int(feedback)
     u = records.whitened(theta, records.u)
     most = max(n // _SAMPLES_A_DIRECTION, 2)
-    near = tuple(range(first, min(recent + _FEW, most // u.shape[2]) + 1))
+    near = _each(first, min(records.kind.recent + _FEW, most // u.shape[2]))
     bins = _bins(first, min(n // 6, _FARTHEST), most // u.shape[2])
     return [
-        Regressors("recent_inputs", "plant", *_lagged(records, u, near)),
+        Regressors("recent_inputs", "plant", *_summed(records, u, near)),
         Regressors("older_inputs", "plant", *_summed(records, u, bins)),
     ]
 
@@ -261,11 +239,11 @@ def past_residuals(records: Records, white: White) -> list[Regressors]:
     """Return past residuals at few lags and at many."""
     n, p = records.y.shape
     most = max(n // _SAMPLES_A_DIRECTION, 2)
-    few, many = (tuple(range(1, min(lags, max(most // p, 1)) + 1)) for lags in (_FEW, _LAGS))
+    few, many = (_each(1, min(lags, max(most // p, 1))) for lags in (_FEW, _LAGS))
     own = np.repeat(white.errors[None], p, axis=0)
     return [
-        Regressors("recent_residuals", "noise", *_lagged(records, own, few), of_residuals=True),
-        Regressors("older_residuals", "noise", *_lagged(records, own, many), of_residuals=True),
+        Regressors("recent_residuals", "noise", *_summed(records, own, few), of_residuals=True),
+        Regressors("older_residuals", "noise", *_summed(records, own, many), of_residuals=True),
     ]
 
 
@@ -299,14 +277,6 @@ def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
     return np.stack(each, axis=1).reshape(-1)
 
 
-def _lagged(
-    records: Records, x: NDArray[np.float64], lags: Sequence[int]
-) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    """Return signals x (p, N, m) at every lag, (p, N, lags m), and the lag of each."""
-    parts = [shifted(x.swapaxes(0, 1), lag, records.lengths).swapaxes(0, 1) for lag in lags]
-    return np.concatenate(parts, axis=2), tuple(lag for lag in lags for _ in range(x.shape[2]))
-
-
 def _bins(first: int, last: int, most: int) -> list[tuple[int, int]]:
     """Return lags from `first` on, one by one and then in ever longer runs: first and one past the last."""
     bins: list[tuple[int, int]] = []
@@ -316,6 +286,11 @@ def _bins(first: int, last: int, most: int) -> list[tuple[int, int]]:
         bins.append((begin, end))
         begin, width = end, width * (_GROWTH if end > _FEW else 1.0)
     return bins
+
+
+def _each(first: int, last: int) -> list[tuple[int, int]]:
+    """Return lags one by one, as runs of one."""
+    return [(lag, lag + 1) for lag in range(first, last + 1)]
 
 
 def _summed(

@@ -8,15 +8,21 @@ narrow band of excitation hardly contradicts a model that is wrong at its edge.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.adequacy import Fault, Score, ScoreTest, score
-from inputdesign_cli.identification.white import Echo, Echoes, White
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.kind import Echo, Extension
+from inputdesign_cli.identification.problem import RecordProblem, evaluate
+from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.model import DELAY
 
 # A parameter of whose effect the estimate explains all but this share is not tried.
 _EXPLAINED = 1e-6
@@ -24,6 +30,7 @@ _EXPLAINED = 1e-6
 _OPEN, _LITTLE = 0.3, 0.1
 # Directions with a larger cosine are one.
 _SAME = 0.99
+_LAGS = ("a", "f", DELAY)
 
 
 @dataclass(frozen=True)
@@ -103,13 +110,12 @@ _Tried = tuple[Alternative, Array, Array]
 
 
 def directed_tests(
-    white: White, alternatives: Sequence[Alternative], parameters: int, echoes: Echoes | None = None
+    white: White, alternatives: Sequence[Alternative], parameters: int
 ) -> tuple[Directed, ...]:
     """Return the test of every alternative; alternatives that these data cannot distinguish share one.
 
     Args:
         parameters: k of the model.
-        echoes: what past errors add to the gradients of parameters; None if that is not known.
     """
     groups: list[list[_Tried]] = []
     for alternative in alternatives:
@@ -122,11 +128,11 @@ def directed_tests(
         alike = (group for group in groups if abs(group[0][2] @ tried[2]) > _SAME)
         group = next(alike, None)
         groups.append([tried]) if group is None else group.append(tried)
-    return tuple(_tested(white, group, parameters, echoes) for group in groups)
+    return tuple(_tested(white, group, parameters) for group in groups)
 
 
-def _tested(white: White, group: list[_Tried], parameters: int, echoes: Echoes | None) -> Directed:
-    found, mean = _score(white, group[0], echoes)
+def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
+    found, mean = _score(white, group[0])
     statistic, directions = found.statistic, found.directions
     larger: Model | None = None
     if white.whitening is None and white.probability(statistic, directions) < _OPEN:
@@ -138,7 +144,7 @@ def _tested(white: White, group: list[_Tried], parameters: int, echoes: Echoes |
             group.sort(key=lambda tried: likeliest.index(tried[0]) if tried[0] in likeliest else len(group))
             # A likelihood ratio has no mean to be compared with.
             statistic = max(statistic, ratio) if abs(mean) <= _LITTLE else statistic
-            found, _ = _score(white, group[0], echoes)
+            found, _ = _score(white, group[0])
     _, column, along = group[0]
     size = float(along @ column)
     scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
@@ -157,10 +163,42 @@ def _tested(white: White, group: list[_Tried], parameters: int, echoes: Echoes |
     )
 
 
-def _score(white: White, tried: _Tried, echoes: Echoes | None) -> tuple[Score, float]:
+def _score(white: White, tried: _Tried) -> tuple[Score, float]:
     """Return the score of a regressor, and the mean of it in its standard deviations."""
     alternative, column, along = tried
-    own = 0.0 if echoes is None or alternative.echo is None else white.echoes(alternative.echo)
+    own = white.echoes(alternative.echo) if white.foreseen and alternative.echo is not None else 0.0
     mean = np.array([own])
     expected = float(white.mean_left(column[:, None], mean)[0])
     return score(white, column[:, None], mean), expected / float(along @ column)
+
+
+def alternative(extension: Extension, records: Records) -> Alternative:
+    """Return the parameter as a regressor of the prediction errors of records."""
+    model, index = extension.model, extension.model.names.index(extension.name)
+    larger = replace(records, kind=extension.kind, earlier=None)
+    again = partial(_estimated, larger, model, index)
+    return Alternative(
+        extension.name,
+        f"one more {extension.what} ({extension.name})",
+        "plant" if model.in_plant[index] else "noise",
+        larger.gradient(model.theta, index),
+        lambda model, w: extension.model.plant_gradient(w)[None, :, index],
+        lag=model.parameters[index].letter in _LAGS,
+        echo=None if extension.through is None else extension.through(records.lengths),
+        estimated=again if extension.nested and records.earlier is None else None,
+    )
+
+
+def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float]:
+    """Return the larger model that a search from here finds, and -2 log of the likelihood ratio.
+
+    Both costs are with the unknown starts of the larger structure; that without the parameter is by one
+    step of Gauss and Newton from here.
+    """
+    theta: Array = model.theta
+    found = minimise(RecordProblem((records,)), theta[None])
+    point, others = evaluate(records, theta), np.arange(theta.size) != index
+    slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
+    cost = point.cost - float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
+    ratio = float(point.near.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
+    return model.at(found.theta[0]), ratio

@@ -1,26 +1,37 @@
-"""Which estimator belongs to which kind of model: a new kind registers its own with `estimator`."""
+"""Estimate models of any kind from records: one estimate with its tests, or many at once.
+
+A new kind of model registers what it supplies with `estimator`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import singledispatch
-from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.watching import Counted, tell
+from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.coloured import ColouredKind
 from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, information_of
-from inputdesign_cli.identification.kind import Kind, fit_batches, identify_records
-from inputdesign_cli.identification.polynomials import PolynomialKind, fit_polynomials
-from inputdesign_cli.identification.record_problem import evaluate
-from inputdesign_cli.identification.records import Records, centred, split
+from inputdesign_cli.identification.estimate import (
+    BatchEstimate,
+    Estimate,
+    concluded,
+    information_of,
+    noise_of,
+)
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.kind import Kind, Starts
+from inputdesign_cli.identification.polynomials import FromRest, PolynomialKind
+from inputdesign_cli.identification.problem import RecordProblem, evaluate, inverses
+from inputdesign_cli.identification.records import Records, centred, longest, split
 from inputdesign_cli.identification.reparametrised import ReparametrisedKind
+from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.state_space import StateSpaceKind
-from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.identification.transfer_matrix import TransferKind, fit_transfer_matrices
+from inputdesign_cli.identification.transfer_matrix import TransferKind, refine
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -35,45 +46,13 @@ from inputdesign_cli.plant import (
 # Of records that follow each other; None for one.
 Lengths = Sequence[int] | None
 
-
-class Estimator(Protocol):
-    """Estimates the structure of one model: what its records answer, and many of them at once."""
-
-    @property
-    def kind(self) -> Kind:
-        """Return the structure that is estimated."""
-
-    def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        """Estimate many records; see the function of this name."""
-
-
-@dataclass(frozen=True)
-class _Polynomials:
-    kind: PolynomialKind
-
-    def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        return fit_polynomials(self.kind.model, u, y, start=start)
-
-
-@dataclass(frozen=True)
-class _TransferMatrix:
-    kind: TransferKind
-
-    def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        return fit_transfer_matrices(self.kind.model, u, y, self.kind.between, start=start)
-
-
-@dataclass(frozen=True)
-class _Recorded:
-    kind: Kind
-
-    def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        return fit_batches(self.kind, u, y, start)
+# Numbers that unknown starts may take up: inputs of long dead times are taken for known beyond.
+_MOST = 2e7
 
 
 @singledispatch
-def estimator(model: Model, step: float) -> Estimator:
-    """Return the estimator for models of this kind, from samples `step` apart.
+def estimator(model: Model, step: float) -> Kind:
+    """Return what models of this kind supply to be estimated, from samples `step` apart.
 
     Models in discrete time have their own step.
 
@@ -84,39 +63,39 @@ def estimator(model: Model, step: float) -> Estimator:
 
 
 @estimator.register
-def _(model: PolynomialModel, step: float) -> Estimator:
-    return _Polynomials(PolynomialKind(model, Structure.of(model)))
+def _(model: PolynomialModel, step: float) -> Kind:
+    return PolynomialKind(model)
 
 
 @estimator.register
-def _(model: ContinuousModel, step: float) -> Estimator:
-    return _TransferMatrix(TransferKind(model, Intersample(step, hold=False)))
+def _(model: ContinuousModel, step: float) -> Kind:
+    return TransferKind(model, Intersample(step, hold=False))
 
 
 @estimator.register
-def _(model: SampledModel, step: float) -> Estimator:
-    return _TransferMatrix(TransferKind(model.continuous_plant, Intersample(model.sample_time, hold=True)))
+def _(model: SampledModel, step: float) -> Kind:
+    return TransferKind(model.continuous_plant, Intersample(model.sample_time, hold=True))
 
 
 @estimator.register
-def _(model: Reparametrised, step: float) -> Estimator:
-    return _Recorded(ReparametrisedKind(model, estimator(model.coefficients, step).kind))
+def _(model: Reparametrised, step: float) -> Kind:
+    return ReparametrisedKind(model, estimator(model.coefficients, step))
 
 
 @estimator.register
-def _(model: StateSpaceModel, step: float) -> Estimator:
-    return _Recorded(StateSpaceKind(model))
+def _(model: StateSpaceModel, step: float) -> Kind:
+    return StateSpaceKind(model)
 
 
 @estimator.register
-def _(model: Coloured, step: float) -> Estimator:
-    return _Recorded(ColouredKind(model, estimator(model.plant, step).kind))
+def _(model: Coloured, step: float) -> Kind:
+    return ColouredKind(model, estimator(model.plant, step))
 
 
 def identify(
     model: Model,
-    u: Array,
-    y: Array,
+    u: ArrayLike,
+    y: ArrayLike,
     step: float = 1.0,
     *,
     start: Array | None = None,
@@ -128,12 +107,12 @@ def identify(
     near: bool = False,
     ramp: bool = False,
 ) -> Estimate:
-    """Estimate the structure of `model` from one record, or jointly from several.
+    """Return the maximum-likelihood estimate of a structure from one record, or jointly from several.
 
     Args:
         model: gives the orders, zero entries, common polynomials and known parameters; its other numbers
             are not used.
-        u, y: (samples, r), (samples, p).
+        u, y: (N, r), (N, p).
         step: time between samples of a plant in continuous time.
         start: (k,), tried besides starts that are made from the data.
         feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
@@ -143,36 +122,91 @@ def identify(
         earlier: an estimate from other data, which counts along.
         experiments: the samples of each experiment, of one or several records; None: all are of one.
         near: whether `start` is an estimate of such data already, so that no others are made.
-        ramp: whether outputs may drift along a line in every record, whose slope is estimated along.
+        ramp: whether outputs may drift along a line in every record, whose slope is estimated along; no
+            record then begins at rest.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
             `not-exciting`.
     """
-    return identify_records(
-        estimator(model, step).kind,
-        np.asarray(u, dtype=float),
-        np.asarray(y, dtype=float),
-        start=start,
-        feedback=feedback,
-        lengths=lengths,
-        rest=rest,
-        earlier=earlier,
-        experiments=experiments,
-        near=near,
-        ramp=ramp,
-    )
+    kind, inputs, outputs = estimator(model, step), np.asarray(u, dtype=float), np.asarray(y, dtype=float)
+    check_length(len(outputs), len(kind.names), kind.recent, outputs=kind.outputs)
+    check_varying(kind.names, inputs, outputs)
+    parts = tuple(split(inputs, outputs, lengths))
+
+    def searched(records: Records, known: Array | None) -> Search:
+        chosen = longest(parts)
+        if near and start is not None:
+            begin = Starts(start[None], np.zeros(1, dtype=np.int64), 1)
+        else:
+            begin = kind.starting_points(centred(chosen) if records.free else chosen, start)
+        others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
+        points = np.concatenate([begin.points, *(theta[None] for theta in others)])
+        steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
+        tell(Counted("starting points followed to a minimum", 0, len(points)))
+        return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
+
+    records = Records(kind, parts, earlier=earlier, ramp=ramp)
+    best = from_rest_or_free(records, False if ramp else rest, searched, start)
+    return concluded(best, outputs, experiments=experiments or (len(outputs),), feedback=feedback)
 
 
-def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:
+def fit_batch(
+    model: Model, u: ArrayLike, y: ArrayLike, step: float = 1.0, *, start: ArrayLike
+) -> BatchEstimate:
     """Estimate many records in one pass, each from a single start, without checks.
 
     Args:
         model, step: see `identify`.
-        u, y: (runs, samples, r), (runs, samples, p).
+        u: (N, r) common to all runs, or (runs, N, r).
+        y: (runs, N, p).
         start: (k,) for all runs, or (runs, k).
     """
-    return estimator(model, step).fit_batch(u, y, start)
+    kind, outputs = estimator(model, step), np.asarray(y, dtype=float)
+    inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
+    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.names)))
+    return _fitted(kind, inputs, outputs, np.array(begin))
+
+
+@singledispatch
+def _fitted(kind: Kind, u: Array, y: Array, start: Array) -> BatchEstimate:
+    """Return the estimates of records (runs, N, r), (runs, N, p) from starts (runs, k)."""
+    records = tuple(Records(kind, (run,)) for run in zip(u, y, strict=True))
+    return _from(records, start, np.zeros(len(y), dtype=np.int64))
+
+
+@_fitted.register
+def _(kind: TransferKind, u: Array, y: Array, start: Array) -> BatchEstimate:
+    records = tuple(Records(kind, (run,)) for run in zip(u, y, strict=True))
+    refined = [
+        refine(record, kind, evaluate(record, record.stabilised(row)))
+        for record, row in zip(records, start, strict=True)
+    ]
+    theta = np.array([point.theta for point, _ in refined])
+    return _from(records, theta, np.array([steps for _, steps in refined]))
+
+
+@_fitted.register
+def _(kind: PolynomialKind, u: Array, y: Array, start: Array) -> BatchEstimate:
+    problem = FromRest(kind.rows, *(np.ascontiguousarray(x.swapaxes(1, 2)) for x in (u, y)))
+    found = minimise(problem, start)
+    sums, left = problem.sums(found.theta), np.sqrt(np.maximum(y.shape[1] - kind.own(), 1.0))
+    noise = sums.errors / np.outer(left, left)
+    information = sums.weighed(inverses(noise)[0])[0]
+    return BatchEstimate(found.theta, noise, information, found.converged, found.steps)
+
+
+def _from(records: tuple[Records, ...], start: Array, steps: Array) -> BatchEstimate:
+    """Return the estimates of many runs from starts (runs, k), and the `steps` (runs,) made to each."""
+    found = minimise(RecordProblem(records), start)
+    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
+    noise = np.array(
+        [noise_of(point, record.kind.own()) for record, point in zip(records, points, strict=True)]
+    )
+    information = np.array([information_of(*each) for each in zip(records, points, noise, strict=True)])
+    return BatchEstimate(
+        found.theta, noise, information, found.converged, found.steps + steps.astype(np.int64)
+    )
 
 
 def information_of_data(
@@ -193,8 +227,21 @@ def information_of_data(
         model, u, y, step, lengths, earlier: see `identify`.
         free: whether starts and levels of the records are unknown.
     """
-    kind, parts = estimator(model, step).kind, split(u, y, lengths)
-    made = tuple(kind.record(*part) for part in (centred(parts) if free else parts))
-    records = Records(made, free=free)
-    told = information_of(records, evaluate(records, model.theta), model.covariance)
-    return told if earlier is None else told + earlier.information
+    parts = split(u, y, lengths)
+    records = Records(estimator(model, step), tuple(centred(parts) if free else parts), free=free)
+    found = information_of(records, evaluate(records, model.theta), model.covariance)
+    return found if earlier is None else found + earlier.information
+
+
+def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) -> Array:
+    """Return the information matrix (k, k) of a record whose initial state and level are unknown.
+
+    Args:
+        u, y: (N, r), (N, p), signals without noise; the excitation of both is all that is counted.
+        step: time between samples of a plant in continuous time.
+    """
+    weights = np.asarray(np.linalg.inv(model.covariance), dtype=float)
+    records = Records(estimator(model, step), ((u, y),), weights=weights)
+    late = records.kind.lateness(model.theta)
+    free = records.begun_freely(late if late * u.shape[1] * y.shape[1] * y.size <= _MOST else 0)
+    return information_of(free, evaluate(free, model.theta), model.covariance)

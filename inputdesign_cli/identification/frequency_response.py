@@ -19,15 +19,14 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.identification.late_inputs import behind
-from inputdesign_cli.identification.period_drift import line_of_periods
+from inputdesign_cli.identification.nonlinearity import SilentLines, silent_lines
 from inputdesign_cli.identification.periodic_response import (
     PeriodicResponse,
     Periods,
     excited_harmonics,
+    line_of_periods,
     periodic_response,
 )
-from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.plant import Model
 
 CONFIDENCE = 0.95
@@ -204,10 +203,17 @@ def _turns(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> b
 
 def _delayed(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
     """The response, output by output, to inputs that are delayed first; what lies before them is left out."""
-    found = []
+    found, begin = [], int(delays.max())
     for i, late in enumerate(delays):
-        shifted = behind([(u, y[:, i : i + 1]) for _, u, y in records], late, int(delays.max()))
-        one = _local_polynomial([(u, u, y) for u, y in shifted]) if shifted else None
+        moved = [
+            (
+                np.stack([u[begin - d : len(u) - d, j] for j, d in enumerate(late)], axis=1),
+                y[begin:, i : i + 1],
+            )
+            for _, u, y in records
+            if len(y) > begin
+        ]
+        one = _local_polynomial([(u, u, y) for u, y in moved]) if moved else None
         if one is None:
             return None
         turned = np.exp(-1j * np.outer(one.frequency, late))

@@ -7,7 +7,7 @@ that of [levenberg-1944].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Protocol, Self
 
 import numpy as np
@@ -62,6 +62,11 @@ class Minimum:
     hessian: NDArray[np.float64]
     converged: NDArray[np.bool_]
     steps: NDArray[np.int64]
+
+    def and_of(self, other: Minimum, runs: NDArray[np.bool_] | slice = slice(None)) -> Minimum:
+        """Return these runs, then some `runs` of another."""
+        fields = zip(astuple(self), astuple(other), strict=True)
+        return Minimum(*(np.concatenate([mine, its[runs]]) for mine, its in fields))
 
 
 def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: float = 0.0) -> Minimum:

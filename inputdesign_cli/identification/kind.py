@@ -1,34 +1,30 @@
-"""An estimate from records, whatever the kind of model: what a kind answers, and the road from data to it."""
+"""What a kind of model supplies to be estimated: prediction errors, their Jacobian, starts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol, Self
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.identification.checks import check_length, check_varying
-from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.estimate import (
-    BatchEstimate,
-    Estimate,
-    concluded,
-    information_of,
-    noise_of,
-)
-from inputdesign_cli.identification.extensions import Extension
-from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Record, Records, centred, longest, split
-from inputdesign_cli.identification.search import Search, from_rest_or_free, search
-from inputdesign_cli.identification.variations import variations
-from inputdesign_cli.identification.white import Echoes
+from inputdesign_cli.identification.start import Start, central_differences
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.model import Listed, Parameter
 
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""
+
+Echo = Callable[[Array], Array]
+"""What past errors (N, p) add to the gradient of a parameter."""
+Echoes = Sequence[tuple[int, Echo]]
+"""Such, and the places of the parameters in theta."""
+
+# Of a parameter, or of one, for central differences.
+_STEP = 1e-6
 
 
 class Starts(NamedTuple):
@@ -38,45 +34,143 @@ class Starts(NamedTuple):
     steps: NDArray[np.int64]
     tried: int
 
+    def with_points(self, points: Sequence[Array], given: Array | None) -> Starts:
+        """Return the starts with other parameters, after the `given` ones (k,), if any."""
+        listed = [given] if given is not None else []
+        steps = np.append(np.zeros(len(listed), dtype=np.int64), self.steps)
+        return Starts(np.array([*listed, *points]), steps, self.tried + len(listed))
 
-class Kind(Protocol):
-    """A structure of k parameters and p outputs that records are to determine."""
+
+@dataclass(frozen=True)
+class Extension:
+    """An additional parameter of a structure.
+
+    Attributes:
+        model: the larger model, whose new parameter is zero. If the model has other parameters than its
+            coefficients, this is the model of the coefficients.
+        kind: of the larger model; in place of `model`, it may be behind a hold.
+        name: of the new parameter; `what` it is.
+        nested: whether that structure has no further freedom than the one parameter.
+        through: made for the lengths of records, what past errors (N, p) add to the gradient; None if
+            they add nothing.
+    """
+
+    model: Listed
+    kind: Kind
+    name: str
+    what: str
+    nested: bool = True
+    through: Callable[[Sequence[int]], Echo | None] | None = None
+
+
+@dataclass(frozen=True)
+class Kind(ABC):
+    """A structure of k parameters and p outputs that records are to determine, here with white noise.
+
+    Samples are u (N, r), y (N, p). Where a record does not begin at rest (`free`), unknown inputs before it
+    act for `late` samples.
+    """
+
+    model: Model
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names (k,) of the parameters."""
+        return self.model.names
 
     @property
     def outputs(self) -> int:
         """Return the number of outputs p."""
+        return self.model.outputs
 
     @property
     def continuous(self) -> bool:
         """Return whether frequencies of the model are in rad per time unit."""
+        return self.model.continuous
 
     @property
     def recent(self) -> int:
-        """Return the lag up to which the structure looks at the inputs."""
+        """Return the lag up to which the structure looks at the inputs; of others they act through poles."""
+        return 0
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
         """Return the mask (k,) of the parameters that take directions of past inputs away from residuals."""
+        return self.model.in_plant
 
     @property
     def whitening(self) -> NDArray[np.bool_]:
         """Return the mask (k,) of the parameters that make residuals look whiter."""
+        return ~self.explaining
 
+    @abstractmethod
     def own(self) -> Array:
         """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
 
-    def record(self, u: Array, y: Array) -> Record:
-        """Return the record of samples u (N, r), y (N, p) that the structure is to explain."""
+    @abstractmethod
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
 
-    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    @abstractmethod
+    def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
+        """Return for each output the effect of the past of a record on its prediction errors.
+
+        Args:
+            free: whether level and states are unknown; else the plant is at rest at zero, and noise is not.
+        """
+
+    @abstractmethod
+    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
+        """Return the parameters on which the starts depend."""
+
+    def start_step(self, theta: Array, index: int, samples: int) -> float:
+        """Return by how much a parameter is moved to differentiate the starts."""
+        return _STEP * max(abs(float(theta[index])), 1.0)
+
+    def start_slopes(
+        self, theta: Array, indices: Sequence[int], samples: int, late: int, *, free: bool
+    ) -> list[tuple[Start, ...]]:
+        """Return the derivatives of the starts with respect to each of these, by central differences."""
+        sizes = [self.start_step(theta, index, samples) for index in indices]
+        return central_differences(
+            lambda point: self.starts(point, samples, late, free=free), theta, indices, sizes
+        )
+
+    def lateness(self, theta: Array) -> int:
+        """Return the samples in which inputs from before a record act by other ways than the states."""
+        return 0
+
+    @property
+    def instants(self) -> float | None:
+        """Return the time between sampling instants, where dead times make kinks of the cost; else None."""
+        return None
+
+    def crossings(self, theta: Array, samples: int) -> Array:
+        """Return steps (m, 2, k) of a dead time to nearby sampling instants, and half a sample beyond."""
+        found, step = [], self.instants
+        for index in np.flatnonzero(self.model.dead_times) if step else ():
+            begun = np.floor(theta[index] / step)
+            for instant, beyond in ((begun - 1, -0.5), (begun, -0.5), (begun + 1, 0.5), (begun + 2, 0.5)):
+                if 0.0 < instant < samples - 1:
+                    there = (instant * step - theta[index], (instant + beyond) * step - theta[index])
+                    found.append(np.outer(there, np.eye(theta.size)[index]))
+        return np.array(found).reshape(-1, 2, theta.size)
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
+        return np.repeat(signals[None], self.outputs, axis=0)
+
+    @abstractmethod
+    def stabilised(self, theta: Array, samples: int) -> Array:
+        """Return theta (k,) with a stable predictor."""
+
+    @abstractmethod
+    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """Return starting points: made from records at rest about zero, and the `given` one (k,)."""
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
-        """Return the kind with starts that keep `known` parameters (k,), if its starts can do that."""
+        """Return the kind with starting points that keep `known` parameters (k,), if they can do that."""
+        return self
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """Return the extensions of the structure at theta (k,) by one parameter.
@@ -84,126 +178,31 @@ class Kind(Protocol):
         Args:
             feedback: whether u(t) depends on y(t).
         """
+        return ()
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
         """Return what past errors add to gradients at theta (k,), in records of `lengths`; None: unknown."""
+        return ()
 
-    def simulated(
-        self, found: Search, y: Array, lengths: Sequence[int] | None
-    ) -> tuple[Array, Sequence[bool]]:
-        """Return the effect of inputs and starts (N, p), and which outputs can be simulated."""
+    def caused(self, theta: Array, u: Array, begun: Array) -> Array:
+        """Return the response (N, p) to inputs, and to errors that the start of the record explains."""
+        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+            return np.asarray(sum(self.model.at(theta).simulate(u, begun, 1.0)))
 
-
-def identify_records(
-    kind: Kind,
-    u: Array,
-    y: Array,
-    *,
-    start: Array | None,
-    feedback: bool,
-    lengths: Sequence[int] | None,
-    rest: bool | None,
-    earlier: Earlier | None,
-    experiments: Sequence[int] | None = None,
-    weights: Array | None = None,
-    near: bool = False,
-    ramp: bool = False,
-) -> Estimate:
-    """Return the maximum-likelihood estimate of a structure from one record, or jointly from several.
-
-    Args:
-        kind: gives names, orders and delays; its numbers are not used.
-        u, y: (N, r), (N, p).
-        start: (k,), tried besides starts that are made from the data.
-        feedback: whether u(t) depends on y(t); the tests of the residuals account for it.
-        lengths: of the records that follow each other in u and y; None for one.
-        rest: whether each begins at rest about zero; None: as the data say.
-        earlier: an estimate from other data, which counts along.
-        experiments: the samples of each experiment, of one or several records; None: all are of one.
-        weights: W (p, p) of the errors if the covariance of the noise is known.
-        near: whether `start` is an estimate of such data already, so that no others are made.
-        ramp: whether outputs may drift along a line in every record, whose slope is estimated along; no
-            record then begins at rest.
-
-    Raises:
-        SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
-            `not-exciting`.
-    """
-    check_length(len(y), len(kind.names), kind.recent, outputs=kind.outputs)
-    check_varying(kind.names, u, y)
-    parts = split(u, y, lengths)
-
-    def records_of(signals: Sequence[Part]) -> Records:
-        made = tuple(kind.record(*part) for part in signals)
-        return Records(made, weights=weights, earlier=earlier, ramp=ramp)
-
-    def searched(records: Records, known: Array | None) -> Search:
-        chosen = longest(parts)
-        if near and start is not None:
-            begin = Starts(start[None], np.zeros(1, dtype=np.int64), 1)
-        else:
-            begin = kind.starts(centred(chosen) if records.free else chosen, start)
-        others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
-        points = np.concatenate([begin.points, *(theta[None] for theta in others)])
-        steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
-        tell(Counted("starting points followed to a minimum", 0, len(points)))
-        return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
-
-    known_rest = False if ramp else rest
-    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), known_rest, searched, start)
-    simulated, stable = kind.simulated(best, y, lengths)
-    moved = None if kind.continuous or not all(stable) else simulated
-    return concluded(
-        kind.names,
-        best,
-        y,
-        simulated,
-        stable,
-        own=kind.own(),
-        in_noise=int(np.sum(kind.whitening)),
-        in_plant=int(np.sum(kind.explaining)),
-        recent=kind.recent,
-        alternatives=(
-            *(one.against(best.records) for one in kind.extensions(best.point.theta, feedback=feedback)),
-            *variations(best.records, kind.record, best.point.theta, moved),
-        ),
-        experiments=experiments or (len(y),),
-        feedback=feedback,
-        echoes=kind.echoes(best.point.theta, best.records.lengths),
-    )
+    def simulates(self, theta: Array) -> Sequence[bool]:
+        """Return which outputs are stable, so that they can be simulated."""
+        return (True,) * self.outputs
 
 
-def fit_records(records: Sequence[Records], start: Array, steps: Array, own: Array) -> BatchEstimate:
-    """Return the estimates of many runs, each from its one start (k,), without checks.
-
-    Args:
-        records: one a run.
-        start: (runs, k), and the steps (runs,) made to each.
-        own: see `Kind`.
-    """
-    found = minimise(RecordProblem(tuple(records)), start)
-    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
-    noise = np.array([noise_of(point, own) for point in points])
-    return BatchEstimate(
-        theta=found.theta,
-        noise=noise,
-        information=np.array([information_of(*each) for each in zip(records, points, noise, strict=True)]),
-        converged=found.converged,
-        steps=found.steps + steps.astype(np.int64),
-    )
+def shares(parameters: Sequence[Parameter], outputs: int) -> Array:
+    """Return `Kind.own` (p,) of parameters that act at listed outputs."""
+    taken = np.zeros(outputs)
+    for parameter in parameters:
+        rows = sorted({i for i, _ in parameter.places})
+        taken[rows] += 1.0 / len(rows)
+    return taken
 
 
-def fit_batches(kind: Kind, u: ArrayLike, y: ArrayLike, start: ArrayLike) -> BatchEstimate:
-    """Estimate many records, given as arrays, each from a single start and without checks.
-
-    Args:
-        kind: gives the structure.
-        u: (N, r) common to all runs, or (runs, N, r).
-        y: (runs, N, p).
-        start: (k,) for all runs, or (runs, k).
-    """
-    outputs, given = np.asarray(y, dtype=float), np.asarray(u, dtype=float)
-    inputs = np.broadcast_to(given, (*outputs.shape[:2], given.shape[-1]))
-    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.names)))
-    records = [Records((kind.record(*run),)) for run in zip(inputs, outputs, strict=True)]
-    return fit_records(records, np.array(begin), np.zeros(len(outputs), dtype=np.int64), kind.own())
+def late_samples(dead_time: float, sample_time: float) -> int:
+    """Return the samples of a record in which inputs before it act through a dead time; none without one."""
+    return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0

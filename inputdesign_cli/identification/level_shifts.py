@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import ScoreTest
-from inputdesign_cli.identification.record_problem import Point
+from inputdesign_cli.identification.problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
@@ -67,14 +69,6 @@ class LevelShift:
         return self.alone and self.test.probability < level("level shift")
 
 
-@dataclass(frozen=True)
-class _Scores:
-    """Of one signal, begun at every sample of a record: statistics (n,), and the signs of their sizes."""
-
-    statistic: Array
-    rises: Array
-
-
 def level_shifts(
     records: Records, point: Point, white: White
 ) -> tuple[LevelShift | None, tuple[LevelShift, ...], White]:
@@ -86,7 +80,9 @@ def level_shifts(
     shift = first
     while shift is not None and shift.refutes and len(found) < _MOST:
         found.append(shift)
-        white = _taken_off(records, point.theta, white, shift)
+        begin, length = next(one for one in _stretches(records) if shift.sample < sum(one))
+        after = _smooth(begin + length - shift.sample, shift.lag)
+        white = white.without(_column(records, point.theta, white, shift.sample, after, shift.output))
         shift = level_shift(records, point, white)
     return first, tuple(found), white
 
@@ -110,43 +106,31 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     """Return the likeliest shift; None in records that are too short for any."""
     found: list[tuple[float, int, int, float, bool, bool]] = []
     lags = _lags(max(records.lengths))
-    steps = np.stack([_smooth(max(records.lengths), lag) for lag in lags], axis=1)
-    single = np.eye(1, len(steps))[0]
-    through = _responses(records, point.theta, np.column_stack([steps, single]), white)
-    for begin, length in _stretches(records):
+    stretches, outputs = list(_stretches(records)), records.y.shape[1]
+    through = _responses(records, point.theta, lags, white)
+    for (begin, length), output in product(stretches, range(outputs)):
         inner = slice(_FEWEST, length - _FEWEST)
-        for output in range(len(through)):
-            of_sample = _scores(white, begin, output, through[output, :length, -1])
-            line = _line(records, point.theta, white, begin, length, output)
-            for lag, response in zip(lags, through[output, :length, :-1].T, strict=True):
-                scores = _scores(white, begin, output, response)
-                at = _FEWEST + int(np.argmax(scores.statistic[inner]))
-                size = float(scores.statistic[at])
-                near = slice(max(at - int(lag) - _FEWEST, 0), at + int(lag) + _FEWEST)
-                alone = size > max(line, float(np.max(of_sample.statistic[near])))
-                found.append((size, output, begin + at, lag, bool(scores.rises[at] > 0.0), alone))
+        of_sample, _ = _scores(white, begin, output, through[output, :length, -1])
+        line = _of_line(records, point.theta, white, begin, length, output)
+        for lag, response in zip(lags, through[output, :length, :-1].T, strict=True):
+            scores, rises = _scores(white, begin, output, response)
+            at = _FEWEST + int(np.argmax(scores[inner]))
+            near = slice(max(at - int(lag) - _FEWEST, 0), at + int(lag) + _FEWEST)
+            alone = scores[at] > max(line, float(np.max(of_sample[near])))
+            found.append((float(scores[at]), output, begin + at, lag, bool(rises[at] > 0.0), bool(alone)))
     if not found:
         return None
-    score, output, sample, lag, rises, alone = max(found)
+    score, output, sample, lag, rising, alone = max(found)
     # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
-    power = float(white.residuals @ white.residuals) / len(through)
+    power = float(white.residuals @ white.residuals) / outputs
     share = min(score * white.variance / power, _MOST_EXPLAINED)
-    statistic = -float(np.log1p(-share)) * point.near.freedom / len(through)
-    looks = sum(length for _, length in _stretches(records)) * len(through) * len(lags)
+    statistic = -float(np.log1p(-share)) * point.near.freedom / outputs
+    looks = sum(length for _, length in stretches) * outputs * len(lags)
     test = ScoreTest("level_shift", "shift", statistic, 1, _by_chance([statistic], looks), None, output)
-    before, after = (1 + round(share * lag) for share in (_UNSURE, _SETTLED))
-    begin, length = next(one for one in _stretches(records) if sample < sum(one))
-    begins, ends = max(sample - before, begin), min(sample + 1 + after, begin + length)
-    return LevelShift(output, sample, lag, begins, ends, rises, test, score, looks, alone)
-
-
-def _taken_off(records: Records, theta: Array, white: White, shift: LevelShift) -> White:
-    """Return the estimate with the shift estimated along, as far as errors are concerned."""
-    begin, length = next(one for one in _stretches(records) if shift.sample < sum(one))
-    signal = np.zeros((records.samples, 1))
-    after = begin + length - shift.sample
-    signal[shift.sample : begin + length, 0] = _smooth(after, shift.lag)
-    return white.without(_column(records, theta, white, signal, shift.output))
+    begin, length = next(one for one in stretches if sample < sum(one))
+    begins = max(sample - 1 - round(_UNSURE * lag), begin)
+    ends = min(sample + 2 + round(_SETTLED * lag), begin + length)
+    return LevelShift(output, sample, lag, begins, ends, rising, test, score, looks, alone)
 
 
 def _stretches(records: Records) -> Iterator[tuple[int, int]]:
@@ -160,12 +144,8 @@ def _stretches(records: Records) -> Iterator[tuple[int, int]]:
 
 def _lags(samples: int) -> list[float]:
     """Return the lags to try: zero, then ever longer ones."""
-    found = [0.0]
-    lag = _SHORTEST
-    while lag <= _SHARE * samples:
-        found.append(lag)
-        lag *= _GROWTH
-    return found
+    every = (_SHORTEST * _GROWTH**k for k in range(12))
+    return [0.0, *(lag for lag in every if lag <= _SHARE * samples)]
 
 
 def _smooth(samples: int, lag: float) -> Array:
@@ -173,24 +153,27 @@ def _smooth(samples: int, lag: float) -> Array:
     return -np.expm1(-np.arange(1.0, samples + 1.0) / lag) if lag else np.ones(samples)
 
 
-def _responses(records: Records, theta: Array, signals: Array, white: White) -> Array:
-    """(p, n, m): signals (n, m) of the longest record through the inverse noise model of each output."""
+def _responses(records: Records, theta: Array, lags: Sequence[float], white: White) -> NDArray[np.float64]:
+    """(p, n, m): steps behind lags, and a single sample, in errors of each output in the longest record."""
     at = int(np.argmax(records.lengths))
-    begin = sum(records.lengths[:at])
-    every = np.zeros((records.samples, signals.shape[1]))
-    every[begin : begin + len(signals)] = signals
+    own = slice(begin := sum(records.lengths[:at]), begin + records.lengths[at])
+    length = records.lengths[at]
+    every = np.zeros((records.samples, len(lags) + 1))
+    every[own] = np.column_stack([*(_smooth(length, lag) for lag in lags), np.eye(1, length)[0]])
     through = records.whitened(theta, every)
     if white.whitening is not None:
-        through = np.moveaxis(white.whitening.through(np.moveaxis(through, 0, -1).swapaxes(0, 1)), -1, 0)
-        through = through.swapaxes(1, 2)
-    return through[:, begin : begin + len(signals)]
+        through = white.whitening.through(through.transpose(2, 1, 0)).transpose(2, 1, 0)
+    return through[:, own]
 
 
-def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:
-    """Of a response (n,) in the errors of one output, begun at every sample of the record from `begin` on.
+def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:
+    """Return statistics (n,) of a response (n,) that begins at every sample of a record, and their signs.
 
     A score is what residuals and response have in common; what the estimate explains of the response is
     taken off its power.
+
+    Args:
+        begin: of the record; `response`, in the errors of one output.
     """
     size, outputs = len(response), len(white.root)
     rows = slice(begin * outputs, (begin + size) * outputs)
@@ -206,14 +189,12 @@ def _scores(white: White, begin: int, output: int, response: Array) -> _Scores:
     # Where a search ends at a kink, residuals are not at right angles to all gradients.
     score = common(white.residuals[rows, None])[:, 0] - explained @ (white.basis.T @ white.residuals)
     seen = left > _EXPLAINED * power
-    return _Scores(np.where(seen, score**2 / np.where(seen, left, 1.0), 0.0) / white.variance, score)
+    return np.where(seen, score**2 / np.where(seen, left, 1.0), 0.0) / white.variance, score
 
 
-def _line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
+def _of_line(records: Records, theta: Array, white: White, begin: int, length: int, output: int) -> float:
     """Return the statistic of a line through one record of an output."""
-    signal = np.zeros((records.samples, 1))
-    signal[begin : begin + length, 0] = np.linspace(-1.0, 1.0, length)
-    column = _column(records, theta, white, signal, output)
+    column = _column(records, theta, white, begin, np.linspace(-1.0, 1.0, length), output)
     left = white.unexplained(column)[:, 0]
     power = float(left @ left)
     if power <= _EXPLAINED * float(column[:, 0] @ column[:, 0]):
@@ -221,8 +202,9 @@ def _line(records: Records, theta: Array, white: White, begin: int, length: int,
     return float(left @ white.residuals) ** 2 / (power * white.variance)
 
 
-def _column(records: Records, theta: Array, white: White, signal: Array, output: int) -> Array:
-    """((N + M) p, 1): a signal (N, 1) in one output, as errors in the units of the noise."""
-    own = np.zeros((1, records.samples, len(white.root)))
-    own[0, :, output] = records.whitened(theta, signal)[output, :, 0]
+def _column(records: Records, theta: Array, white: White, begin: int, signal: Array, output: int) -> Array:
+    """((N + M) p, 1): a signal (n,) in one output from a sample on, as errors in units of the noise."""
+    every, own = np.zeros((records.samples, 1)), np.zeros((1, *records.y.shape))
+    every[begin : begin + len(signal), 0] = signal
+    own[0, :, output] = records.whitened(theta, every)[output, :, 0]
     return white.columns(own)

@@ -1,170 +1,159 @@
-"""Prediction errors of all outputs, weighed: what a search minimises, for many runs at once.
+"""Prediction errors weighed by their own covariance: what is minimised, for many runs at once.
 
-With weights W (p, p) the cost is the sum over the samples of epsilon^T W epsilon. Without, it is
-N det(S / N)^(1/p), S the sum of epsilon epsilon^T, which with one output is S itself. Its minimiser is that
-of the cost with the inverse covariance of its own residuals, the maximum-likelihood estimate for Gaussian
-noise of unknown covariance ([ljung-1999], (7.87)-(7.96) and Section 15.2). Its gradient is that of the
-weighted cost at W = N det(S / N)^(1/p) S^-1 / p, and so is its Hessian up to what vanishes at the minimum.
+With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), the sum of squares for one output. It falls with the
+likelihood of Gaussian noise of unknown covariance ([ljung-1999], (7.87)-(7.96) and Section 15.2). Minus half
+its gradient is sum psi(t) W e(t), half its Hessian sum psi W psi^T up to what vanishes at the minimum, with
+W = cost / (p N) S^-1. Known weights are kept.
+
+What unknown starts explain is taken off. Of the n = N p - m errors that m free unknowns leave, n log cost is
+-2 log likelihood. Integrating over the starts adds a determinant to that, and an earlier estimate at a
+distance q, -2 log of its density, adds q: they multiply the cost by exp(q / n); with known weights they are
+added.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.orders import OutputOrders
-from inputdesign_cli.identification.predictor import block_length, stream
-from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
+from inputdesign_cli.identification.records import Linearised, Records
+
+# Errors of this power relative to the output are rounding. It is added to S, so that an output without
+# noise does not hide the others.
+_EXACT = 1e-20
 
 
 @dataclass(frozen=True)
-class Sums:
-    """Sums of products of residuals and gradients over the samples, for each run.
-
-    epsilon epsilon^T (runs, p, p), psi epsilon^T (runs, m, p) and psi psi^T (runs, m, m), psi the gradients
-    of one output after the other, m in all.
-    """
-
-    errors: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    products: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class PredictionErrors:
-    """The problem of fitting `rows` to records.
+class Point:
+    """Errors, gradient, weights W (p, p) and cost of records at theta (k,).
 
     Attributes:
-        rows: one an output.
-        places: of each row, where its parameters stand in theta (k,); outputs may share some.
-        u, y: signals (samples, runs), one an input and one an output.
-        weights: W (p, p), or None to weigh by the residuals' own covariance.
+        known: (k, k), half the Hessian of the terms of an earlier estimate and of integrating over unknown
+            starts; `towards` (k,), minus half their gradient.
     """
 
-    rows: tuple[OutputOrders, ...]
-    places: tuple[NDArray[np.int64], ...]
-    u: tuple[Array, ...]
-    y: tuple[Array, ...]
-    weights: Array | None = None
+    theta: Array
+    near: Linearised
+    weights: Array
+    cost: float
+    known: Array
+    towards: Array
 
-    @classmethod
-    def single(cls, row: OutputOrders, u: Sequence[Array], y: Array) -> PredictionErrors:
-        """Return the problem of one output alone: the sum of squared prediction errors."""
-        return cls((row,), (np.arange(row.size),), tuple(u), (y,))
+    @property
+    def errors(self) -> Array:
+        """(N, p)."""
+        return self.near.errors
 
-    def repeated(self, starts: int) -> PredictionErrors:
-        """Return the record, (samples, 1) signals, repeated for a search from several starts."""
-        u, y = (tuple(np.repeat(x, starts, axis=1) for x in signals) for signals in (self.u, self.y))
-        return replace(self, u=u, y=y)
+    @property
+    def psi(self) -> NDArray[np.float64]:
+        """(k, N, p)."""
+        return self.near.psi
 
-    @cached_property
-    def size(self) -> int:
-        """Return the number of parameters k."""
-        return 1 + max(int(place.max(initial=-1)) for place in self.places)
+    @property
+    def slope(self) -> Array:
+        """Return minus half the gradient (k,) of the cost."""
+        near = self.near
+        return np.asarray(self._weighed(near.all_psi) @ near.all_errors.ravel() + self.towards)
+
+    @property
+    def hessian(self) -> Array:
+        """Return half the Hessian (k, k) of the cost, to first order."""
+        every = self.near.all_psi
+        return np.asarray(self._weighed(every) @ every.reshape(len(every), -1).T + self.known)
+
+    def against(self, regressors: NDArray[np.float64]) -> Array:
+        """Return `hessian` (k, k) with regressors phi (k, N, p) for one psi, and without past noise."""
+        return np.asarray(self._weighed(self.psi) @ regressors.reshape(len(regressors), -1).T + self.known)
+
+    @property
+    def of_errors(self) -> Point:
+        """Return the point without the terms that do not come from the errors."""
+        return replace(self, known=np.zeros_like(self.known), towards=np.zeros_like(self.towards))
+
+    def _weighed(self, psi: NDArray[np.float64]) -> Array:
+        return (psi @ self.weights).reshape(len(psi), -1)
+
+
+def rounding(records: Records) -> Array:
+    """Return a covariance (p, p) of errors so small that they are rounding."""
+    return _EXACT * np.diag(np.mean(records.y**2, axis=0))
+
+
+def evaluate(records: Records, theta: Array) -> Point:
+    """Return the cost of records; infinite where it overflows, zero where all errors are rounding."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        near = records.at(theta)
+        S = near.all_errors.T @ near.all_errors / records.samples
+    none, nowhere = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
+    if not all(np.all(np.isfinite(x)) for x in (S, near.psi, near.determinant, near.slope)):
+        nothing = Linearised.at_rest(np.zeros(near.errors.shape), np.zeros(near.psi.shape))
+        return Point(theta, nothing, np.eye(len(S)), np.inf, none, nowhere)
+    floor = rounding(records)
+    if np.all(np.diag(S) <= np.diag(floor)):
+        return Point(theta, near, np.eye(len(S)), 0.0, none, nowhere)
+    if records.weights is not None:
+        cost, weights = records.samples * float(np.sum(records.weights * S)), records.weights
+    else:
+        costs, every = weighing((S + floor)[None], records.samples)
+        cost, weights = float(costs[0]), every[0]
+    return _with_known(records, Point(theta, near, weights, cost, none, nowhere))
+
+
+def _with_known(records: Records, point: Point) -> Point:
+    """Return a point with the terms of unknown starts and of an earlier estimate."""
+    near, earlier = point.near, records.earlier
+    q, towards, known = near.determinant, -near.slope, near.curvature
+    if earlier is not None:
+        q, towards = q + earlier.q(point.theta), towards - earlier.slope(point.theta)
+        known = known + earlier.information
+    if records.weights is not None:
+        return replace(point, cost=point.cost + q, known=known, towards=towards)
+    with np.errstate(over="ignore"):
+        factor = float(np.exp(q / near.freedom))
+    if not np.isfinite(factor * point.cost):
+        return replace(point, cost=np.inf)
+    cost = factor * point.cost
+    share = cost / near.freedom
+    return replace(
+        point, weights=factor * point.weights, cost=cost, known=share * known, towards=share * towards
+    )
+
+
+@dataclass(frozen=True)
+class RecordProblem:
+    """The problem of fitting records of one structure, one a run; see `gauss_newton.Problem`."""
+
+    records: tuple[Records, ...]
 
     @property
     def errors(self) -> int:
-        """Return the number of prediction errors of a run."""
-        return len(self.y) * self.y[0].shape[0]
-
-    def kept(self, runs: NDArray[np.bool_]) -> PredictionErrors:
-        """Return the problem with some of the runs only."""
-        u, y = (tuple(x[:, runs] for x in signals) for signals in (self.u, self.y))
-        return replace(self, u=u, y=y)
-
-    def stabilised(self, theta: Array) -> Array:
-        """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
-
-        Roots of F that are exactly one belong to integrators, and stay.
-        """
-        theta = theta.copy()
-        for letter, columns in self._monic:
-            monic = np.concatenate([np.ones((theta.shape[0], 1)), theta[:, columns]], axis=1)
-            for run in np.flatnonzero(~is_stable(monic)):
-                moving = without_integrators(monic[run]) if letter == "f" else monic[run]
-                if not is_stable(moving[None])[0]:
-                    theta[run, columns] = reflected(monic[run])[1:]
-        return theta
+        """Return the number of output errors of a run."""
+        return self.records[0].y.size
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
-        """Cost (runs,), psi^T W psi (runs, k, k) and psi^T W epsilon (runs, k); overflow costs infinity."""
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            sums = self.sums(theta)
-            cost, weights = self._weighed(sums.errors)
-            hessian, slope = self.gathered(sums, weights)
-        finite = np.isfinite(cost) & np.isfinite(hessian).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)
-        if not np.all(finite):
-            cost, hessian[~finite], slope[~finite] = np.where(finite, cost, np.inf), np.eye(self.size), 0.0
-        return cost, hessian, slope
+        """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k)."""
+        points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
+        hessian = np.array([point.hessian for point in points])
+        slope = np.array([point.slope for point in points])
+        return np.array([point.cost for point in points]), hessian, slope
 
-    def sums(self, theta: Array) -> Sums:
-        """Return the sums from which the cost and its derivatives are computed."""
-        p, m = len(self.rows), len(self._owner)
-        samples, runs = self.y[0].shape
-        own = [theta[:, place] for place in self.places]
-        order = max(row.polynomials(t).order for row, t in zip(self.rows, own, strict=True))
-        length = block_length(samples, runs, order)
-        flows = [stream(row, t, self.u, y, length) for row, t, y in zip(self.rows, own, self.y, strict=True)]
-        found, slopes, products = np.zeros((p, p, runs)), np.zeros((m, p, runs)), np.zeros((m, m, runs))
-        for parts in zip(*flows, strict=True):
-            errors = [part[1] for part in parts]
-            columns = [column for part in parts for column in part[2]]
-            for i, left in enumerate(errors):
-                for j, right in enumerate(errors[: i + 1]):
-                    found[i, j] += _dot(left, right)
-            for i, left in enumerate(columns):
-                for j, right in enumerate(errors):
-                    slopes[i, j] += _dot(left, right)
-                for j, right in enumerate(columns[: i + 1]):
-                    products[i, j] += _dot(left, right)
-        return Sums(_whole(found), np.ascontiguousarray(np.moveaxis(slopes, -1, 0)), _whole(products))
+    def stabilised(self, theta: Array) -> Array:
+        """Return theta (runs, k) with stable poles."""
+        return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
 
-    def gathered(self, sums: Sums, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
-        """Return psi^T W psi (runs, k, k) and psi^T W epsilon (runs, k) for weights (runs, p, p)."""
-        owner, spread = self._owner, self._spread
-        products = sums.products * weights[:, owner[:, None], owner[None, :]]
-        slopes = np.sum(sums.slopes * weights[:, owner, :], axis=2)
-        return spread.T @ products @ spread, slopes @ spread
+    def kept(self, runs: NDArray[np.bool_]) -> RecordProblem:
+        """Return the same problem with some of its runs only."""
+        return RecordProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))
 
-    def _weighed(self, errors: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]]:
-        """Return cost (runs,) and the weights (runs, p, p) of its derivatives."""
-        p = len(self.rows)
-        if self.weights is not None:
-            weights = np.broadcast_to(self.weights, errors.shape)
-            return np.sum(weights * errors, axis=(1, 2)), weights
-        if p == 1:  # the sum of squares, whose derivatives are not weighed
-            return errors[:, 0, 0], np.ones_like(errors)
-        samples = self.y[0].shape[0]
-        inverse, logarithm = inverses(errors / samples)
-        cost = samples * np.exp(logarithm / p)
-        return cost, (cost / (p * samples))[:, None, None] * inverse
 
-    @cached_property
-    def _owner(self) -> NDArray[np.int64]:
-        """(m,): the output that each gradient is of."""
-        return np.repeat(np.arange(len(self.rows)), [row.size for row in self.rows])
-
-    @cached_property
-    def _spread(self) -> Array:
-        """(m, k): which parameter each gradient is with respect to."""
-        return np.eye(self.size)[np.concatenate(self.places)]
-
-    @cached_property
-    def _monic(self) -> tuple[tuple[str, NDArray[np.int64]], ...]:
-        """Return the letters of C, D and F, and where the coefficients of each stand in theta."""
-        found = {
-            (letter, tuple(place[block.columns].tolist()))
-            for row, place in zip(self.rows, self.places, strict=True)
-            for letter in "cdf"
-            for block in row.by_letter[letter]
-            if block.lags
-        }
-        return tuple((letter, np.array(columns)) for letter, columns in sorted(found))
+def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.float64]]:
+    """Return cost (runs,) and weights W (runs, p, p) of errors of the covariances S (runs, p, p)."""
+    inverse, logarithm = inverses(S)
+    root = np.exp(logarithm / S.shape[1])
+    return samples * root, (root / S.shape[1])[:, None, None] * inverse
 
 
 def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
@@ -182,13 +171,3 @@ def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Arr
     logarithm = np.sum(np.log(values), axis=1) + 2.0 * np.sum(np.log(rms), axis=1)
     inverse = (vectors / values[:, None, :]) @ vectors.swapaxes(1, 2) / scale
     return inverse, np.where(usable, logarithm, np.inf)
-
-
-def _dot(left: Array, right: Array) -> Array:
-    return np.einsum("tr,tr->r", left, right)
-
-
-def _whole(lower: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return symmetric matrices (runs, m, m) from their lower triangles (m, m, runs)."""
-    moved = np.ascontiguousarray(np.moveaxis(lower, -1, 0))
-    return moved + np.swapaxes(np.tril(moved, -1), 1, 2)

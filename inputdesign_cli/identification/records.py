@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,65 +17,10 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.free_starts import FreeStarts
-from inputdesign_cli.identification.start import Start
+from inputdesign_cli.identification.kind import Kind, Part
+from inputdesign_cli.identification.start import Start, central_differences
 
 _MOST_STARTED = 3
-# Of a coefficient of the noise, or of one: central differences of a filtered line lose about half the digits.
-_STEP = 1e-6
-
-
-class Record(Protocol):
-    """One experiment and the structure that is to explain it by parameters theta (k,)."""
-
-    @property
-    def u(self) -> Array:
-        """(N, r)."""
-
-    @property
-    def y(self) -> Array:
-        """(N, p)."""
-
-    @property
-    def size(self) -> int:
-        """Return the number of parameters k."""
-
-    def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
-
-    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """Return for each output the effect of the past of the record on its prediction errors.
-
-        Args:
-            free: whether level and states are unknown; else the plant is at rest at zero, and noise is not.
-        """
-
-    def lateness(self, theta: Array) -> int:
-        """Return the samples in which inputs from before the record act by other ways than the states."""
-
-    @property
-    def dead_times(self) -> NDArray[np.int64]:
-        """Return the parameters that move dead times: there the cost has kinks."""
-
-    def crossings(self, theta: Array) -> Array:
-        """Return steps (m, 2, k) of a dead time to sampling instants (kinks of the cost), and beyond."""
-
-    def remembering(self, late: int) -> Self:
-        """Return the record with free responses to inputs before it, which act for `late` samples."""
-
-    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Return the parameters on which the starts depend."""
-
-    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """Return the derivatives of the starts with respect to each of these."""
-
-    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """Return the change of psi (k, N, p) if measured outputs replace the model's."""
-
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
-
-    def stabilised(self, theta: Array) -> Array:
-        """Return theta with a stable predictor."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +83,8 @@ class Records:
     """Records of one structure, one after the other.
 
     Attributes:
+        kind: the structure.
+        parts: u (n, r), y (n, p) of each record.
         free: whether each begins in an unknown state about an unknown level, instead of at rest at zero.
         late: samples in which unknown inputs before each act, if it is free.
         weights: W (p, p) of the errors; None to weigh by their own covariance.
@@ -146,7 +92,8 @@ class Records:
         ramp: whether outputs of free records may drift along a line besides, of an unknown slope.
     """
 
-    parts: tuple[Record, ...]
+    kind: Kind
+    parts: tuple[Part, ...]
     free: bool = False
     late: int = 0
     weights: Array | None = None
@@ -155,31 +102,26 @@ class Records:
 
     def begun_freely(self, late: int) -> Records:
         """Return the records, each begun in an unknown state after `late` samples of unknown inputs."""
-        parts = tuple(part.remembering(late) for part in self.parts)
-        return replace(self, parts=parts, free=True, late=late)
+        return replace(self, free=True, late=late)
 
-    def lateness(self, theta: Array) -> int:
-        """Return the largest lateness of all parts."""
-        return max(part.lateness(theta) for part in self.parts)
-
-    @property
+    @cached_property
     def dead_times(self) -> NDArray[np.int64]:
-        """See `Record`."""
-        return self.parts[0].dead_times
+        """Return the parameters that move dead times: there the cost has kinks."""
+        return np.flatnonzero(self.kind.model.dead_times)
 
     def crossings(self, theta: Array) -> Array:
-        """See `Record`."""
-        return max((part.crossings(theta) for part in self.parts), key=len)
+        """Return the crossings (m, 2, k) of sampling instants, see `Kind`."""
+        return self.kind.crossings(theta, self._longest)
 
     @cached_property
     def u(self) -> Array:
         """(N, r)."""
-        return np.concatenate([part.u for part in self.parts])
+        return np.concatenate([u for u, _ in self.parts])
 
     @cached_property
     def y(self) -> Array:
         """(N, p)."""
-        return np.concatenate([part.y for part in self.parts])
+        return np.concatenate([y for _, y in self.parts])
 
     @property
     def samples(self) -> int:
@@ -189,27 +131,30 @@ class Records:
     @property
     def size(self) -> int:
         """Return the number of parameters k."""
-        return self.parts[0].size
+        return len(self.kind.names)
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
         """Return the samples of each part."""
-        return tuple(len(part.y) for part in self.parts)
+        return tuple(len(y) for _, y in self.parts)
+
+    def from_rest(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Return prediction errors (N, p) and their gradient (k, N, p) if each record began at rest."""
+        found = [self.kind.errors_and_gradient(theta, *part) for part in self.parts]
+        return np.concatenate([e for e, _ in found]), np.concatenate([psi for _, psi in found], axis=1)
 
     def at(self, theta: Array) -> Linearised:
         """Return prediction errors and their gradient, the unknown starts eliminated."""
-        found = [part.errors_and_gradient(theta) for part in self.parts]
-        errors = np.concatenate([e for e, _ in found])
-        psi = np.concatenate([gradient for _, gradient in found], axis=1)
+        errors, psi = self.from_rest(theta)
         at_rest = Linearised.at_rest(errors, psi)
         if not all(np.all(np.isfinite(x)) for x in (errors, psi)):
             return at_rest
-        starts = self._starts(theta)
+        starts = FreeStarts(self.lengths, self._starts(theta))
         if not (starts.any and starts.finite):
             return at_rest
         coefficients, root, directions = starts.eliminated(errors, self.weights)
         slopes = np.zeros((theta.size, starts.parts))
-        moving = self.parts[0].in_starts(free=self.free).tolist()
+        moving = self._moving
         for k, change in zip(moving, self._start_slopes(theta, moving), strict=True):
             psi[k] += starts.combined(coefficients, starts=change)
             slopes[k] = 0.5 * starts.slopes(change)
@@ -234,62 +179,46 @@ class Records:
 
     def gradient(self, theta: Array, index: int) -> Array:
         """Return minus the derivative (N, p) of the errors by a parameter; past noise stays as estimated."""
-        found = [part.errors_and_gradient(theta) for part in self.parts]
-        psi = np.concatenate([gradient[index] for _, gradient in found])
-        starts = self._starts(theta)
-        if index not in self.parts[0].in_starts(free=self.free) or not (starts.past and starts.finite):
+        errors, every = self.from_rest(theta)
+        starts, psi = FreeStarts(self.lengths, self._starts(theta)), every[index]
+        if index not in self._moving or not (starts.past and starts.finite):
             return psi
-        coefficients, _, _ = starts.eliminated(np.concatenate([e for e, _ in found]), self.weights)
+        coefficients, _, _ = starts.eliminated(errors, self.weights)
         (change,) = self._start_slopes(theta, [index])
         return psi + starts.combined(coefficients, starts=change, free=False)
 
-    @cached_property
-    def _longest(self) -> Record:
-        """Return the longest record: the past acts on all alike, on shorter ones for fewer samples."""
-        return max(self.parts, key=lambda part: len(part.y))
-
-    def _starts(self, theta: Array) -> FreeStarts:
-        starts = self._longest.starts(theta, free=self.free)
-        if self.ramp and self.free:
-            line = self._line
-            through = self._longest.whitened(theta, line)
-            starts = tuple(start.and_free(own.T, line.T) for start, own in zip(starts, through, strict=True))
-        return FreeStarts(self.lengths, starts)
-
-    def _start_slopes(self, theta: Array, indices: Sequence[int]) -> list[tuple[Start, ...]]:
-        slopes = self._longest.start_slopes(theta, indices, free=self.free)
-        if not (self.ramp and self.free):
-            return slopes
-        still, found = np.zeros_like(self._line).T, []
-        for index, starts in zip(indices, slopes, strict=True):
-            step = _STEP * max(abs(float(theta[index])), 1.0) * np.eye(theta.size)[index]
-            above, below = (self._longest.whitened(end, self._line) for end in (theta + step, theta - step))
-            change = (above - below) / (2.0 * step[index])
-            found.append(
-                tuple(start.and_free(own.T, still) for start, own in zip(starts, change, strict=True))
-            )
-        return found
+    @property
+    def _longest(self) -> int:
+        """Return the samples of the longest record: the past acts on all alike, on shorter ones for fewer."""
+        return max(self.lengths)
 
     @property
-    def _line(self) -> Array:
-        """Return a line (N, 1) through the longest record."""
-        return np.linspace(-1.0, 1.0, len(self._longest.y))[:, None]
+    def _moving(self) -> list[int]:
+        """Return the parameters on which the starts depend."""
+        return self.kind.in_starts(self.late, free=self.free).tolist()
 
-    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p), see `Record`."""
-        pieces = np.split(errors, np.cumsum(self.lengths)[:-1])
-        found = [part.noise_in_regressors(theta, e) for part, e in zip(self.parts, pieces, strict=True)]
-        return np.concatenate(found, axis=1)
+    def _starts(self, theta: Array) -> tuple[Start, ...]:
+        starts = self.kind.starts(theta, self._longest, self.late, free=self.free)
+        if not (self.ramp and self.free):
+            return starts
+        line = np.linspace(-1.0, 1.0, self._longest)[:, None]
+        through = self.kind.whitened(theta, line)
+        return tuple(start.and_free(own.T, line.T) for start, own in zip(starts, through, strict=True))
+
+    def _start_slopes(self, theta: Array, indices: Sequence[int]) -> list[tuple[Start, ...]]:
+        if self.ramp and self.free:
+            steps = [self.kind.start_step(theta, index, self._longest) for index in indices]
+            return central_differences(self._starts, theta, indices, steps)
+        return self.kind.start_slopes(theta, indices, self._longest, self.late, free=self.free)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m), see `Record`."""
+        """(p, N, m), see `Kind`."""
         pieces = np.split(signals, np.cumsum(self.lengths)[:-1])
-        found = [part.whitened(theta, x) for part, x in zip(self.parts, pieces, strict=True)]
-        return np.concatenate(found, axis=1)
+        return np.concatenate([self.kind.whitened(theta, x) for x in pieces], axis=1)
 
     def stabilised(self, theta: Array) -> Array:
         """Return theta with a stable predictor."""
-        return self._longest.stabilised(theta)
+        return self.kind.stabilised(theta, self._longest)
 
 
 def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
@@ -303,18 +232,18 @@ def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
     return out
 
 
-def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[tuple[Array, Array]]:
+def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[Part]:
     """Return the signals of each record; None: of the only one."""
     at = np.cumsum(lengths or [len(y)])[:-1]
     return list(zip(np.split(u, at), np.split(y, at), strict=True))
 
 
-def longest(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def longest(parts: Sequence[Part]) -> list[Part]:
     """Return the longest records, of which starting points are made: at most three, of similar lengths."""
     ranked = sorted(parts, key=lambda part: -len(part[1]))[:_MOST_STARTED]
     return [part for part in ranked if 2 * len(part[1]) >= len(ranked[0][1])]
 
 
-def centred(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def centred(parts: Sequence[Part]) -> list[Part]:
     """Return the records without their means."""
     return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy
 
@@ -28,17 +26,12 @@ def like_nothing_elsewhere(
         nominal, estimated: of one structure.
         step: between samples, in the unit of time of the models.
     """
-    w = _frequencies(step)
-    with np.errstate(all="ignore"):
-        gradient, now, before = estimated.plant_gradient(w), estimated.plant_at(w), nominal.plant_at(w)
+    gradient, now, before = *_response(estimated, step), _response(nominal, step)[1]
     found = []
     for j in range(estimated.inputs):
-        change = _stacked(gradient[:, :, :, j].swapaxes(0, 1))
-        zero = _chance(estimate, change, _stacked(now[None, :, :, j])[0], wholly=True)
-        if zero is None or zero < _ZERO:
-            continue
-        expected = _chance(estimate, change, _stacked((now - before)[None, :, :, j])[0], wholly=False)
-        if expected is not None:
+        zero = _chance(estimate, gradient[..., j], now[..., j], wholly=True)
+        expected = _chance(estimate, gradient[..., j], (now - before)[..., j], wholly=False)
+        if zero is not None and zero >= _ZERO and expected is not None:
             found.append((j, zero, expected))
     return found
 
@@ -49,58 +42,52 @@ def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> li
     Args:
         step: between samples, in the unit of time of the model.
     """
-    return _like_nothing(model, estimate, step, [(i, slice(None)) for i in range(model.outputs)])
+    return _like_nothing(model, estimate, step, axis=2)
 
 
 def driving_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
     """Return the inputs (from zero) of a model whose column of G does not differ from zero significantly."""
-    return _like_nothing(model, estimate, step, [(slice(None), j) for j in range(model.inputs)])
+    return _like_nothing(model, estimate, step, axis=3)
 
 
-def chance_of_response(model: Model, estimate: Estimate, other: Model, step: float = 1.0) -> float | None:
-    """Return the probability that by chance alone an estimated G is as far from another model's G.
-
-    Return None if G is infinite, or no step of the parameters changes it.
-    """
-    w = _frequencies(step)
-    with np.errstate(all="ignore"):
-        gradient, away = model.plant_gradient(w), other.plant_at(w) - model.plant_at(w)
-    change = _stacked(gradient.swapaxes(0, 1))
-    return _chance(estimate, change, _stacked(away[None])[0], wholly=False)
-
-
-def _like_nothing(
-    model: Model, estimate: Estimate, step: float, parts: Sequence[tuple[int | slice, int | slice]]
-) -> list[int]:
-    """Return the indices of parts of G not significantly different from zero, and not known to be zero."""
-    w = _frequencies(step)
-    with np.errstate(all="ignore"):
-        gradient, G = model.plant_gradient(w), model.plant_at(w)
+def _like_nothing(model: Model, estimate: Estimate, step: float, axis: int) -> list[int]:
+    """Return the rows or columns of G not significantly different from zero, and not known to be zero."""
+    gradient, G = _response(model, step)
     found = []
-    for number, (i, j) in enumerate(parts):
-        change = _stacked(gradient[:, :, i, j].swapaxes(0, 1))
-        probability = _chance(estimate, change, _stacked(G[None, :, i, j])[0], wholly=True)
+    for number in range(gradient.shape[axis]):
+        change, own = np.take(gradient, number, axis), np.take(G, number, axis - 1)
+        probability = _chance(estimate, change, own, wholly=True)
         if np.any(change) and probability is not None and probability > _ZERO:
             found.append(number)
     return found
 
 
-def _frequencies(step: float) -> Array:
-    return np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi / step
+def _response(model: Model, step: float) -> tuple[ComplexArray, ComplexArray]:
+    """Return the gradient (n, k, p, r) of G, and G (n, p, r), up to half the sampling frequency."""
+    w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi / step
+    with np.errstate(all="ignore"):
+        return model.plant_gradient(w), model.plant_at(w)
 
 
-def _stacked(G: ComplexArray) -> Array:
-    """(m, 2 n p): real and imaginary parts of values (m, n, p)."""
-    flat = G.reshape(len(G), -1)
-    return np.concatenate([flat.real, flat.imag], axis=1)
-
-
-def _chance(estimate: Estimate, change: Array, away: Array, *, wholly: bool) -> float | None:
-    """Return the probability that G differs from the estimate by `away` (m,) through chance alone.
+def _chance(
+    estimate: Estimate, gradient: ComplexArray, difference: ComplexArray, *, wholly: bool
+) -> float | None:
+    """Return the probability that a part of G differs by (n, p) from the estimate through chance alone.
 
     The Wald statistic is the smallest step of the parameters that moves G there, as far as any step can.
-    `change` (k, m) is the gradient of G. Return None if the step must lead there `wholly` and none does.
+
+    Args:
+        gradient: (n, k, p), of that part.
+        wholly: whether the step must lead there.
+
+    Returns:
+        None if no step does, or something is infinite.
     """
+
+    def stacked(x: ComplexArray) -> Array:
+        return np.concatenate([x.real.reshape(len(x), -1), x.imag.reshape(len(x), -1)], axis=1)
+
+    change, away = stacked(gradient.swapaxes(0, 1)), stacked(difference[None])[0]
     if not all(np.all(np.isfinite(x)) for x in (change, away)):
         return None
     J = scipy.linalg.solve_triangular(estimate.factor, change, lower=True)

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.gauss_newton import MOST_STEPS, best_run, minimise
-from inputdesign_cli.identification.instants import beyond_instants, minima_beside
-from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records
-from inputdesign_cli.identification.rivals import Rival, rivals
+from inputdesign_cli.identification.minima import Rival, beyond_instants, minima_beside, rivals
+from inputdesign_cli.identification.problem import Point, RecordProblem, evaluate
+from inputdesign_cli.identification.records import Records, centred
 
 # A record that begins at rest is taken for one that does not with this probability.
 _MISTAKEN = 0.01
@@ -83,7 +82,7 @@ def search(
     if not converged and not quick and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
-    others = () if quick else rivals(records, point, found)
+    others = () if quick else rivals(point, found)
     near = () if quick else minima_beside(records, point, found)
     return Search(records, point, converged, steps, starts, _first(records, point.theta), others, near)
 
@@ -151,37 +150,61 @@ def _unit(size: int, index: int) -> NDArray[np.bool_]:
 
 
 def _first(records: Records, theta: Array) -> Array:
-    return np.array([part.errors_and_gradient(theta)[0][0] for part in records.parts])
+    return np.array([records.kind.errors_and_gradient(theta, *part)[0][0] for part in records.parts])
 
 
 def _deviance(records: Records, point: Point) -> float:
     """-2 log of the likelihood at the likeliest levels and states, up to a constant."""
     products = point.near.all_errors.T @ point.near.all_errors
-    if records.weights is not None:
-        return float(np.sum(records.weights * products)) + point.near.of_noise
     return float(records.samples * np.linalg.slogdet(products)[1]) + point.near.of_noise
 
 
-def _by_chance(records: Records, fell: float, more: int, unknowns: int) -> float:
-    """Return the probability that `more` useless unknowns lower -2 log likelihood by `fell`.
+@dataclass(frozen=True)
+class _FromRest:
+    """The search of records from rest, against which unknown starts are held."""
 
-    Many unknowns shrink the estimated noise, which chi-squared does not account for.
-    """
-    left = records.y.size - records.size - unknowns
-    if records.weights is not None or left < 1:
-        return float(scipy.special.chdtrc(more, fell))
-    ratio = np.expm1(min(fell / records.y.size, _LARGEST))
-    return float(scipy.special.fdtrc(more, left, ratio * left / more))
+    found: Search
 
+    def more(self, point: Point) -> int:
+        """Return the unknowns beyond the ones from rest; 0 if too few errors are left to compare."""
+        records = self.found.records
+        few = records.y.size <= records.size + point.near.unknowns + _FEWEST
+        return 0 if few else point.near.unknowns - self.found.point.near.unknowns
 
-def _swamped(records: Records, late: int) -> bool:
-    """Return whether unknown inputs over `late` samples explain half of a record, whatever the model."""
-    return 2 * late * records.u.shape[1] > max(records.lengths)
+    def probability(self, records: Records, point: Point, gain: float = 0.0) -> float:
+        """Return the probability that unknown starts, if useless, lower -2 log likelihood as far.
+
+        Many unknowns shrink the estimated noise, which chi-squared does not account for: F does.
+        """
+        more, errors = max(self.more(point), 1), records.y.size
+        fell = max(_deviance(self.found.records, self.found.point) - _deviance(records, point) + gain, 0.0)
+        left = errors - records.size - point.near.unknowns
+        if left < 1:
+            return float(scipy.special.chdtrc(more, fell))
+        ratio = np.expm1(min(fell / errors, _LARGEST))
+        return float(scipy.special.fdtrc(more, left, ratio * left / more))
+
+    def unless_by_chance(self, begun: Search) -> Search:
+        """Return the search with unknown starts if chance does not explain what it gains."""
+        refuted = self.more(begun.point) > 0 and self.probability(begun.records, begun.point) < _MISTAKEN
+        return replace(begun, rest_refuted=True) if refuted else self.found
+
+    def hopeless(self, free: Records, near: Point) -> bool:
+        """Return whether a search from rest on, with unknown starts, is not worth the while.
+
+        What errors promise of one step is about what the search would find. Near the edge of stability the
+        determinant allows short steps only.
+        """
+        errors = near.of_errors
+        step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
+        # Where nothing is left of the errors there is nothing to gain.
+        share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED) if near.cost else 0.0
+        gain = -near.near.freedom * np.log1p(-share)
+        return self.more(near) <= 0 or self.probability(free, near, gain) > _UNLIKELY
 
 
 def from_rest_or_free(
     records: Records,
-    deviations: Records,
     rest: bool | None,
     searched: Callable[[Records, Array | None], Search],
     about: Array | None = None,
@@ -193,61 +216,43 @@ def from_rest_or_free(
 
     Args:
         records: from rest.
-        deviations: the records about their means, which an unknown level makes up for.
         rest: whether the records begin at rest about zero; None: as the data say.
         searched: what searches from its own starts and, if given, from the parameters (k,).
         about: (k,), parameters that show roughly how long unknown inputs act.
     """
+    # An unknown level makes up for the means.
+    deviations = replace(records, parts=tuple(centred(records.parts)))
+
+    def later(theta: Array | None) -> int:
+        late = 0 if theta is None else records.kind.lateness(theta)
+        return late + _SPARE if late else 0
 
     def begun_free(known: Array | None, late: int) -> Search:
         tried = {late: (found := searched(deviations.begun_freely(late), known))}
         # The dead time may come out another than was thought when the unknown inputs were counted.
         while abs((now := later(found.point.theta)) - late) > _SPARE:
-            if now in tried or len(tried) > _MOST_COUNTS or _swamped(deviations, now):
+            # Unknown inputs may explain half of a record, whatever the model.
+            swamped = 2 * now * records.u.shape[1] > max(records.lengths)
+            if now in tried or len(tried) > _MOST_COUNTS or swamped:
                 found = tried[min(tried)]  # the fewest unknown inputs explain the least by chance
                 break
             late = now
             tried[late] = found = searched(deviations.begun_freely(late), found.point.theta)
         return replace(found, first=_first(records, found.point.theta))
 
-    def later(theta: Array) -> int:
-        late = deviations.lateness(theta)
-        return late + _SPARE if late else 0
-
     if rest is False:
-        return begun_free(None, 0 if about is None else later(about))
+        return begun_free(None, later(about))
     at_rest = searched(records, None)
     if rest or at_rest.point.cost <= 0.0:
         return at_rest
-    late = later(at_rest.point.theta)
+    judge, late = _FromRest(at_rest), later(at_rest.point.theta)
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
-    from_rest = _deviance(records, at_rest.point)
-
-    def more(point: Point) -> int:
-        """Return the unknowns beyond the ones from rest; 0 if too few errors are left to compare."""
-        few = records.y.size <= records.size + point.near.unknowns + _FEWEST
-        return 0 if few else point.near.unknowns - at_rest.point.near.unknowns
-
-    def probability(start: Records, point: Point, gain: float = 0.0) -> float:
-        fell = max(from_rest - _deviance(start, point) + gain, 0.0)
-        return _by_chance(records, fell, max(more(point), 1), point.near.unknowns)
-
-    def unless_by_chance(begun: Search) -> Search:
-        refuted = more(begun.point) > 0 and probability(begun.records, begun.point) < _MISTAKEN
-        return replace(begun, rest_refuted=True) if refuted else at_rest
-
     if records.dead_times.size and near.near.unknowns * _MANY > records.y.size:
         # A wrong level or a spike may feign a dead time, and the inputs before it explain whatever they like.
-        return unless_by_chance(begun_free(None, 0 if about is None else later(about)))
-    if more(near) <= 0:
-        return at_rest
-    # What errors promise of one step is about what the search would find. Near the edge of stability the
-    # determinant allows short steps only.
-    errors = near.of_errors
-    step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
-    # Where nothing is left of the errors there is nothing to gain.
-    share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED) if near.cost else 0.0
-    if probability(free, near, -near.near.freedom * np.log1p(-share)) > _UNLIKELY:
-        return at_rest
-    return unless_by_chance(begun_free(at_rest.point.theta, late))
+        return judge.unless_by_chance(begun_free(None, later(about)))
+    return (
+        at_rest
+        if judge.hopeless(free, near)
+        else judge.unless_by_chance(begun_free(at_rest.point.theta, late))
+    )

@@ -7,7 +7,7 @@ on initial conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihoo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,22 +61,23 @@ class Start(NamedTuple):
         return Start(free, disturbance, noise, self.zeros)
 
     @property
-    def still(self) -> Start:
-        """Its derivative with respect to what it does not depend on."""
-        return Start(*(np.zeros_like(block) for block in self))
-
-    @property
     def finite(self) -> bool:
         """Return whether all numbers are finite."""
         return all(bool(np.all(np.isfinite(block))) for block in self)
 
 
-def differences(above: Sequence[Start], below: Sequence[Start], span: float) -> tuple[Start, ...]:
-    """(above - below) / span, output by output."""
-    return tuple(
-        Start(*((a - b) / span for a, b in zip(*ends, strict=True)))
-        for ends in zip(above, below, strict=True)
-    )
+def central_differences(
+    starts: Callable[[Array], Sequence[Start]], theta: Array, indices: Sequence[int], sizes: Sequence[float]
+) -> list[tuple[Start, ...]]:
+    """Return the derivatives of the `starts` of parameters (k,) by some of these, moved by these `sizes`."""
+    found = []
+    for index, size in zip(indices, sizes, strict=True):
+        step = size * np.eye(theta.size)[index]
+        ends = zip(starts(theta + step), starts(theta - step), strict=True)
+        found.append(
+            tuple(Start(*((a - b) / (2.0 * size) for a, b in zip(*pair, strict=True))) for pair in ends)
+        )
+    return found
 
 
 def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:

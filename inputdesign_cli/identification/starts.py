@@ -8,41 +8,45 @@ time, on the output less what the others cause.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.orders import Block, OutputOrders
+from inputdesign_cli.identification.polynomial_rows import Coefficients, Row
 from inputdesign_cli.identification.stability import reflected
 from inputdesign_cli.plant.filtering import filtered
+
+Parts = list[tuple[Coefficients, Array]]
+"""Coefficients and their values."""
 
 _ITERATIONS = 15
 _LONGEST = 40
 
 
-def starting_points(row: OutputOrders, u: Sequence[Array], y: Array) -> Array:
-    """(points, k): several starts for one output y (samples,) and all inputs u, (samples,) each."""
-    inputs = [u[entry.input] for entry in row.entries]
+def starting_points(row: Row, size: int, u: Array, y: Array) -> Array:
+    """Return starts (points, k) for one output y (N,) and all inputs u (N, r); k is the `size`."""
+    inputs = [u[:, j] for j in row.inputs]
     noise, responses = _long_model(row, inputs, y)
     first = _equation_error(row, inputs, y, noise)
     second = _output_error(row, inputs, y, responses, coloured=True)
     left = y - sum(responses, np.zeros_like(y))
     third = _output_error(row, inputs, y, [left + x for x in responses], coloured=False)
-    points = np.array([first, second, third, *_nearly_cancelling(row, second)])
+    points = np.zeros((3, size))
+    for point, parts in zip(points, (first, second, third), strict=True):
+        for one, values in parts:
+            point[one.columns] = values
+    points = np.concatenate([points, *_nearly_cancelling(row, points[1])])
     return points[np.all(np.isfinite(points), axis=1)]
 
 
-def _nearly_cancelling(row: OutputOrders, theta: Array) -> list[Array]:
+def _nearly_cancelling(row: Row, theta: Array) -> list[Array]:
     """Return `theta` with C and D that nearly cancel, at low and at high frequency: often separate minima."""
-    C, D = (row.by_letter[letter][0] for letter in "cd")
     points = []
-    for sign in (1.0, -1.0) if row.c and row.d else ():
+    for sign in (1.0, -1.0) if row.c.lags and row.d.lags else ():
         point = theta.copy()
-        for block, root in ((C, 0.85), (D, 0.95)):
-            point[block.columns] = 0.0
-            point[block.columns.start] = -sign * root
-        points.append(point)
+        for one, root in ((row.c, 0.85), (row.d, 0.95)):
+            point[one.columns] = 0.0
+            point[one.columns[0]] = -sign * root
+        points.append(point[None])
     return points
 
 
@@ -61,58 +65,55 @@ def _shifted(x: Array, lag: int) -> Array:
     return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])
 
 
-def _long_model(row: OutputOrders, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
+def _long_model(row: Row, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
     """Return residuals of a long ARX model, and what it says that each input alone causes."""
-    highest = max([row.a, row.c, row.d, *(max(entry.b, entry.f) for entry in row.entries)])
+    highest = max(one.lags.stop for one in row.all) - 1
     order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
-    regressors = [(x, range(entry.delay, order + 1)) for x, entry in zip(inputs, row.entries, strict=True)]
-    (a, *bs), residual = regress(y, [(-y, range(1, order + 1)), *regressors])
-    A = reflected(np.concatenate([[1.0], a]))
-    responses = [
-        filtered(np.concatenate([np.zeros(entry.delay), b]), A, x)
-        for b, x, entry in zip(bs, inputs, row.entries, strict=True)
-    ]
-    return residual, responses
+    lags = [range(b.lags.start, order + 1) for b in row.b]
+    (a, *bs), residual = regress(y, [(-y, range(1, order + 1)), *zip(inputs, lags, strict=True)])
+    A = reflected(np.append(1.0, a))
+    return residual, [_caused(b, A, of.start, x) for b, x, of in zip(bs, inputs, lags, strict=True)]
 
 
-def _equation_error(row: OutputOrders, inputs: list[Array], y: Array, noise: Array) -> Array:
+def _caused(b: Array, F: Array, delay: int, x: Array) -> Array:
+    return filtered(np.concatenate([np.zeros(delay), b]), F, x)
+
+
+def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Parts:
     """A, B, C by regression; output-error denominators F take the place of a missing A."""
-    A, C = row.by_letter["a"][0], row.by_letter["c"][0]
-    Bs, Fs = row.by_letter["b"], row.by_letter["f"]
-    longest = max((block.lags for block in Fs), key=len, default=range(1, 1))
-    in_f = len(longest) > 0 and row.a == 0
-    regressors = [(x, block.lags) for x, block in zip(inputs, Bs, strict=True)]
-    (a, *bs, c), _ = regress(y, [(-y, longest if in_f else A.lags), *regressors, (noise, C.lags)])
-    denominators = [(block, a[: len(block.lags)]) for block in Fs] if in_f else [(A, a)]
-    return _theta(row, [*denominators, *zip(Bs, bs, strict=True), (C, c)])
+    longest = max((f.lags for f in row.f), key=len, default=range(1, 1))
+    in_f = len(longest) > 0 and not row.a.lags
+    regressors = [(x, b.lags) for x, b in zip(inputs, row.b, strict=True)]
+    (a, *bs, c), _ = regress(y, [(-y, longest if in_f else row.a.lags), *regressors, (noise, row.c.lags)])
+    denominators = [(f, a[: len(f.lags)]) for f in row.f] if in_f else [(row.a, a)]
+    return [*denominators, *zip(row.b, bs, strict=True), (row.c, c)]
 
 
-def _output_error(
-    row: OutputOrders, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool
-) -> Array:
+def _output_error(row: Row, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool) -> Parts:
     """B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
-    A, C, D = (row.by_letter[letter][0] for letter in "acd")
-    Bs, Fs = row.by_letter["b"], row.by_letter["f"]
-    if any(block.lags for block in Fs) or row.a == 0:
+    if any(f.lags for f in row.f) or not row.a.lags:
         found = [
-            _iterated(x, F.lags, [(x_in, B.lags)])
-            for x, x_in, F, B in zip(targets, inputs, Fs, Bs, strict=True)
+            _iterated(target, f.lags, [(x, b.lags)])
+            for target, x, f, b in zip(targets, inputs, row.f, row.b, strict=True)
         ]
         bs, denominators = [b for _, (b,) in found], [f for f, _ in found]
-        parts = [*zip(Bs, bs, strict=True), *((F, f[1:]) for F, f in zip(Fs, denominators, strict=True))]
+        parts = [
+            *zip(row.b, bs, strict=True),
+            *((of, f[1:]) for of, f in zip(row.f, denominators, strict=True)),
+        ]
         shaped = np.ones(1)
     else:
-        regressors = [(x, B.lags) for x, B in zip(inputs, Bs, strict=True)]
-        shaped, bs = _iterated(sum(targets, np.zeros_like(y)) if coloured else y, A.lags, regressors)
+        regressors = [(x, b.lags) for x, b in zip(inputs, row.b, strict=True)]
+        shaped, bs = _iterated(sum(targets, np.zeros_like(y)) if coloured else y, row.a.lags, regressors)
         denominators = [shaped] * len(bs)
-        parts = [*zip(Bs, bs, strict=True), (A, shaped[1:])]
-    if coloured and (row.c or row.d):
+        parts = [*zip(row.b, bs, strict=True), (row.a, shaped[1:])]
+    if coloured and (row.c.lags or row.d.lags):
         v = y.copy()
-        for b, f, x, entry in zip(bs, denominators, inputs, row.entries, strict=True):
-            v -= filtered(np.concatenate([np.zeros(entry.delay), b]), f, x)
+        for b, f, x, of in zip(bs, denominators, inputs, row.b, strict=True):
+            v -= _caused(b, f, of.lags.start, x)
         v = filtered(shaped, [1.0], v)
-        parts += zip((C, D), noise_polynomials(v, row.c, row.d), strict=True)
-    return _theta(row, parts)
+        parts += zip((row.c, row.d), noise_polynomials(v, len(row.c.lags), len(row.d.lags)), strict=True)
+    return parts
 
 
 def noise_polynomials(v: Array, c: int, d: int) -> tuple[Array, Array]:
@@ -133,10 +134,3 @@ def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> 
         (f, *numerators), _ = regress(y, [(-y, below), *smoothed])
         F = reflected(np.concatenate([[1.0], f]))
     return F, numerators
-
-
-def _theta(row: OutputOrders, parts: Iterable[tuple[Block, Array]]) -> Array:
-    theta = np.zeros(row.size)
-    for block, values in parts:
-        theta[block.columns] = values
-    return theta

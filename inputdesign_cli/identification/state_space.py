@@ -1,24 +1,18 @@
-"""State-space models against records: prediction errors, gradients, free responses."""
+"""Estimate state-space models in their innovations form."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.extensions import Extension
-from inputdesign_cli.identification.kind import Part, Starts
-from inputdesign_cli.identification.of_model import OfModel
+from inputdesign_cli.identification.kind import Echoes, Kind, Part, Starts, late_samples
 from inputdesign_cli.identification.records import shifted
-from inputdesign_cli.identification.search import Search
-from inputdesign_cli.identification.start import Start, differences
-from inputdesign_cli.identification.transfer_record import crossings_of, late_samples
-from inputdesign_cli.identification.white import Echoes
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
 
@@ -30,179 +24,10 @@ _INTEGRATES = 1e-2
 
 
 @dataclass(frozen=True)
-class StateSpaceRecord:
-    """Samples u (N, r), y (N, p), and the `structure` that is to explain them; see `Record`.
-
-    Unknown inputs before the record act for `late` samples of it, where it does not begin at rest.
-    """
-
-    structure: StateSpaceModel
-    u: Array
-    y: Array
-    late: int = 0
-
-    @property
-    def size(self) -> int:
-        """Return the number of parameters k."""
-        return len(self.structure.entries)
-
-    def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Return prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
-        model = self.structure.at(theta)
-        (A, early, late), m, n = model.held, model.matrices, model.order
-        u0, u1 = (shifted(self.u, model.lag + lag, (len(self.u),)) for lag in (0, 1))
-        direct = shifted(self.u, model.direct_lag, (len(self.u),))
-        at_once = direct @ m.D.T
-        slopes = model.slopes
-        closed = A - m.K @ m.C
-        onward = np.zeros((n * (1 + len(slopes)),) * 2)
-        driven = np.zeros((len(self.y), len(onward)))
-        read = np.zeros((self.y.shape[1] * (1 + len(slopes)), len(onward)))
-        found = np.zeros((len(self.y), len(read)))
-        p = self.y.shape[1]
-        onward[:n, :n], read[:p, :n], found[:, :p] = closed, m.C, at_once
-        driven[:, :n] = u0 @ early.T + u1 @ late.T + (self.y - at_once) @ m.K.T
-        for k, d in enumerate(slopes, start=1):
-            own, out = slice(k * n, (k + 1) * n), slice(k * p, (k + 1) * p)
-            onward[own, own], onward[own, :n] = closed, d.A - m.K @ d.C - d.K @ m.C
-            read[out, own], read[out, :n] = m.C, d.C
-            found[:, out] = direct @ d.D.T
-            driven[:, own] = u0 @ d.early.T + u1 @ d.late.T - direct @ d.D.T @ m.K.T
-            driven[:, own] += (self.y - at_once) @ d.K.T
-        x, step, reading = np.zeros(len(onward)), onward.T, read.T
-        states = np.empty_like(driven)
-        for t in range(len(driven)):
-            states[t] = x
-            x = x @ step + driven[t]
-        found = found + states @ reading
-        psi = found[:, p:].reshape(len(found), len(slopes), p)
-        return self.y - found[:, :p], np.moveaxis(psi, 1, 0)
-
-    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
-        """What the past adds: levels of the outputs, and the states at the start.
-
-        Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
-        Inputs before the record that come late by the dead time move the states, sample by sample, along the
-        directions in which inputs do; what they do at once, through D, is not counted. From rest, only noise
-        has moved the states, and as far as nobody knows.
-        """
-        coloured, nothing = self._coloured, np.zeros((0, len(self.y)))
-        if not (free or coloured):
-            return (Start.white(nothing),) * self.structure.outputs
-        model = self.structure.at(theta)
-        m, n, p = model.matrices, model.order, model.outputs
-        A, early, later = model.held
-        pushes = np.eye(n) if n <= 2 * model.inputs else np.concatenate([early, later], axis=1).T
-        if free:
-            late = min(self.late, len(self.y) - 1)
-            steady = n if np.any(np.abs(model.poles - 1.0) < _INTEGRATES) else 0
-            size, levels = n + p + late * len(pushes) + steady, p
-        else:
-            late, steady, size, levels = 0, 0, n, 0
-        x, level, driven = np.zeros((size, n)), np.zeros((size, p)), np.zeros((size, n))
-        x[:n], driven[size - steady :] = np.eye(size, n)[:n], np.eye(steady, n)
-        level[n : n + levels] = np.eye(levels, p)
-
-        def responses(K: Array) -> NDArray[np.float64]:
-            found, state, onward = np.empty((size, len(self.y), p)), x.copy(), (A - K @ m.C).T
-            for t in range(len(self.y)):
-                if 0 < t <= late:
-                    first = n + p + (t - 1) * len(pushes)
-                    state[first : first + len(pushes)] += pushes
-                found[:, t] = level - state @ m.C.T
-                state = state @ onward + level @ K.T + driven
-            return found
-
-        through = responses(m.K)
-        # What an unstable plant does without its predictor grows beyond all numbers.
-        stable = bool(np.all(np.abs(model.poles) < 1.0 + _MARGIN))
-        before = responses(np.zeros_like(m.K)) if coloured and stable else through
-        return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))
-
-    def lateness(self, theta: Array) -> int:
-        """Return the dead time in samples, one that is begun counted whole."""
-        model = self.structure.at(theta)
-        return late_samples(model.matrices.delay, model.sample_time or 1.0)
-
-    @property
-    def dead_times(self) -> NDArray[np.int64]:
-        """That of the structure, if it is free."""
-        return np.flatnonzero([letter == DELAY for letter, _, _ in self.structure.entries])
-
-    def crossings(self, theta: Array) -> Array:
-        """Return the crossings of its dead time."""
-        return crossings_of(theta, self.dead_times, self.structure.at(theta).sample_time or 1.0, len(self.y))
-
-    def remembering(self, late: int) -> Self:
-        """Return the record with free responses to inputs before it, which act for `late` samples."""
-        return replace(self, late=late)
-
-    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
-        """Return the indices of entries in A, C and K; of B and delays too if few inputs push many states."""
-        if not (free or self._coloured):
-            return np.zeros(0, dtype=np.int64)
-        pushed = free and self.late > 0 and self.structure.order > 2 * self.structure.inputs
-        letters = ("A", "C", "K", *(("B", "delay") if pushed else ()))
-        return np.flatnonzero([letter in letters for letter, _, _ in self.structure.entries])
-
-    @property
-    def _coloured(self) -> bool:
-        """Return whether noise moves the states."""
-        estimated = any(letter == "K" for letter, _, _ in self.structure.entries)
-        return estimated or bool(np.any(self.structure.matrices.K))
-
-    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
-        """By central differences."""
-        return [self._start_slope(theta, index, free=free) for index in indices]
-
-    def _start_slope(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
-        size = _STEP * max(abs(theta[index]), _STEP)
-        step = size * np.eye(self.size)[index]
-        above, below = (self.starts(theta + sign * step, free=free) for sign in (1.0, -1.0))
-        return differences(above, below, 2.0 * size)
-
-    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p): nothing; no instruments are used."""
-        return np.zeros((self.size, *errors.shape))
-
-    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): signals (N, m) through the inverse of each output's own noise model."""
-        model = self.structure.at(theta)
-        m = model.matrices
-        closed = model.held[0] - m.K @ m.C
-        found = np.empty((model.outputs, *signals.shape))
-        for i in range(model.outputs):
-            x = np.zeros((signals.shape[1], model.order))
-            for t, sample in enumerate(signals):
-                found[i, t] = sample - x @ m.C[i]
-                x = x @ closed.T + np.outer(sample, m.K[:, i])
-        return found
-
-    def stabilised(self, theta: Array) -> Array:
-        """Return theta if its predictor is stable or integrates, otherwise infinite values."""
-        delay = [k for k, (letter, _, _) in enumerate(self.structure.entries) if letter == DELAY]
-        out = theta.copy()
-        longest = (len(self.y) - 1) * (self.structure.sample_time or 1.0)
-        out[delay] = np.clip(out[delay], 0.0, longest)
-        if np.max(np.abs(self.structure.at(out).predictor_poles), initial=0.0) > 1.0 + _MARGIN:
-            return np.full_like(theta, np.inf)
-        return out
-
-
-@dataclass(frozen=True)
-class StateSpaceKind(OfModel):
-    """A state-space model; see `Kind`."""
+class StateSpaceKind(Kind):
+    """A state-space model in its innovations form; see `Kind`."""
 
     model: StateSpaceModel
-
-    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """None without a gain K; not known with one."""
-        return None if np.any(self.model.matrices.K) else ()
-
-    @property
-    def explaining(self) -> NDArray[np.bool_]:
-        """(k,): all that are in G."""
-        return self.model.in_plant
 
     @cached_property
     def whitening(self) -> NDArray[np.bool_]:
@@ -217,22 +42,135 @@ class StateSpaceKind(OfModel):
         """(p,): outputs share the parameters."""
         return np.full(self.outputs, len(self.names) / self.outputs)
 
-    def record(self, u: Array, y: Array) -> StateSpaceRecord:
-        """Samples u (N, r), y (N, p) that the structure is to explain."""
-        return StateSpaceRecord(self.model, u, y)
+    def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Return prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
+        model = self.model.at(theta)
+        (A, early, late), m, n = model.held, model.matrices, model.order
+        u0, u1, direct = (shifted(u, lag, (len(u),)) for lag in (model.lag, model.lag + 1, model.direct_lag))
+        at_once = direct @ m.D.T
+        slopes = model.slopes
+        closed = A - m.K @ m.C
+        onward = np.zeros((n * (1 + len(slopes)),) * 2)
+        driven = np.zeros((len(y), len(onward)))
+        read = np.zeros((y.shape[1] * (1 + len(slopes)), len(onward)))
+        found = np.zeros((len(y), len(read)))
+        p = y.shape[1]
+        onward[:n, :n], read[:p, :n], found[:, :p] = closed, m.C, at_once
+        driven[:, :n] = u0 @ early.T + u1 @ late.T + (y - at_once) @ m.K.T
+        for k, d in enumerate(slopes, start=1):
+            own, out = slice(k * n, (k + 1) * n), slice(k * p, (k + 1) * p)
+            onward[own, own], onward[own, :n] = closed, d.A - m.K @ d.C - d.K @ m.C
+            read[out, own], read[out, :n] = m.C, d.C
+            found[:, out] = direct @ d.D.T
+            driven[:, own] = u0 @ d.early.T + u1 @ d.late.T - direct @ d.D.T @ m.K.T
+            driven[:, own] += (y - at_once) @ d.K.T
+        x, step, reading = np.zeros(len(onward)), onward.T, read.T
+        states = np.empty_like(driven)
+        for t in range(len(driven)):
+            states[t] = x
+            x = x @ step + driven[t]
+        found = found + states @ reading
+        psi = found[:, p:].reshape(len(found), len(slopes), p)
+        return y - found[:, :p], np.moveaxis(psi, 1, 0)
 
-    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+    def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
+        """What the past adds: levels of the outputs, and the states at the start.
+
+        Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
+        Inputs before the record that come late by the dead time move the states, sample by sample, along the
+        directions in which inputs do; what they do at once, through D, is not counted. From rest, only noise
+        has moved the states, and as far as nobody knows.
+        """
+        coloured, nothing = self._coloured, np.zeros((0, samples))
+        if not (free or coloured):
+            return (Start.white(nothing),) * self.outputs
+        model = self.model.at(theta)
+        m, n, p = model.matrices, model.order, model.outputs
+        A, early, later = model.held
+        pushes = np.eye(n) if n <= 2 * model.inputs else np.concatenate([early, later], axis=1).T
+        if free:
+            late = min(late, samples - 1)
+            steady = n if np.any(np.abs(model.poles - 1.0) < _INTEGRATES) else 0
+            size, levels = n + p + late * len(pushes) + steady, p
+        else:
+            late, steady, size, levels = 0, 0, n, 0
+        x, level, driven = np.zeros((size, n)), np.zeros((size, p)), np.zeros((size, n))
+        x[:n], driven[size - steady :] = np.eye(size, n)[:n], np.eye(steady, n)
+        level[n : n + levels] = np.eye(levels, p)
+
+        def responses(K: Array) -> NDArray[np.float64]:
+            found, state, onward = np.empty((size, samples, p)), x.copy(), (A - K @ m.C).T
+            for t in range(samples):
+                if 0 < t <= late:
+                    first = n + p + (t - 1) * len(pushes)
+                    state[first : first + len(pushes)] += pushes
+                found[:, t] = level - state @ m.C.T
+                state = state @ onward + level @ K.T + driven
+            return found
+
+        through = responses(m.K)
+        # What an unstable plant does without its predictor grows beyond all numbers.
+        stable = bool(np.all(np.abs(model.poles) < 1.0 + _MARGIN))
+        before = responses(np.zeros_like(m.K)) if coloured and stable else through
+        return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))
+
+    def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
+        """Return the indices of entries in A, C and K; of B and delays too if few inputs push many states."""
+        if not (free or self._coloured):
+            return np.zeros(0, dtype=np.int64)
+        pushed = free and late > 0 and self.model.order > 2 * self.model.inputs
+        letters = ("A", "C", "K", *(("B", DELAY) if pushed else ()))
+        return np.flatnonzero([letter in letters for letter, _, _ in self.model.entries])
+
+    def start_step(self, theta: Array, index: int, samples: int) -> float:
+        """Return a small share of the entry."""
+        return _STEP * max(abs(float(theta[index])), _STEP)
+
+    def lateness(self, theta: Array) -> int:
+        """Return the dead time in samples, one that is begun counted whole."""
+        return late_samples(self.model.at(theta).matrices.delay, self.instants)
+
+    @property
+    def instants(self) -> float:
+        """Return the time between the steps of the inputs."""
+        return self.model.sample_time or 1.0
+
+    @property
+    def _coloured(self) -> bool:
+        """Return whether noise moves the states."""
+        estimated = any(letter == "K" for letter, _, _ in self.model.entries)
+        return estimated or bool(np.any(self.model.matrices.K))
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """(p, N, m): signals (N, m) through the inverse of each output's own noise model."""
+        model = self.model.at(theta)
+        m = model.matrices
+        closed = model.held[0] - m.K @ m.C
+        found = np.empty((model.outputs, *signals.shape))
+        for i in range(model.outputs):
+            x = np.zeros((signals.shape[1], model.order))
+            for t, sample in enumerate(signals):
+                found[i, t] = sample - x @ m.C[i]
+                x = x @ closed.T + np.outer(sample, m.K[:, i])
+        return found
+
+    def stabilised(self, theta: Array, samples: int) -> Array:
+        """Return theta if its predictor is stable or integrates, otherwise infinite values."""
+        out, late = theta.copy(), self.model.dead_times
+        out[late] = np.clip(out[late], 0.0, (samples - 1) * self.instants)
+        if np.max(np.abs(self.model.at(out).predictor_poles), initial=0.0) > 1.0 + _MARGIN:
+            return np.full_like(theta, np.inf)
+        return out
+
+    def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """Return the nominal parameters, and the `given` ones."""
         points = np.array([self.model.theta, *([] if given is None else [given])])
         return Starts(points, np.zeros(len(points), dtype=np.int64), len(points))
 
-    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """None: whether the entries that are not free are right is left to the tests of many signals."""
-        return ()
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """None without a gain K; not known with one."""
+        return None if np.any(self.model.matrices.K) else ()
 
-    def simulated(
-        self, found: Search, y: Array, lengths: Sequence[int] | None
-    ) -> tuple[Array, Sequence[bool]]:
-        """What the inputs cause in the estimate, and what unknown starts explain."""
-        runs = bool(np.all(np.abs(self.model.at(found.point.theta).poles) < 1.0 + _MARGIN))
-        return self.caused(found, y, lengths), (runs,) * self.outputs
+    def simulates(self, theta: Array) -> Sequence[bool]:
+        """Return whether the plant is stable or integrates."""
+        return (bool(np.all(np.abs(self.model.at(theta).poles) < 1.0 + _MARGIN)),) * self.outputs

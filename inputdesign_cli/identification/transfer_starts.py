@@ -16,8 +16,7 @@ from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.records import shifted
-from inputdesign_cli.identification.transfer_record import TransferRecord
-from inputdesign_cli.plant import ContinuousModel
+from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.model import DELAY
 
@@ -32,45 +31,47 @@ _SWEEPS, _MINIMA = 2, 6
 Place = tuple[int, int]
 
 
-def starting_points(record: TransferRecord, held: Mapping[Place, float] | None = None) -> Array:
-    """Return starting points (points, k) for each cutoff and order of the rows.
+def starting_points(
+    model: ContinuousModel, between: Intersample, held: Mapping[Place, float], u: Array, y: Array
+) -> Array:
+    """Return starting points (points, k) for each cutoff and order of the rows, from one record.
 
     Cutoffs lie between the record's length and its step. Dead times are searched on a grid, one after the
     other, by the residuals of the regression of the row. A single one also takes its next best minima.
 
     Args:
+        model: gives the structure.
         held: known dead times of entries.
+        u, y: (N, r), (N, p).
     """
-    step = record.intersample.sample_time
-    lines = slice(1, None, -(-record.samples // (2 * _MOST_FREQUENCIES)))
-    w = np.asarray(2.0 * np.pi / step * np.fft.rfftfreq(record.samples), dtype=float)[lines]
-    spectra = np.abs(np.fft.rfft(record.u, axis=0))[lines]
-    summing = (False,) if record.structure.common or record.structure.inputs == 1 else (False, True)
+    samples, step = len(y), between.sample_time
+    lines = slice(1, None, -(-samples // (2 * _MOST_FREQUENCIES)))
+    w = np.asarray(2.0 * np.pi / step * np.fft.rfftfreq(samples), dtype=float)[lines]
+    spectra = np.abs(np.fft.rfft(u, axis=0))[lines]
+    summing = (False,) if model.common or model.inputs == 1 else (False, True)
     points = []
-    for cutoff in np.geomspace(8.0 * np.pi / (record.samples * step), 0.5 * np.pi / step, _CUTOFFS):
+    for cutoff in np.geomspace(8.0 * np.pi / (samples * step), 0.5 * np.pi / step, _CUTOFFS):
         for summed in summing:
-            filtered = _Filtered(record, float(cutoff), summed)
-            for delays in _delays(record, filtered, held or {}):
+            behind = _Filtered(model, between, u, y, float(cutoff), summed)
+            for delays in _delays(model, behind, held, _grid(samples) * step):
                 responses: dict[Place, ComplexArray] = {}
-                for output in sorted({i for i, _ in record.structure.active}):
-                    responses |= filtered.responses(output, delays, w)
-                points.append(_reduced(record, responses, delays, w, spectra))
+                for output in sorted({i for i, _ in model.active}):
+                    responses |= behind.responses(output, delays, w)
+                points.append(_reduced(model, responses, delays, w, spectra))
     return np.array(points)
 
 
 def _delays(
-    record: TransferRecord, filtered: _Filtered, held: Mapping[Place, float]
+    model: ContinuousModel, filtered: _Filtered, held: Mapping[Place, float], grid: Array
 ) -> list[dict[Place, float]]:
     """Return dead times of all entries: the best on the grid, and for a single one its next best minima."""
-    model = record.structure
     best = {place: held.get(place, model.dead_time(*place)) for place in model.active}
     groups = [
         p.places for p in model.parameters if p.letter == DELAY and not any(x in held for x in p.places)
     ]
     if not groups:
         return [best]
-    grid, alone = _grid(record), len(groups) == 1
-    ranked = grid
+    ranked, alone = grid, len(groups) == 1
     for _ in range(1 if alone else _SWEEPS):
         for places in groups:
             outputs = {i for i, _ in places}
@@ -84,13 +85,13 @@ def _delays(
     return [best, *(best | dict.fromkeys(groups[0], delay) for delay in beside)]
 
 
-def _grid(record: TransferRecord) -> Array:
-    """Dead times in steps of a sample, then ever longer ones, up to a third of the record."""
-    longest = max(record.samples // 3, 1)
+def _grid(samples: int) -> Array:
+    """Dead times in samples, one by one, then ever longer ones, up to a third of the record."""
+    longest = max(samples // 3, 1)
     fine = np.arange(min(_FINE, longest))
     steps = 1 + int(np.log(max(longest / _FINE, 1.0)) / np.log(_GROWTH))
     far = np.rint(np.geomspace(_FINE, longest, steps)) if longest > _FINE else np.zeros(0)
-    return np.concatenate([fine, far]) * record.intersample.sample_time
+    return np.concatenate([fine, far])
 
 
 @dataclass
@@ -101,7 +102,10 @@ class _Filtered:
     largest.
     """
 
-    record: TransferRecord
+    model: ContinuousModel
+    between: Intersample
+    u: Array
+    y: Array
     cutoff: float
     summed: bool
     _columns: dict[tuple[int, int, float], Array] = field(default_factory=dict)
@@ -126,10 +130,10 @@ class _Filtered:
         return squared / max(float(np.sum(target**2)), 1e-300)
 
     def _places(self, output: int) -> list[Place]:
-        return [place for place in self.record.structure.active if place[0] == output]
+        return [place for place in self.model.active if place[0] == output]
 
     def _orders(self, output: int) -> list[int]:
-        return [self.record.structure.denominator[i][j].size - 1 for i, j in self._places(output)]
+        return [self.model.denominator[i][j].size - 1 for i, j in self._places(output)]
 
     def _order(self, output: int) -> int:
         orders = self._orders(output)
@@ -137,13 +141,13 @@ class _Filtered:
 
     def _regression(self, output: int, delays: Mapping[Place, float]) -> tuple[Array, Array]:
         """Regressors and target: the highest derivative of the output on the others and on the inputs'."""
-        model, record, m = self.record.structure, self.record, self._order(output)
+        model, m = self.model, self._order(output)
         places, orders = self._places(output), self._orders(output)
         biproper = m == 0 or any(
             model.numerator[i][j].size > n for (i, j), n in zip(places, orders, strict=True)
         )
         y = self._derivatives(-1 - output, m, 0.0, hold=False)
-        parts = [self._derivatives(j, m, delays[i, j], hold=record.intersample.hold) for i, j in places]
+        parts = [self._derivatives(j, m, delays[i, j], hold=self.between.hold) for i, j in places]
         kept = slice(None) if biproper else slice(0, m)
         return np.column_stack([-y[:, :m], *(part[:, kept] for part in parts)]), y[:, m]
 
@@ -151,31 +155,30 @@ class _Filtered:
         """(N, m + 1): of order 0 to m, of an input j >= 0 or of output -1 - j, behind 1 / (s + 1)^m."""
         key = (signal, m, delay)
         if key not in self._columns:
-            step = self.record.intersample.sample_time
-            x = self.record.u[:, signal] if signal >= 0 else self.record.y[:, -1 - signal]
+            step = self.between.sample_time
+            x = self.u[:, signal] if signal >= 0 else self.y[:, -1 - signal]
             chain = HeldEntry.of(np.ones(1), _power(self.cutoff, m), step, delay or None)
-            low = self.record.intersample.responses(chain, x, hold=hold)[:, :m]
+            low = self.between.responses(chain, x, hold=hold)[:, :m]
             late = shifted(x, int(np.rint(delay / step)), (x.size,))
             self._columns[key] = np.column_stack([low, late - low @ _power(1.0, m)[:-1]])
         return self._columns[key]
 
 
 def _reduced(
-    record: TransferRecord,
+    model: ContinuousModel,
     responses: dict[Place, ComplexArray],
     delays: Mapping[Place, float],
     w: Array,
     spectra: Array,
 ) -> Array:
     """theta of the structure's own orders, fitted to the responses where the inputs (n, r) have power."""
-    theta = np.zeros(record.size)
-    for index, parameter in enumerate(record.structure.parameters):
+    theta = np.zeros(len(model.parameters))
+    for index, parameter in enumerate(model.parameters):
         if parameter.letter == DELAY:
             theta[index] = delays[parameter.places[0]]
-    active = record.structure.active
-    for places in [active] if record.structure.common else [(place,) for place in active]:
-        _fit_group(record.structure, theta, places, responses, w, spectra)
-    return record.stabilised(theta)
+    for places in [model.active] if model.common else [(place,) for place in model.active]:
+        _fit_group(model, theta, places, responses, w, spectra)
+    return theta
 
 
 def _fit_group(

@@ -14,6 +14,7 @@ the dead time.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import Fault
 from inputdesign_cli.identification.directed import Alternative
-from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.identification.records import Records, split
 from inputdesign_cli.plant import Model
 
 # A signal that lies on a straight line but for this share is the input itself.
@@ -51,15 +52,12 @@ class _Tried(NamedTuple):
     early: int = 0
 
 
-def variations(
-    records: Records, record: Callable[[Array, Array], Record], theta: Array, simulated: Array | None
-) -> tuple[Alternative, ...]:
+def variations(records: Records, theta: Array, simulated: Array | None) -> tuple[Alternative, ...]:
     """Return the alternatives for each input, and for the speed of a plant with one input and output.
 
     For an input with two values, powers and sign are the input itself about a level: they add nothing.
 
     Args:
-        record: makes the record of samples (N, r), (N, p) that the structure is to explain.
         theta: (k,), the estimate.
         simulated: (N, p), the response to the inputs; None if it cannot be simulated, or frequencies are not
             in rad/sample.
@@ -70,22 +68,18 @@ def variations(
         x = (samples - np.mean(samples)) / max(size, 1e-300)
         tried = [*_changes(name, x), *_curves(name, x, lengths)]
         if simulated is not None and u.shape[1] == simulated.shape[1] == 1:
-            tried += _one_way(x, simulated[:, 0], records.lateness(theta) + 1, lengths)
+            tried += _one_way(x, simulated[:, 0], records.kind.lateness(theta) + 1, lengths)
         for one in tried:
-            column = _caused(records, record, theta, channel, size * one.f)
+            column = _caused(records, theta, channel, size * one.f)
             found.append(Alternative(one.name, one.phrase, one.fault, column, _slopes(channel, size, one)))
     return tuple(found)
 
 
-def _caused(
-    records: Records, record: Callable[[Array, Array], Record], theta: Array, channel: int, signal: Array
-) -> NDArray[np.float64]:
+def _caused(records: Records, theta: Array, channel: int, signal: Array) -> NDArray[np.float64]:
     """Return what a signal (N,) beside an input adds to the outputs, as minus prediction errors (N, p)."""
-    only, outputs = np.zeros_like(records.u), records.y.shape[1]
+    only, none = np.zeros_like(records.u), np.zeros_like(records.y)
     only[:, channel] = signal
-    pieces = np.split(only, np.cumsum(records.lengths)[:-1])
-    parts = (record(piece, np.zeros((len(piece), outputs))) for piece in pieces)
-    return -np.concatenate([part.errors_and_gradient(theta)[0] for part in parts])
+    return -replace(records, parts=tuple(split(only, none, records.lengths))).from_rest(theta)[0]
 
 
 def _slopes(channel: int, size: float, tried: _Tried) -> Callable[[Model, ArrayLike], NDArray[np.complex128]]:

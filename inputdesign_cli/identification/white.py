@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,8 +10,9 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.kind import Echo, Echoes
 from inputdesign_cli.identification.noise_first import Whitening
-from inputdesign_cli.identification.record_problem import Point
+from inputdesign_cli.identification.problem import Point
 from inputdesign_cli.identification.records import Records
 
 DEPENDENT = 1e-6
@@ -21,11 +21,6 @@ DEPENDENT = 1e-6
 _WELL_KNOWN = 1e-3
 # A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
-
-Echo = Callable[[Array], Array]
-"""What past errors (N, p) add to the gradient of a parameter."""
-Echoes = Sequence[tuple[int, Echo]]
-"""Such, and the places of the parameters in theta."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +35,7 @@ class White:
         starts: ((N + M) p, m), orthonormal, what m unknown starts explain.
         explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
         means: (k,), of the scores of the parameters, see `echoes`.
-        known: what past errors add to the gradients of parameters of the noise.
+        known: what past errors add to the gradients of parameters of the noise, if that is known.
         whitening: filters of residuals that are not white; their coefficients come after the k parameters.
     """
 
@@ -52,20 +47,18 @@ class White:
     explained: Array
     basis: Array
     means: Array
-    known: Echoes
+    known: Echoes | None
     whitening: Whitening | None = None
 
     @classmethod
-    def of(
-        cls, records: Records, point: Point, echoes: Echoes | None = None, whitening: Whitening | None = None
-    ) -> White:
+    def of(cls, records: Records, point: Point, whitening: Whitening | None = None) -> White:
         """Return that of a point of the search; a parameter that stands at its limit explains nothing.
 
         Args:
             whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
                 estimated along; of the parameters of that noise model nothing is known then.
         """
-        near = point.near
+        near, echoes = point.near, records.kind.echoes(point.theta, records.lengths)
         errors, psi = near.all_errors, np.where(_held(records, point)[:, None, None], 0.0, near.all_psi)
         starts = near.directions
         if whitening is not None:
@@ -89,12 +82,17 @@ class White:
             explained,
             _orthonormal(_scaled(explained)),
             none,
-            echoes or (),
+            echoes,
             whitening,
         )
         for index, through in echoes or ():
             none[index] = found.echoes(through)
         return found
+
+    @property
+    def foreseen(self) -> bool:
+        """Return whether the means of scores of residuals are known; otherwise they are taken for zero."""
+        return self.whitening is None and self.known is not None
 
     def columns(self, signals: NDArray[np.float64]) -> Array:
         """((N + M) p, m): signals (m, N, p) in units of the residuals, zero before the records."""
@@ -126,7 +124,7 @@ class White:
         """
         freedom = directions.shape[1]
         slopes = np.zeros(self.means.size)
-        for index, through in self.known:
+        for index, through in self.known or ():
             slopes[index] = 2.0 * self._trace(through, directions) / freedom
         deviations = slopes @ self._spread
         v = self.variance * float(deviations @ deviations)

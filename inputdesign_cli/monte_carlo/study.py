@@ -145,7 +145,7 @@ def _again_where_lost(job: _Job, u: Array, y: Array, found: BatchEstimate) -> Ba
         except SpecError:  # the noise of this run leaves some parameter without an estimate
             continue
         theta[run], noise[run], information[run] = other.theta, other.noise, other.information
-        converged[run], steps[run] = other.converged, other.steps
+        converged[run], steps[run] = other.search.converged, other.search.steps
     return BatchEstimate(theta, noise, information, converged, steps)
 
 
@@ -190,9 +190,9 @@ def searched_run(
     found = identify(
         model, u[0], y[0], step, start=model.theta, feedback=true.loop is not None, rest=True, earlier=earlier
     )
-    minima = (Rival(found.theta, 0.0), *found.rivals)
+    minima = (Rival(found.theta, 0.0), *found.search.rivals)
     away = [float(np.sum((found.factor.T @ (one.theta - model.theta)) ** 2)) for one in minima]
     number = int(np.argmin(away))
     home = minima[number]
     others = tuple(Rival(one.theta, one.excess - home.excess) for n, one in enumerate(minima) if n != number)
-    return replace(found, theta=home.theta, rivals=others), number == 0
+    return replace(found, theta=home.theta).with_rivals(others), number == 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from inputdesign_cli.identification import identify
+from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.search import search
@@ -35,9 +35,7 @@ def test_a_minimum_on_a_kink_is_a_minimum_and_is_told_to_be_one():
     model = heater(3.0)
     *_, (u, y) = records(model, 6)
     found = search(
-        Records((estimator(model, 1.0).kind.record(u, y),)),
-        np.array([heater(2.8).theta, heater(3.3).theta]),
-        starts=2,
+        Records(estimator(model, 1.0), ((u, y),)), np.array([heater(2.8).theta, heater(3.3).theta]), starts=2
     )
     assert found.converged
     assert found.point.theta[2] == pytest.approx(3.0, abs=1e-6)
@@ -61,7 +59,7 @@ def test_the_cramer_rao_bound_is_reached_by_a_dead_time_within_a_sample():
     """
     model, runs = heater(3.37), list(records(heater(3.37), 1200))
     u, far = runs[0][0], heater(1.0, 1.0, 5.0).theta
-    estimates = estimator(model, 1.0).fit_batch(u, np.array([y for _, y in runs]), model.theta).theta
+    estimates = fit_batch(model, u, np.array([y for _, y in runs]), start=model.theta).theta
     for (_, y), theta in zip(runs[:50], estimates, strict=False):
         np.testing.assert_allclose(identify(model, u, y, start=far, rest=True).theta, theta, rtol=1e-5)
     bound = np.linalg.inv(FiniteRecord(Experiment(model, SAMPLES), SAMPLES).information(u))

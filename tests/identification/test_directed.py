@@ -9,11 +9,9 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import identify
-from inputdesign_cli.identification.polynomials import PolynomialKind
-from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.identification.transfer_matrix import TransferKind
+from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.levels import level
-from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
+from inputdesign_cli.plant import ContinuousModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
 from tests.support.records import shifted, simulated
@@ -23,7 +21,7 @@ W = np.linspace(0.01, 3.0, 50)
 
 
 def by_name(found):
-    return {one.test.name: one for one in found.directed if one.test.fault in ("plant", "noise")}
+    return {one.test.name: one for one in found.tests.directed if one.test.fault in ("plant", "noise")}
 
 
 @pytest.fixture(scope="module")
@@ -78,25 +76,26 @@ def test_gradients_are_those_of_the_larger_model(name):
     """Against differences of its prediction errors; B, F (or A), C and D have each one coefficient more."""
     model = SYSTEMS[name]
     u, y = (x[0] for x in data(name, 60, np.random.default_rng(2)))
-    found = PolynomialKind(model, Structure.of(model)).extensions(model.theta, feedback=False)
+    found = estimator(model, 1.0).extensions(model.theta, feedback=False)
     letters = "".join(sorted(extension.name[0] for extension in found))
     assert letters == {"oe": "bbcdf", "bj": "bbcdf", "ararmax": "abbcd", "full": "abcdf"}[name]
     for extension in found:
-        record, theta = extension.record(u, y), extension.model.theta
-        assert abs(theta[extension.index]) < 1e-12
-        step = 1e-6 * (np.arange(theta.size) == extension.index)
-        above, below = (record.errors_and_gradient(theta + sign * step)[0] for sign in (1, -1))
-        column = record.errors_and_gradient(theta)[1][extension.index]
+        kind, theta = extension.kind, extension.model.theta
+        index = extension.model.names.index(extension.name)
+        assert abs(theta[index]) < 1e-12
+        step = 1e-6 * (np.arange(theta.size) == index)
+        above, below = (kind.errors_and_gradient(theta + sign * step, u, y)[0] for sign in (1, -1))
+        column = kind.errors_and_gradient(theta, u, y)[1][index]
         assert column == pytest.approx((below - above) / 2e-6, rel=1e-5, abs=1e-6)
 
 
 def test_an_input_that_answers_the_output_does_not_act_at_once():
     model = SYSTEMS["bj"]
-    kind = PolynomialKind(model, Structure.of(model))
+    kind = estimator(model, 1.0)
     names = [{e.name for e in kind.extensions(model.theta, feedback=loop)} for loop in (False, True)]
     assert names[0] - names[1] == {"b0"}
     lag = ContinuousModel(((np.ones(1),),), ((np.array([0.5, 1.0]),),), np.eye(1))
-    in_s = TransferKind(lag, Intersample(0.4, hold=True))
+    in_s = estimator(SampledModel(lag, 0.4), 0.4)
     names = [{e.name for e in in_s.extensions(lag.theta, feedback=loop)} for loop in (False, True)]
     assert names == [{"b1", "delay"}, {"delay"}]
 
@@ -118,7 +117,7 @@ def test_probabilities_of_right_models_are_uniform():
         assert scipy.stats.kstest([by_name(f)[name].test.probability for f in found], "uniform").pvalue > 1e-3
     u, y = simulated(arx(), 300, rng, 8)
     found = [identify(arx(), u[i], y[i], start=arx().theta, rest=True) for i in range(8)]
-    below = [one.test.probability < 0.05 for f in found for one in f.directed]
+    below = [one.test.probability < 0.05 for f in found for one in f.tests.directed]
     assert scipy.stats.binomtest(sum(below), len(below), 0.05).pvalue > 1e-3
 
 
@@ -136,8 +135,8 @@ def test_it_names_what_is_missing(B, F, first):
     u = np.repeat(rng.choice([-1.0, 1.0], 200), 4)
     y = scipy.signal.lfilter(B, F, u) + scipy.signal.lfilter([1], [1, -0.7], 0.05 * rng.standard_normal(800))
     found = identify(one_channel([0, 0, 0, 0.2], F=[1, -0.8], D=[1, -0.7]), u[:, None], y[:, None])
-    strongest = min(found.directed, key=lambda one: one.test.probability)
-    assert strongest.test in found.failed
+    strongest = min(found.tests.directed, key=lambda one: one.test.probability)
+    assert strongest.test in found.tests.failed
     assert first in [one.phrase.removeprefix("one more ") for one in strongest.alternatives]
 
 
@@ -155,15 +154,15 @@ def test_a_dead_time_in_s_is_found(hold):
         truth, model = SampledModel(truth, 0.4), SampledModel(model, 0.4)
     y = truth.simulate(u, 0 * u, 0.4)[0] + 0.1 * rng.standard_normal((400, 1))
     found = identify(model, u, y, 0.4)
-    test = next(one for one in found.directed if "delay" in one.test.name)
-    assert test.test in found.failed
+    test = next(one for one in found.tests.directed if "delay" in one.test.name)
+    assert test.test in found.tests.failed
     assert test.larger.theta[test.larger.names.index("delay")] == pytest.approx(0.3, abs=0.05)
 
 
 def test_a_level_and_a_state_add_unknowns_not_verdicts():
     u, y = (x[0] for x in data("oe", 300, np.random.default_rng(7)))
     found = identify(one_channel([0, 1.0, 0.5], F=[1, -0.7]), u, y + 30.0, rest=False)
-    assert min(one.test.probability for one in found.directed) < level("one parameter")
+    assert min(one.test.probability for one in found.tests.directed) < level("one parameter")
 
 
 @pytest.mark.slow

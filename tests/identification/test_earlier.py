@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from inputdesign_cli.identification import Earlier, identify, identify_polynomials
+from inputdesign_cli.identification import Earlier, identify
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.problem import RecordProblem, evaluate
+from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
-from tests.support.plants import arx
 from tests.support.records import shifted, simulated
 
 ARX = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.2, 0.5], variance=0.3)
@@ -22,31 +25,21 @@ def test_arx_with_known_noise_is_ridge_regression():
     u, y = (x[0] for x in simulated(ARX, 60, rng))
     root = rng.standard_normal((4, 4))
     earlier = Earlier(ARX.theta + 0.1 * rng.standard_normal(4), 50.0 * root @ root.T)
-    found = identify_polynomials(ARX, u, y, noise=[[0.3]], rest=True, earlier=earlier)
+    records = Records(estimator(ARX, 1.0), ((u, y),), weights=np.array([[1.0 / 0.3]]), earlier=earlier)
+    point = evaluate(records, minimise(RecordProblem((records,)), ARX.theta[None]).theta[0])
     phi = np.array([shifted(-y[:, 0], 1), shifted(-y[:, 0], 2), shifted(u[:, 0], 1), shifted(u[:, 0], 2)]).T
     information = phi.T @ phi / 0.3 + earlier.information
     right = phi.T @ y[:, 0] / 0.3 + earlier.information @ earlier.theta
-    np.testing.assert_allclose(found.theta, np.linalg.solve(information, right), rtol=1e-8)
-    np.testing.assert_allclose(found.covariance, np.linalg.inv(information), rtol=1e-8)
+    np.testing.assert_allclose(point.theta, np.linalg.solve(information, right), rtol=1e-8)
+    np.testing.assert_allclose(point.hessian, information, rtol=1e-8)
     alone = np.linalg.lstsq(phi, y[:, 0], rcond=None)[0]
     both = np.linalg.inv(phi.T @ phi / 0.3) + np.linalg.inv(earlier.information)
     statistic = (alone - earlier.theta) @ np.linalg.solve(both, alone - earlier.theta)
-    assert found.agreement == pytest.approx(scipy.stats.chi2.sf(statistic, 4), rel=1e-6)
+    differing = earlier.agreement(point.theta, np.linalg.cholesky(information))
+    assert differing == pytest.approx(scipy.stats.chi2.sf(statistic, 4), rel=1e-6)
 
 
-@pytest.mark.parametrize("model", [ARX, arx()], ids=["one channel", "two by two"])
-def test_one_record_after_the_other_is_both_at_once(model):
-    rng = np.random.default_rng(2)
-    u, y = simulated(model, 150, rng, runs=2)
-    known = {"noise": model.covariance, "rest": True}
-    first = identify_polynomials(model, u[0], y[0], **known)
-    then = identify_polynomials(model, u[1], y[1], **known, earlier=of(first))
-    joint = identify_polynomials(model, np.concatenate(u), np.concatenate(y), **known, lengths=[150, 150])
-    np.testing.assert_allclose(then.theta, joint.theta, atol=1e-7)
-    np.testing.assert_allclose(then.information, joint.information, rtol=1e-8, atol=1e-6)
-
-
-def test_the_same_of_box_and_jenkins_in_the_limit():
+def test_one_record_after_the_other_is_both_at_once_in_the_limit():
     u, y = simulated(JENKINS, 3000, np.random.default_rng(3), runs=2)
     first = identify(JENKINS, u[0], y[0], rest=True)
     then = identify(JENKINS, u[1], y[1], rest=True, earlier=of(first))
@@ -77,8 +70,8 @@ def test_knowing_nothing_changes_nothing():
     nothing = identify(JENKINS, u, y, earlier=Earlier(JENKINS.theta, np.zeros((4, 4))))
     np.testing.assert_allclose(nothing.theta, plain.theta, atol=1e-6)
     np.testing.assert_allclose(nothing.covariance, plain.covariance, rtol=1e-5)
-    assert nothing.agreement == 1.0
-    assert plain.agreement is None
+    assert nothing.prior.differing == 1.0
+    assert plain.prior is None
 
 
 def test_what_is_known_of_some_parameters_makes_up_for_excitation():

@@ -17,7 +17,7 @@ SLOW = PolynomialModel.single(
 DECADES = st.integers(-6, 6)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_collinear_gradients_are_no_lack_of_excitation(seed):
     u, y = simulated(SLOW, 400, np.random.default_rng(seed))
     found = identify(SLOW, u[0], y[0])
@@ -52,7 +52,7 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_units_of_signals_change_no_answer(rest, of_u, of_y):
@@ -61,16 +61,16 @@ def test_units_of_signals_change_no_answer(rest, of_u, of_y):
     model = SLOW if rest else SLOW.at(np.where(of_noise, -0.5, SLOW.theta))
     u, y = simulated(model, 400, np.random.default_rng(4))
     one = identify(model, u[0], y[0], start=model.theta, rest=rest)
-    assert one.converged
+    assert one.search.converged
     scale = np.where([name[0] == "b" for name in one.names], 10.0 ** (of_y - of_u), 1.0)
     other = identify(model, 10.0**of_u * u[0], 10.0**of_y * y[0], start=scale * model.theta, rest=rest)
     deviation = np.sqrt(np.diag(one.covariance))
     np.testing.assert_allclose(other.theta / scale, one.theta, atol=1e-3 * deviation.min())
     np.testing.assert_allclose(np.sqrt(np.diag(other.covariance)) / scale, deviation, rtol=1e-3)
-    assert [test.name for test in other.failed] == [test.name for test in one.failed]
+    assert [test.name for test in other.tests.failed] == [test.name for test in one.tests.failed]
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(of_time=st.integers(-4, 4), of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, False])
 def test_the_unit_of_time_changes_no_answer(rest, of_time, of_y):
@@ -90,7 +90,7 @@ def test_the_unit_of_time_changes_no_answer(rest, of_time, of_y):
     np.testing.assert_allclose(found[1][1], found[0][1], rtol=1e-3)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("kind", ["a sinusoid too few", "two inputs as one", "feedback alone"])
 def test_data_that_cannot_tell_are_refused_in_any_unit(kind, of_u, of_y):

@@ -38,7 +38,7 @@ def moved(seed):
     return u, y, lags, lates, log
 
 
-@pytest.mark.parametrize("seed", [7, 14, 20, 37])
+@pytest.mark.parametrize("seed", [20, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (7, 14, 37))])
 def test_deviations_are_those_of_the_likelihood_beyond_instants(seed):
     """The curvature at the best minimum alone has dead times by a third to a half too sure here."""
     u, y, lags, lates, log = moved(seed)
@@ -55,7 +55,7 @@ def test_the_best_minimum_is_found_from_any_sample_beside():
     """There is another one, hardly less likely, at 2.75."""
     u, y, _, lates, log = moved(20)
     best = lates[np.argmax(log.max(axis=0))]
-    for start in (0.4, 1.5, 2.5, 3.5, 4.4):
+    for start in (0.4, 2.5, 4.4):
         estimate = estimated(np.array([2.0, 4.0, start]), u, y, rest=True)
         assert estimate.theta[2] == pytest.approx(best, abs=0.05), start
 

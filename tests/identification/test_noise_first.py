@@ -23,13 +23,13 @@ def record(seed, *, distorted=lambda u: u, samples=400):
 
 
 def blamed(found):
-    return {test.fault for test in (*found.failed, *found.answering)} - {"noise"}
+    return {test.fault for test in (*found.tests.failed, *found.tests.answering)} - {"noise"}
 
 
 def test_no_plant_is_blamed_for_slow_noise():
     """White residuals are a wrong model in all records; a right plant fails no more often than the rate."""
     found = [identify(FIR, *record(seed), rest=True) for seed in range(25)]
-    assert all(one.coloured for one in found)
+    assert all(one.tests.coloured for one in found)
     assert sum(bool(blamed(one)) for one in found) <= scipy.stats.binom.ppf(0.999, len(found), RATE)
 
 
@@ -50,7 +50,9 @@ def test_slow_noise_hides_no_fault(fault, distorted):
 def test_units_do_not_matter():
     u, y = record(3)
     one, other = identify(FIR, u, y, rest=True), identify(FIR, 1e3 * u, 1e-4 * y, rest=True)
-    for mine, its in zip((*one.tests, *one.future), (*other.tests, *other.future), strict=True):
+    for mine, its in zip(
+        (*one.tests.scores, *one.tests.future), (*other.tests.scores, *other.tests.future), strict=True
+    ):
         assert its.statistic == pytest.approx(mine.statistic, rel=1e-6)
 
 

@@ -35,16 +35,16 @@ def test_of_arx_it_is_the_test_of_wald():
         variances.append(np.mean(left**2) * np.linalg.inv(matrix.T @ matrix))
     apart = estimates[0] - estimates[1]
     statistic = apart @ np.linalg.solve(sum(variances), apart)
-    assert found.alike == pytest.approx([scipy.stats.chi2.sf(statistic, 4)] * 2, rel=1e-6)
+    assert found.tests.alike == pytest.approx([scipy.stats.chi2.sf(statistic, 4)] * 2, rel=1e-6)
 
 
 def test_one_experiment_has_nothing_to_differ_from():
-    assert jointly(recorded(1.0, 300, 1)).alike == ()
+    assert jointly(recorded(1.0, 300, 1)).tests.alike == ()
 
 
 def test_the_one_that_differs_is_the_least_likely():
     records = [recorded(1.0, 300, 1), recorded(1.0, 300, 2), recorded(-1.0, 300, 3)]
-    alike = jointly(*records).alike
+    alike = jointly(*records).tests.alike
     assert np.argmin(alike) == 2
     assert alike[2] < 1e-6
 
@@ -56,7 +56,7 @@ def test_of_one_system_the_probability_is_uniform():
         rng = np.random.default_rng(seed)
         u = rng.standard_normal((2, 250))
         y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u) + rng.standard_normal((2, 250))
-        found.append(jointly(*zip(u, y, strict=True), model=model).alike[0])
+        found.append(jointly(*zip(u, y, strict=True), model=model).tests.alike[0])
     assert scipy.stats.kstest(found, "uniform").pvalue > 1e-3
 
 
@@ -71,4 +71,4 @@ def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
         )
     matrix = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
     np.testing.assert_allclose(found.theta, np.linalg.lstsq(matrix, y, rcond=None)[0], rtol=1e-6)
-    assert np.all(np.array(found.alike) > 0.01)
+    assert np.all(np.array(found.tests.alike) > 0.01)

@@ -5,8 +5,7 @@ import pytest
 import scipy.signal
 from hypothesis import given, settings, strategies as st
 
-from inputdesign_cli.identification.period_drift import line_of_periods, period_drift
-from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.periodic_response import Periods, line_of_periods, period_drift
 
 PERIOD = 100
 

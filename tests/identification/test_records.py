@@ -8,35 +8,34 @@ import scipy.signal
 
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.checks import fit_percent
-from inputdesign_cli.identification.polynomial_record import PolynomialRecord
-from inputdesign_cli.identification.record_problem import evaluate
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.problem import evaluate
 from inputdesign_cli.identification.records import Records
-from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.identification.transfer_record import TransferRecord
-from inputdesign_cli.plant import Intersample
+from inputdesign_cli.plant import SampledModel
 from tests.support.identification_systems import SYSTEMS, data
 from tests.support.plants import box_jenkins, two_by_two
-from tests.support.records import simulated
 
 CUT = 60
+
+
+def model_and_data(name, samples, rng, noise):
+    """A model, and samples of it."""
+    if name == "in s":
+        model = SampledModel(two_by_two(), 0.4)
+    else:
+        model = box_jenkins() if name == "two outputs" else SYSTEMS[name]
+    u = rng.standard_normal((samples, model.inputs))
+    e = noise * rng.standard_normal((samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    return model, u, sum(model.simulate(u, e, 1.0))
 
 
 def record_of(name):
     """Two records of a structure, neither of them at rest, and a theta near the truth."""
     rng = np.random.default_rng(3)
-    if name == "in s":
-        model = two_by_two()
-        u = rng.standard_normal((260, 2))
-        y = model.driven(u, Intersample(0.4, True)) + rng.standard_normal((260, 2)) @ [[1, 0.8], [0, 0.6]]
-        make = lambda u, y: TransferRecord(model, u, y, Intersample(0.4, True))  # noqa: E731
-    else:
-        model = box_jenkins() if name == "two outputs" else SYSTEMS[name]
-        u, y = simulated(model, 260, rng) if name == "two outputs" else data(name, 260, rng)
-        u, y = u[0], y[0]
-        structure = Structure.of(model)
-        make = lambda u, y: PolynomialRecord(structure, u, y)  # noqa: E731
-    parts = tuple(make(u[part] + 2.0, y[part] + 5.0) for part in (slice(CUT, 150), slice(150, 260)))
-    return Records(parts, free=True), model.theta * (1 + 0.03 * rng.standard_normal(model.theta.size))
+    model, u, y = model_and_data(name, 260, rng, 1.0)
+    parts = tuple((u[part] + 2.0, y[part] + 5.0) for part in (slice(CUT, 150), slice(150, 260)))
+    theta = model.theta * (1 + 0.03 * rng.standard_normal(model.theta.size))
+    return Records(estimator(model, 1.0), parts, free=True), theta
 
 
 @pytest.mark.parametrize("ramp", [False, True])
@@ -55,20 +54,11 @@ def test_the_slope_with_unknown_starts_is_a_difference_quotient(name, ramp):
 @pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
 def test_an_unknown_start_explains_what_was_cut_off(name):
     """Without noise, the later part of a record about any level leaves no error at the true parameters."""
-    rng = np.random.default_rng(5)
-    if name == "in s":
-        model = two_by_two()
-        u = rng.standard_normal((300, 2))
-        y = model.driven(u, Intersample(0.4, True))
-        record = TransferRecord(model, u[CUT:], y[CUT:] + 7.0, Intersample(0.4, True))
-    else:
-        model = box_jenkins() if name == "two outputs" else SYSTEMS[name]
-        u = rng.standard_normal((300, model.inputs))
-        y, _ = model.simulate(u, np.zeros((300, model.outputs)), 1.0)
-        record = PolynomialRecord(Structure.of(model), u[CUT:], y[CUT:] + 7.0)
-    left = Records((record,), free=True).at(model.theta).errors
+    model, u, y = model_and_data(name, 300, np.random.default_rng(5), 0.0)
+    records = Records(estimator(model, 1.0), ((u[CUT:], y[CUT:] + 7.0),))
+    left = replace(records, free=True).at(model.theta).errors
     np.testing.assert_allclose(left, 0.0, atol=1e-6 * np.abs(y).max())
-    assert np.abs(Records((record,)).at(model.theta).errors).max() > 1e-2
+    assert np.abs(records.at(model.theta).errors).max() > 1e-2
 
 
 @pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
@@ -77,8 +67,8 @@ def test_lines_in_the_outputs_leave_nothing_where_they_may_drift(name):
     records, theta = record_of(name)
     records = replace(records, ramp=True)
     lined = tuple(
-        replace(part, y=part.y + np.outer(np.arange(len(part.y)), slope * np.arange(1, part.y.shape[1] + 1)))
-        for slope, part in zip((0.03, -0.02), records.parts, strict=True)
+        (u, y + np.outer(np.arange(len(y)), slope * np.arange(1, y.shape[1] + 1)))
+        for slope, (u, y) in zip((0.03, -0.02), records.parts, strict=True)
     )
     plain, drifting = records.at(theta), replace(records, parts=lined).at(theta)
     np.testing.assert_allclose(drifting.errors, plain.errors, atol=1e-6 * np.abs(plain.errors).max())
@@ -95,8 +85,8 @@ def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(
         u, y = (x[0] for x in data(name, 700, rng))
         u, y = u[100:], y[100:] + np.repeat([[3.0], [-8.0]], 300, axis=0)
         found = identify(model, u, y, lengths=(300, 300))
-        assert found.converged
-        assert found.free
+        assert found.search.converged
+        assert found.start.free
         off = found.theta - model.theta
         squares.append(off @ found.information @ off)
     k = model.theta.size
@@ -106,7 +96,7 @@ def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(
 @pytest.mark.slow
 def test_records_at_rest_are_taken_for_such():
     u, y = data("bj", 400, np.random.default_rng(7), runs=30)
-    free = [identify(SYSTEMS["bj"], u[i], y[i]).free for i in range(30)]
+    free = [identify(SYSTEMS["bj"], u[i], y[i]).start.free for i in range(30)]
     assert np.mean(free) < 0.1
     told = identify(SYSTEMS["bj"], u[0], y[0], rest=True)
     np.testing.assert_allclose(told.theta, identify(SYSTEMS["bj"], u[0], y[0]).theta, atol=1e-9)
@@ -134,8 +124,8 @@ def test_the_simulation_begins_where_the_record_does():
     swing = scipy.signal.lfilter([1.0], [1, -1.5, 0.7], np.eye(1, 400)[0])[:, None]
     y = y + 50.0 + 20.0 * swing + 0.1 * rng.standard_normal((400, 1))
     found = identify(SYSTEMS["oe"], u, y)
-    assert found.free
-    assert found.fit[0] > 95
+    assert found.start.free
+    assert found.simulation.fit[0] > 95
 
 
 def test_levels_of_records_do_not_count_as_explained():

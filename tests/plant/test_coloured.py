@@ -105,12 +105,11 @@ def check_record(model, samples):
     """psi of a record with noise by differences of its errors, which at the truth are the noise itself."""
     rng = np.random.default_rng(3)
     u, e = rng.standard_normal((samples, model.inputs)), rng.standard_normal((samples, model.outputs))
-    kind = estimator(model, 1.0).kind
-    record = kind.record(u, sum(model.simulate(u, e, 1.0)))
-    errors, psi = record.errors_and_gradient(model.theta)
+    kind, y = estimator(model, 1.0), sum(model.simulate(u, e, 1.0))
+    errors, psi = kind.errors_and_gradient(model.theta, u, y)
     np.testing.assert_allclose(errors, e, atol=1e-9)
     for k, step in enumerate(1e-6 * np.eye(model.theta.size)):
-        up, down = (record.errors_and_gradient(model.theta + s * step)[0] for s in (1, -1))
+        up, down = (kind.errors_and_gradient(model.theta + s * step, u, y)[0] for s in (1, -1))
         np.testing.assert_allclose(psi[k], (down - up) / 2e-6, atol=1e-6 * max(np.abs(psi[k]).max(), 1.0))
 
 
@@ -146,9 +145,9 @@ def test_estimates_with_coloured_and_drifting_noise(noise, feedback):
         u, y = r, sum(model.simulate(r, e, 1.0))
     far = model.theta * np.where(np.array(model.names) == "delay", 2.0, 0.5)
     found = identify(model, u, y, start=far, feedback=feedback, rest=True)
-    assert found.converged
+    assert found.search.converged
     assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
-    assert found.failed == ()
+    assert found.tests.failed == ()
 
 
 def test_a_level_that_is_unknown_is_no_matter_to_a_drift():
@@ -159,7 +158,7 @@ def test_a_level_that_is_unknown_is_no_matter_to_a_drift():
     y = sum(model.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
     found = identify(model, u[100:], 20.0 + y[100:], start=model.theta)
     assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
-    assert found.free
+    assert found.start.free
 
 
 def test_a_root_on_the_circle_may_be_known():

@@ -181,7 +181,7 @@ def test_estimates_hold_the_integrator():
         u = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
         y = sum(truth.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
         found = identify(model, u, y, start=0.8 * model.theta)
-        assert found.converged
+        assert found.search.converged
         assert np.all(np.abs(found.theta - model.theta) < 4 * np.sqrt(np.diag(found.covariance)))
 
 

@@ -207,16 +207,16 @@ def test_records():
     found, rng = model(), np.random.default_rng(0)
     u, e = rng.standard_normal((2, 150, 2))
     y = sum(found.simulate(u, e, 1.0))
-    record = estimator(found, 1.0).kind.record(u, y)
-    errors, psi = record.errors_and_gradient(found.theta)
+    kind = estimator(found, 1.0)
+    errors, psi = kind.errors_and_gradient(found.theta, u, y)
     np.testing.assert_allclose(errors, e, atol=1e-10)
     for k, step in enumerate(1e-6 * np.eye(found.theta.size)):
-        up, down = (record.errors_and_gradient(found.theta + s * step)[0] for s in (1, -1))
+        up, down = (kind.errors_and_gradient(found.theta + s * step, u, y)[0] for s in (1, -1))
         np.testing.assert_allclose(psi[k], (down - up) / 2e-6, atol=1e-6 * max(np.abs(psi[k]).max(), 1.0))
-    calm = estimator(found, 1.0).kind.record(u, found.simulate(u, 0 * e, 1.0)[0])
+    calm = found.simulate(u, 0 * e, 1.0)[0]
     whitener = np.linalg.inv(np.linalg.cholesky(COVARIANCE))
     by_frequency = FiniteRecord(Experiment(found, 150), 150).gradient(u)
-    in_time = np.moveaxis(calm.errors_and_gradient(found.theta)[1], 0, 1) @ whitener.T
+    in_time = np.moveaxis(kind.errors_and_gradient(found.theta, u, calm)[1], 0, 1) @ whitener.T
     np.testing.assert_allclose(by_frequency, in_time, atol=1e-8)
 
 
@@ -275,7 +275,7 @@ def test_estimates_of_physical_parameters():
     y = sum(truth.simulate(u, 0.01 * rng.standard_normal((600, 1)), 1.0))
     found = identify(truth.at(1.4 * truth.theta), u, y)
     assert found.names == ("R", "K")
-    assert found.converged
+    assert found.search.converged
     assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
 
 
@@ -291,6 +291,6 @@ def test_an_estimate_with_a_gain_is_as_good_as_its_covariance():
     e = rng.standard_normal((900, 2)) @ np.linalg.cholesky(0.01 * COVARIANCE).T
     y = sum(truth.simulate(u, e, 1.0))
     found = identify(truth.at(0.7 * truth.theta), u, y + 3.0)
-    assert found.converged
+    assert found.search.converged
     assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
-    assert found.failed == ()
+    assert found.tests.failed == ()

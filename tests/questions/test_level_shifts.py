@@ -116,7 +116,8 @@ def found_with(samples, places, split="halves"):
         )
         for at in places
     )
-    return SimpleNamespace(estimate=SimpleNamespace(shifted=shifts), samples=np.arange(samples), split=split)
+    estimate = SimpleNamespace(tests=SimpleNamespace(shifted=shifts))
+    return SimpleNamespace(estimate=estimate, samples=np.arange(samples), split=split)
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
     assert found.names == ("gain", "time_constant", "dead_time")
     deviation = np.abs(found.theta - truth.theta) / np.sqrt(np.diag(found.covariance))
     assert np.all(deviation < 4.0)
-    assert found.failed == ()
+    assert found.tests.failed == ()
 
 
 def test_what_is_known_keeps_its_value():

@@ -3,7 +3,6 @@
 import numpy as np
 import scipy.signal
 
-from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant import PolynomialModel
 from tests.support.plants import arrays
 
@@ -22,11 +21,6 @@ SYSTEMS = {
     "ararmax": one_channel([0, 0, 1.0, 0.5], A=[1, -1.5, 0.7], C=[1, 0.6], D=[1, -0.8]),
     "full": one_channel([0.4, 1.0, 0.5], A=[1, -0.9], C=[1, 0.6], D=[1, 0.5], F=[1, -0.3]),
 }
-
-
-def row_of(model):
-    """What is to be estimated of the only output."""
-    return Structure.of(model).rows[0]
 
 
 def data(name, samples, rng, runs=1):

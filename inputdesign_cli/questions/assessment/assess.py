@@ -189,7 +189,7 @@ def _remarks(task: Identification, found: Identified, topped: Results) -> list[F
     if "signal" in topped.tables and signal is not None and not task.header.units.closed_loop:
         point, levels = signal.operating_point, found.preparation.levels
         remarks += level_notes(levels, point, found.data.means, found.data.u.std(axis=0))
-    if task.has_prior and found.estimate.agreement is None:
+    if task.has_prior and found.estimate.prior is None:
         remarks.append(prior_left_out())
     return remarks
 

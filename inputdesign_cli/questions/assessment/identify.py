@@ -29,7 +29,7 @@ from inputdesign_cli.findings.estimates import (
 )
 from inputdesign_cli.findings.faults import faults, loop_faults
 from inputdesign_cli.findings.level_shifts import shifted_levels
-from inputdesign_cli.findings.other_systems import differences, prior_notes, repetitions
+from inputdesign_cli.findings.other_systems import differences, prior_notes
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.rivals import other_minima, ruled_out
 from inputdesign_cli.findings.unrelated_inputs import answering, hardly_explained, idle
@@ -169,7 +169,7 @@ def _with_larger_noise(
 ) -> tuple[Identification, Identified]:
     """Return the estimate with C and D of small orders more, if the noise of the spec is refuted without."""
     estimate = found.estimate
-    if task.with_noise is None or not estimate.coloured:
+    if task.with_noise is None or not estimate.tests.coloured:
         return task, found
     plant = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
     for more in noises_of_residuals(estimate.errors, estimate.lengths):
@@ -181,7 +181,7 @@ def _with_larger_noise(
             other = estimated(larger, found.data, first, found.preparation, start=start)
         except IdesignError:  # this plant cannot have this noise, or it cannot be estimated
             continue
-        if other.estimate.converged and not other.estimate.coloured:
+        if other.estimate.search.converged and not other.estimate.tests.coloured:
             return larger, replace(other, noise_refuted=noise_probability(estimate))
     return task, found
 
@@ -271,7 +271,7 @@ def speaking_against(task: Identification, found: Identified) -> list[Finding]:
         *shifted_levels(estimate, data, units.time_unit),
         *refutations(found.model, estimate),
         *([] if found.loop_told else answering(units, estimate)),
-        *repetitions(estimate, data.files, data.repeated),
+        *data.repeated,
     ]
 
 
@@ -300,7 +300,7 @@ def identification_results(task: Identification, found: Identified, began: float
         )
     outcome = Outcome(
         title=header.title,
-        status="identified" if estimate.converged else "not_converged",
+        status="identified" if estimate.search.converged else "not_converged",
         samples=len(estimate.errors),
         identification=identification_entry(estimate, found.preparation, found.ruled_out),
         information=information_entry(estimate),

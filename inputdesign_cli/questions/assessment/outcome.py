@@ -49,21 +49,21 @@ def identification_entry(
         theta=dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
         standard_deviation=_deviations(estimate),
         variance=float(estimate.noise[0, 0]) if single else tuple(map(tuple, estimate.noise.tolist())),
-        converged=estimate.converged,
-        steps=estimate.steps,
-        starts=estimate.starts,
-        whiteness=_test(estimate.whiteness),
-        independence=_test(estimate.independence),
-        tests={test.name: _test(test, test.lag) for test in estimate.all_tests},
-        failed=tuple(test.name for test in estimate.failed),
-        free_start=estimate.free,
-        rivals=rival_entries(estimate, estimate.rivals) or None,
+        converged=estimate.search.converged,
+        steps=estimate.search.steps,
+        starts=estimate.search.starts,
+        whiteness=_test(estimate.tests.whiteness),
+        independence=_test(estimate.tests.independence),
+        tests={test.name: _test(test, test.lag) for test in estimate.tests.all},
+        failed=tuple(test.name for test in estimate.tests.failed),
+        free_start=estimate.start.free,
+        rivals=rival_entries(estimate, estimate.search.rivals) or None,
         ruled_out=rival_entries(estimate, ruled_out) or None,
-        prior=None if estimate.agreement is None else PriorAgreement(estimate.agreement),
+        prior=None if estimate.prior is None else PriorAgreement(estimate.prior.differing),
         records=tuple(estimate.lengths) if len(estimate.lengths) > 1 else None,
         means_removed=centred or None,
         operating_point=levels or None,
-        fit_percent=estimate.fit[0] if single else tuple(estimate.fit),
+        fit_percent=estimate.simulation.fit[0] if single else tuple(estimate.simulation.fit),
     )
 
 
@@ -124,13 +124,13 @@ def data_curves(
     columns |= {**_columns(units, "u", u), **_columns(units, "y", y)}
     columns |= _columns(units, "y", predicted, "_predicted")
     panels = []
-    for i, fit in enumerate(estimate.fit):
-        curve = None if fit is None else estimate.simulated[:, i]
+    for i, fit in enumerate(estimate.simulation.fit):
+        curve = None if fit is None else estimate.simulation.outputs[:, i]
         if curve is not None:
             columns[f"y{_number(units, i)}_simulated"] = curve
         panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i, units.label(f"y{i + 1}")))
     columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
-    white, cross = estimate.whiteness, estimate.independence
+    white, cross = estimate.tests.whiteness, estimate.tests.independence
     shared = min(white.lags.size, cross.lags.size)
     residuals = {"autocorrelation_lag": white.lags[:shared]}
     residuals |= _pairs(units, "autocorrelation", white.correlation[:shared])

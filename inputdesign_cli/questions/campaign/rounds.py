@@ -241,7 +241,7 @@ def _standing(task: Rounds, found: Identified, past: Past) -> Standing | None:
         if model is found.model:
             return estimate.information
         return information_of_data(
-            model, data.u, data.y, units.step, lengths=data.lengths, free=estimate.free, earlier=earlier
+            model, data.u, data.y, units.step, lengths=data.lengths, free=estimate.start.free, earlier=earlier
         )
 
     nominal = task.identification.nominal

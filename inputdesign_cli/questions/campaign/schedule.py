@@ -109,7 +109,7 @@ class Rules:
 
         The tests are repeated after every part, and the parts share their level.
         """
-        return self.stops and bool(estimate.failed_within(self.schedule.looks))
+        return self.stops and bool(estimate.tests.failed_within(self.schedule.looks))
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ class _Run:
 
     def _speaks_against(self, full: Estimate) -> bool:
         """Return whether the estimate contradicts the structure at the end."""
-        if full.failed or not full.converged:
+        if full.tests.failed or not full.search.converged:
             return True
         known = self.known
         if known is None or not known.met:  # more parameters miss it all the more

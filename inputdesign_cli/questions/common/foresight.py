@@ -7,7 +7,7 @@ away. A record of the design is simulated on the nominal plant and estimated wit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -93,8 +93,8 @@ class Foresight:
 
     def _beyond(self, record: Array, estimate: Estimate, requirements: Sequence[Requirement]) -> list[Apart]:
         if self.knowledge is not None:
-            known = tuple(one for one in estimate.rivals if self.knowledge.admits(one.theta))
-            estimate = replace(estimate, rivals=known)
+            known = tuple(one for one in estimate.search.rivals if self.knowledge.admits(one.theta))
+            estimate = estimate.with_rivals(known)
         model, errors = self.nominal.model.at(estimate.theta), model_errors(requirements)
         if errors:
             return beyond(model, estimate, errors)

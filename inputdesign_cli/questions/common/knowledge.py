@@ -7,7 +7,7 @@ well. Who says that it is 25 s within 30 % has said that it is not ten minutes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ def that_agrees(
 
     If none does, the knowledge is wrong and rules nothing out.
     """
-    minima = (Rival(estimate.theta, 0.0), *estimate.rivals)
+    minima = (Rival(estimate.theta, 0.0), *estimate.search.rivals)
     admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]
     if not admitted or len(admitted) == len(minima):
         return estimate, ()
@@ -82,4 +82,4 @@ def that_agrees(
     ]
     found = estimate if home is minima[0] else near(home.theta)
     rivals, ruled_out = (tuple(one for agrees, one in others if agrees is kept) for kept in (True, False))
-    return replace(found, rivals=rivals), ruled_out
+    return found.with_rivals(rivals), ruled_out

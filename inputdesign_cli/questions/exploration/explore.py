@@ -129,7 +129,7 @@ def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = Non
     whole = rest = log
     first = found = found_in(log)
     for _ in range(_MOST_SHIFTS):
-        shifts = found.estimate.shifted
+        shifts = found.estimate.tests.shifted
         if not shifts:
             return rest, found
         shifting = np.unique(np.concatenate([found.samples[one.begins : one.ends] for one in shifts]))
@@ -143,7 +143,7 @@ def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = Non
         short = len(rest.y) - len(less.y) - len(shifting)
         step = left_out(rest, shifts, found.samples, rest.time_unit, short=short)
         rest, found = replace(less, remarks=(*rest.remarks, step)), another
-    return (whole, first) if found.estimate.shifted else (rest, found)
+    return (whole, first) if found.estimate.tests.shifted else (rest, found)
 
 
 def _data(log: Record, found: Found) -> Record:

@@ -27,19 +27,17 @@ from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
 from inputdesign_cli.findings.places import places
 from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
 from inputdesign_cli.identification import frequency_response, response_delays
-from inputdesign_cli.identification.cubes import cubes
-from inputdesign_cli.identification.distortion import response_error
+from inputdesign_cli.identification.faults import period_spikes
 from inputdesign_cli.identification.frequency_response import of_periods
-from inputdesign_cli.identification.period_drift import period_drift
+from inputdesign_cli.identification.nonlinearity import SilentLines, cubes, response_error, silent_lines
 from inputdesign_cli.identification.periodic_response import (
     PeriodicResponse,
     Periods,
     differing,
     excited_lines,
+    period_drift,
     periodic_response,
 )
-from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
-from inputdesign_cli.identification.spikes import period_spikes
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.plant import Model

@@ -15,8 +15,8 @@ from inputdesign_cli.findings.frequency_responses import REMEDY, UNLIKE
 from inputdesign_cli.findings.nonlinear_response import Distorted, nonlinear_response, silent_lines_answer
 from inputdesign_cli.findings.scattered_periods import within_chance
 from inputdesign_cli.identification import FrequencyResponse
+from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
 from inputdesign_cli.outcome.curves import Curves, ResponseCurves
 from inputdesign_cli.outcome.response import SilentLine

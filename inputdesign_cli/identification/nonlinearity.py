@@ -1,7 +1,16 @@
-"""Estimate what a cube within a plant does to a measured frequency response, from lines not excited.
+"""Estimate what a nonlinearity does to a measured frequency response, from lines that were not excited.
 
-The power at silent lines alone does not determine what a nonlinearity changes at excited ones. Signals of
-low peaks leave little power there, and the gain changes all the same. If the nonlinearity is static, at an
+An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones
+([pintelon-schoukens-2012], Sections 3.4 and 4.3). One of odd degree adds as much to each excited line as to
+its neighbours, which is measured; the scatter of the periods shows how much of it is noise. It changes the
+gain as well, at frequencies that no silent line shows.
+
+The change is estimated as for a cubic of a Gaussian signal. With y = x + c x^3 and E x^2 = s the gain is
+1 + 3 c s, and the rest of c x^3 has the mean square 6 c^2 s^3. The square of the relative change is 9/6 of
+the ratio of the rest to the power of x. A third of the rest is beyond the highest line (three times the
+band), so that the share that is seen counts 9/6 times 3/2.
+
+Signals of low peaks leave less power for the same change of the gain. If the nonlinearity is static, at an
 input or at the output, the signal itself gives its cubic part up to a factor. The part of the outputs at
 silent lines in phase with it gives the factor, and so the change at every excited line.
 """
@@ -16,6 +25,96 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods
+
+# Neighbouring lines over which the spectrum of the noise is taken to be even, where it is not known.
+_NEIGHBOURS = 15
+_OF_THE_SHARE = 9.0 / 6.0 * 3.0 / 2.0
+
+
+@dataclass(frozen=True)
+class SilentLines:
+    """The power of p outputs at `lines` lines without excitation.
+
+    Attributes:
+        over_noise: (p,) mean of the power there over that of the noise; about one for noise alone.
+        probability: (p,) that noise alone has as much, by an F test over all lines.
+        rms: (p,) of the part beyond the noise.
+        beyond: (lines, p) mean squares of the transforms that are beyond the noise, over neighbouring lines.
+    """
+
+    lines: int
+    over_noise: Array
+    probability: Array
+    rms: Array
+    beyond: NDArray[np.float64]
+
+
+def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> SilentLines | None:
+    """From transforms (blocks, periods, lines, p) of outputs; None without lines or without scatter.
+
+    Args:
+        shape: (lines, p) of the spectrum of the noise, up to a factor; None: that of the scatter, smoothed.
+    """
+    blocks, periods, lines, _ = Y.shape
+    if lines == 0 or periods < 2:
+        return None
+    mean = Y.mean(axis=1, keepdims=True)
+    noise = np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (blocks * (periods - 1))
+    if np.any(noise <= 0.0):
+        return None
+    level: NDArray[np.float64] = periods * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
+    even = _smoothed(noise) if shape is None else shape
+    # Over the shape of the noise all lines count alike.
+    ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
+    freedom = 2 * blocks * lines
+    # Where strong noise at some lines hides the sum, what is beyond it is taken to have its shape.
+    like_noise = (ratio - 1.0) * np.mean(noise / even, axis=0) * np.sum(even, axis=0)
+    plain = np.sum(level - noise, axis=0)
+    beyond = np.where(plain > 0.0, plain, np.maximum(like_noise, 0.0))
+    return SilentLines(
+        lines,
+        np.asarray(ratio),
+        np.asarray(scipy.special.fdtrc(freedom, freedom * (periods - 1), ratio)),
+        np.sqrt(2.0 * beyond / periods),
+        np.maximum(_smoothed(level - noise), 0.0) / periods,
+    )
+
+
+def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return means over neighbouring lines (lines, p), at the ends over equally many nearest ones."""
+    window = min(_NEIGHBOURS, len(noise))
+    sums = np.concatenate([np.zeros((1, noise.shape[1])), np.cumsum(noise, axis=0)])
+    first = np.clip(np.arange(len(noise)) - window // 2, 0, len(noise) - window)
+    return np.asarray((sums[first + window] - sums[first]) / window)
+
+
+def response_error(
+    found: PeriodicResponse, period: int, kept: int, odd: SilentLines, harmonics: NDArray[np.int_]
+) -> NDArray[np.float64]:
+    """Return the errors (L, p, r) of G at the excited lines: added part and change of gain, in mean square.
+
+    Args:
+        found: the response, from `kept` periods of `period` samples in all.
+        odd: the power at odd lines without excitation, at these `harmonics`.
+    """
+    added = _between(harmonics, odd.beyond, found.harmonics)
+    of_inverse = kept * period * found.deviation**2 / found.noise[:, :, None]  # sum over blocks of |U^-1|^2
+    at_lines = added[:, :, None] * of_inverse
+    # The power of the inputs behind each output, and of the added part, referred to the inputs.
+    gain = np.sum(np.abs(found.G) ** 2, axis=2)
+    before = found.explained / gain
+    seen = _between(found.harmonics, gain, harmonics)
+    shares = np.maximum(
+        (odd.beyond.sum(axis=0) + added.sum(axis=0)) / found.explained.sum(axis=0),
+        ((odd.beyond / seen).sum(axis=0) + (added / gain).sum(axis=0)) / before.sum(axis=0),
+    )
+    changed = _OF_THE_SHARE * shares[None, :, None] * np.abs(found.G) ** 2
+    return np.asarray(np.sqrt(at_lines + changed))
+
+
+def _between(known: NDArray[np.int_], values: NDArray[np.float64], at: NDArray[np.int_]) -> Array:
+    """Return values (n, p) at harmonics `at`, interpolated from values (l, p) at `known` ones."""
+    return np.stack([np.interp(np.log(at), np.log(known), column) for column in values.T], axis=1)
 
 
 @dataclass(frozen=True)

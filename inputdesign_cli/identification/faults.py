@@ -1,26 +1,33 @@
-"""Detect a sensor that stands still: its samples are equal although noise, or the input, would move them.
+"""Faults of measurement: spikes, and sensors that stand still.
 
 An innovation of standard deviation s falls into a cell of width d with a probability of at most d f / s.
-Here f is the largest density of usual noise. If that is small, a row of equal samples is
-beyond chance. If rounding hides the noise, the model decides: it moves by more than a cell and its own errors
-while the sensor does not.
+Here f is the largest density of usual noise. If that is small, a row of equal samples is beyond chance. If
+rounding hides the noise, the model decides: it moves by more than a cell and its own errors while the sensor
+does not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.repeated import NORMAL, whitened
+from inputdesign_cli.identification.noise_first import Whitening
+from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.levels import level
 
+# The median of the absolute value of a normal variable, in standard deviations.
+_NORMAL = 0.6745
+# A spike is farther from zero than _FAR robust standard deviations, twice that of _UNSURE samples.
+_FAR, _UNSURE = 8.0, 20
+# Not more of the samples than this, which hold this share of the sum of squares.
+_FEW, _MOST = 0.05, 0.5
 # Fewer equal samples in a row, and fewer samples in all, say nothing.
-_SHORTEST, _FEW = 5, 20
+_SHORTEST, _FEWEST = 5, 20
 # The largest density of noise with two-sided exponential tails, by its robust deviation; normal: 0.4.
 _DENSITY = 0.52
 # A filter of two differences passes so much of the mean square of rounding, d^2 / 12.
@@ -33,12 +40,57 @@ _SPAN = 8.0
 
 
 @dataclass(frozen=True)
+class Spikes:
+    """Samples whose errors in one output hold the `share` of the sum of squares there."""
+
+    output: int
+    samples: tuple[int, ...]
+    share: float
+
+
+@dataclass(frozen=True)
 class Frozen:
     """Output `output` stands still for `length` samples from `first` on."""
 
     output: int
     first: int
     length: int
+
+
+def spikes(errors: Array) -> list[Spikes]:
+    """Of prediction errors (samples, p): output by output, where few hold most of the sum of squares."""
+    found = []
+    for output, e in enumerate(errors.T):
+        spread = float(np.median(np.abs(e))) / _NORMAL
+        far = np.flatnonzero(np.abs(e) > _FAR * (1.0 + _UNSURE / e.size) * spread)
+        if not far.size or not spread > 0.0 or far.size > _FEW * e.size:
+            continue
+        size = np.abs(e).max()
+        share = float(np.sum((e[far] / size) ** 2) / np.sum((e / size) ** 2))
+        if share >= _MOST:
+            found.append(Spikes(output, tuple(far.tolist()), share))
+    return found
+
+
+def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spikes]:
+    """Of outputs (N, p) of inputs that repeat, by how each of the periods that count differs from the others.
+
+    Medians of the periods, and over them, so that neither a spike nor a level that drifts counts elsewhere.
+
+    Args:
+        repeats: how many records of equal length with the same input follow each other.
+    """
+
+    def parts(signal: Array) -> NDArray[np.float64]:
+        return np.concatenate([periods.parts(one) for one in np.split(signal, repeats)], axis=1)
+
+    each = parts(y)
+    apart = each - np.median(each, axis=1, keepdims=True)
+    levelled = each - np.median(apart, axis=2, keepdims=True)
+    errors = levelled - np.median(levelled, axis=1, keepdims=True)
+    at = parts(np.arange(float(len(y)))[:, None]).ravel().astype(np.int64)
+    found = spikes(errors.reshape(-1, y.shape[1]))
+    return [replace(one, samples=tuple(sorted(at[list(one.samples)].tolist()))) for one in found]
 
 
 def frozen(
@@ -64,7 +116,7 @@ def frozen(
     ends, moves = np.cumsum([0, *lengths]), _MOVES * np.std(u, axis=0)
     found = []
     for output, d in enumerate(resolution.tolist()):
-        stays = _likely(errors[:, output], d)
+        stays = _likely(errors[:, [output]], d)
         size = _spread(apart[:, output])
         for start, end in pairwise(ends.tolist()):
             for first, length in _runs(held[start:end, output]):
@@ -90,15 +142,15 @@ def resolution_of(y: Array) -> Array:
 
 def _likely(errors: Array, d: float) -> float:
     """Return the largest probability that a sample falls into the cell of the last one."""
-    if errors.size < _FEW or not np.any(errors):
+    if len(errors) < _FEWEST or not np.any(errors):
         return 1.0
-    white = whitened(errors)
+    white = Whitening.of(errors, (len(errors),)).through(errors[None])
     variance = _spread(white) ** 2 - _ROUNDING * d**2
     return min(1.0, _DENSITY * d / float(np.sqrt(variance))) if variance > 0.0 else 1.0
 
 
-def _spread(x: Array) -> float:
-    return float(np.median(np.abs(x - np.median(x)))) / NORMAL
+def _spread(x: NDArray[np.float64]) -> float:
+    return float(np.median(np.abs(x - np.median(x)))) / _NORMAL
 
 
 def _runs(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
