@@ -19,8 +19,16 @@ from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
 from inputdesign_cli.outcome.curves_file import curves_json
 from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, not_a_run
-from inputdesign_cli.outcome.provenance import environment
-from inputdesign_cli.outcome.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files, unreadable
+from inputdesign_cli.outcome.record import (
+    FIGURES,
+    RESULT,
+    SIGNAL,
+    SPEC,
+    environment,
+    load_result,
+    owned_files,
+    unreadable,
+)
 from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain

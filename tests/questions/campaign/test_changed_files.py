@@ -28,12 +28,11 @@ EDITS = {
 
 
 @pytest.mark.parametrize("name", EDITS)
-def test_what_was_edited_by_hand_is_told(name, run, begun, tmp_path):
-    run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")
-    result = json.loads((begun / "result.json").read_text())
-    record = applied(begun, tmp_path / "r2.csv")
+def test_what_was_edited_by_hand_is_told(name, run, taken, tmp_path):
+    result = json.loads((taken / "result.json").read_text())
+    record = applied(taken, tmp_path / "r2.csv")
     EDITS[name](result["campaign"], result)
-    (begun / "result.json").write_text(json.dumps(result))
+    (taken / "result.json").write_text(json.dumps(result))
     for command in (("status", "c"), ("next", "c", record, "--no-figures")):
         code, _, err = run(*command)
         assert code == 2
@@ -58,13 +57,12 @@ def tenfold(text):
 
 
 @pytest.mark.parametrize("damage", [halved, lambda text: text[:40], tenfold, lambda text: text + "\n"])
-def test_a_record_that_was_changed_decides_nothing(damage, run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    kept, before = (begun / "record_01.csv").read_text(), (begun / "result.json").read_bytes()
-    (begun / "record_01.csv").write_text(damage(kept))
+def test_a_record_that_was_changed_decides_nothing(damage, run, taken, tmp_path):
+    kept, before = (taken / "record_01.csv").read_text(), (taken / "result.json").read_bytes()
+    (taken / "record_01.csv").write_text(damage(kept))
     for command in (
         ("next", "c"),
-        ("next", "c", applied(begun, tmp_path / "r2.csv")),
+        ("next", "c", applied(taken, tmp_path / "r2.csv")),
         ("next", "c", "--withdraw", 2),
         ("status", "c"),
     ):
@@ -73,33 +71,31 @@ def test_a_record_that_was_changed_decides_nothing(damage, run, begun, tmp_path)
         assert "campaign-changed" in err
         assert "c/record_01.csv" in err
         assert "--withdraw 1" in err
-    assert (begun / "result.json").read_bytes() == before
+    assert (taken / "result.json").read_bytes() == before
     # Both ways that are told of mend it.
     code, out, _ = run("next", "c", "--withdraw", 1, "--json", "--no-figures")
     assert (code, json.loads(out)["campaign"]["rounds"][-1]["records"]) == (0, [])
-    assert run("next", "c", applied(begun, tmp_path / "r3.csv"), "--no-figures")[0] == 0
-    kept = (begun / "record_02.csv").read_text()
-    (begun / "record_02.csv").write_text(damage(kept))
+    assert run("next", "c", applied(taken, tmp_path / "r3.csv"), "--no-figures")[0] == 0
+    kept = (taken / "record_02.csv").read_text()
+    (taken / "record_02.csv").write_text(damage(kept))
     assert run("next", "c", "--no-figures")[0] == 2
-    (begun / "record_02.csv").write_text(kept)
+    (taken / "record_02.csv").write_text(kept)
     assert run("next", "c", "--no-figures")[0] == 0
 
 
-def test_a_plan_that_was_changed_decides_nothing(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    record = applied(begun, tmp_path / "r2.csv")
+def test_a_plan_that_was_changed_decides_nothing(run, taken, tmp_path):
+    record = applied(taken, tmp_path / "r2.csv")
     for name in ("plan_01.csv", "plan_02.csv"):
-        kept = (begun / name).read_text()
-        (begun / name).write_text(kept[:-3] + "9\n")
+        kept = (taken / name).read_text()
+        (taken / name).write_text(kept[:-3] + "9\n")
         code, _, err = run("next", "c", record)
         assert (code, "campaign-changed" in err, f"c/{name}" in err) == (2, True, True)
-        (begun / name).write_text(kept)
-    assert (begun / "signal.csv").read_text() == kept  # which the message says of the plan that is due
+        (taken / name).write_text(kept)
+    assert (taken / "signal.csv").read_text() == kept  # which the message says of the plan that is due
 
 
-def test_a_record_that_is_gone_is_to_be_put_back(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    (begun / "record_01.csv").unlink()
+def test_a_record_that_is_gone_is_to_be_put_back(run, taken, tmp_path):
+    (taken / "record_01.csv").unlink()
     code, _, err = run("next", "c")
     assert (code, "run-incomplete" in err, "put it back" in err) == (2, True, True)
     assert "run the spec again" not in err
@@ -129,12 +125,11 @@ DECIDING = {
 }
 
 
-def test_every_file_that_decides_is_known_by_its_digest(run, begun, tmp_path):
+def test_every_file_that_decides_is_known_by_its_digest(run, taken, tmp_path):
     """Each of the directory is changed in turn; the others are pictures, estimates and copies."""
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    record = applied(begun, tmp_path / "r2.csv")
+    record = applied(taken, tmp_path / "r2.csv")
     told = set()
-    for path in sorted(begun.iterdir()):
+    for path in sorted(taken.iterdir()):
         kept = path.read_bytes()
         DECIDING.get(path.name, appended)(path)
         code, _, err = run("status", "c")
@@ -143,9 +138,9 @@ def test_every_file_that_decides_is_known_by_its_digest(run, begun, tmp_path):
             assert "campaign-changed" in err
             assert f"c/{path.name}" in err
             assert "put it back" in err
-            changed = (begun / "result.json").read_bytes()
+            changed = (taken / "result.json").read_bytes()
             assert run("next", "c", record, "--no-figures")[0] == 2
-            assert (begun / "result.json").read_bytes() == changed
+            assert (taken / "result.json").read_bytes() == changed
         path.write_bytes(kept)
     assert told == set(DECIDING)
     assert run("next", "c", record, "--no-figures")[0] == 0
@@ -158,17 +153,16 @@ def test_what_is_told_of_a_changed_signal_mends_it(run, begun, tmp_path):
     assert run("status", "c")[0] == 0
 
 
-def test_where_the_result_is_gone_the_records_are_not_given_up(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    record, kept = applied(begun, tmp_path / "r2.csv"), (begun / "result.json").read_bytes()
-    (begun / "result.json").unlink()
+def test_where_the_result_is_gone_the_records_are_not_given_up(run, taken, tmp_path):
+    record, kept = applied(taken, tmp_path / "r2.csv"), (taken / "result.json").read_bytes()
+    (taken / "result.json").unlink()
     for command in (("next", "c", record), ("next", "c"), ("status", "c")):
         code, _, err = run(*command)
         assert (code, "run-missing" in err) == (2, True)
         assert "put it back from a copy" in err
         assert "idesign identify" in err
         assert "solve SPEC" not in err
-    (begun / "result.json").write_bytes(kept)
+    (taken / "result.json").write_bytes(kept)
     assert run("next", "c", record, "--no-figures")[0] == 0
     told = run("next", "nowhere", record)[2]
     assert "run-missing" in told
