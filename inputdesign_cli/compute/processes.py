@@ -47,7 +47,7 @@ class Processes:
             self._standing.submit(os.getpid)
 
     def end(self) -> None:
-        """End those that stand."""
+        """End the processes that were started."""
         if self._standing:
             self._standing.close()
             self._standing = None
