@@ -91,9 +91,9 @@ def standing_in(plan: Array, applied: Array, columns: Mapping[str, Array]) -> tu
     for j in range(plan.shape[1]):
         least = max(LIKE, abs(likeness(plan[:, j], applied[:, j])) + _BETTER)
         for name, column in columns.items():
-            found = likeness(plan[:, j], column)
-            if found > least and not _scale(plan[:, j], column)[1]:
-                return j + 1, name, found
+            each = [likeness(due, column) for due in plan.T]
+            if each[j] > least and each[j] == max(each) and not _scale(plan[:, j], column)[1]:
+                return j + 1, name, each[j]
     return None
 
 
