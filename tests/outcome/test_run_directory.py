@@ -119,7 +119,7 @@ class Saboteur:
     def __init__(self, monkeypatch, failing: int, error: BaseException):
         self.count, self.failing, self.error = 0, failing, error
         for owner, name in (
-            (pathlib.Path, "write_text"),
+            (pathlib.Path, "write_bytes"),
             (pathlib.Path, "rename"),
             (pathlib.Path, "replace"),
             (pathlib.Path, "mkdir"),
