@@ -66,25 +66,25 @@ class Cluster:
         """Return the finished ones, one at least; while there are no workers, say so and wait."""
         from distributed import wait
 
-        alone_since = None
+        alone_since: float | None = None
         while True:
             with _reaching(self.address), suppress(TimeoutError), client.as_current():
                 return wait(futures, timeout=_TICK, return_when="FIRST_COMPLETED").done
             with _reaching(self.address):
                 workers = client.nthreads()
+            now = time.monotonic()
             if workers:
                 alone_since = None
-            elif alone_since is None:
-                alone_since = time.monotonic()
+                continue
+            if alone_since is None:
+                alone_since = now
                 self.tell(f"no workers at {self.address}; waiting")
-            if alone_since is not None and self.worker_timeout is not None:
-                alone = time.monotonic() - alone_since
-                if alone > self.worker_timeout:
-                    message = f"the cluster at {self.address} has had no workers for {alone:.0f} seconds"
-                    hint = (
-                        "start workers (`dask worker ADDRESS --nthreads 1`), then give the same command again"
-                    )
-                    raise DataError.because("cluster-no-workers", message, hint)
+            if self.worker_timeout is not None and now - alone_since > self.worker_timeout:
+                raise DataError.because(
+                    "cluster-no-workers",
+                    f"the cluster at {self.address} has had no workers for {now - alone_since:.0f} seconds",
+                    "start workers (`dask worker ADDRESS --nthreads 1`), then give the same command again",
+                )
 
     @contextmanager
     def _client(self) -> Iterator[Any]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -56,10 +55,10 @@ class _Pool:
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         source = iter(jobs)
-        pending: dict[Future[tuple[Answer | None, Exception | None]], Job] = {}
+        pending: dict[Future[Answer], Job] = {}
         while True:
             for job in islice(source, self._count - len(pending)):
-                pending[self.submit(_answered, function, job)] = job
+                pending[self.submit(function, job)] = job
             if not pending:
                 return
             done, _ = wait(pending, return_when=FIRST_COMPLETED)
@@ -68,10 +67,8 @@ class _Pool:
                 self.close()
                 self._begin()
             for future, job in [(future, pending.pop(future)) for future in done]:
-                if isinstance(future.exception(), BrokenProcessPool):
-                    yield _alone(function, job)
-                else:
-                    yield Finished(job, *future.result())
+                broken = isinstance(future.exception(), BrokenProcessPool)
+                yield _alone(function, job) if broken else _finished(job, future)
 
     def close(self) -> None:
         """End the processes, whatever they compute."""
@@ -83,8 +80,22 @@ def _alone(function: Callable[[Job], Answer], job: Job) -> Finished[Job, Answer]
     """Compute a job in a process of its own: its process was killed, or that of another job."""
     for _ in range(_ATTEMPTS):
         with closing(_Pool(1)) as pool, suppress(BrokenProcessPool):
-            return Finished(job, *pool.submit(_answered, function, job).result())
+            return _finished(job, pool.submit(function, job))
     return Finished(job, None, WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"))
+
+
+def _finished(job: Job, future: Future[Answer]) -> Finished[Job, Answer]:
+    """Return what a job has answered.
+
+    Raises:
+        BrokenProcessPool: its process was killed.
+    """
+    try:
+        return Finished(job, future.result())
+    except BrokenProcessPool:
+        raise
+    except Exception as error:
+        return Finished(job, None, error)
 
 
 @contextmanager
@@ -112,15 +123,3 @@ def _end_with_the_caller(there: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _answered(function: Callable[[Job], Answer], job: Job) -> tuple[Answer | None, Exception | None]:
-    """Return the answer, or the error, in words if it cannot be pickled."""
-    try:
-        return function(job), None
-    except Exception as error:
-        try:
-            pickle.loads(pickle.dumps(error))
-        except Exception:
-            return None, RuntimeError(f"{type(error).__name__}: {error}")
-        return None, error

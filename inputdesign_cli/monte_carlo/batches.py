@@ -16,36 +16,32 @@ from inputdesign_cli.compute.executor import Executor, InProcess, WorkerLostErro
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
 
-Job = TypeVar("Job")
 Answer = TypeVar("Answer")
 Seed = int | np.random.SeedSequence
 
 
 @dataclass(frozen=True)
-class _Batch(Generic[Job, Answer]):
-    """What a worker needs to know of a batch: the same function and job for all, a stream of its own."""
+class _Batch(Generic[Answer]):
+    """What a worker needs to know of a batch: the same function for all, a stream of its own."""
 
     index: int
-    function: Callable[[Job, int, np.random.Generator], Answer]
-    job: Job
+    function: Callable[[int, np.random.Generator], Answer]
     runs: int
     seed: np.random.SeedSequence
 
 
 def run_batches(
-    function: Callable[[Job, int, np.random.Generator], Answer],
-    job: Job,
+    function: Callable[[int, np.random.Generator], Answer],
     *,
     runs: int,
     size: int,
     seed: Seed,
     executor: Executor | None = None,
 ) -> list[Answer]:
-    """The answers of `function(job, count, rng)` for batches of `size` runs (the last one shorter), in order.
+    """The answers of `function(count, rng)` for batches of `size` runs (the last one shorter), in order.
 
     Args:
-        function: importable by name; it draws all that is random from `rng`, and does not change `job`.
-        job: what all batches share; it can be pickled.
+        function: draws all that is random from `rng`; it can be pickled, with what all batches share.
         runs: how many in all; `size` of them are one batch.
         seed: of the streams of all batches.
         executor: where the batches are computed (default: in this process).
@@ -55,7 +51,7 @@ def run_batches(
     """
     answers: dict[int, Answer] = {}
     told = 0
-    batches = _batches(function, job, runs=runs, size=size, seed=seed)
+    batches = _batches(function, runs=runs, size=size, seed=seed)
     for done in (executor or InProcess()).run(_compute, batches):
         if isinstance(done.error, WorkerLostError):
             message = f"a batch of {done.job.runs} simulated runs has no result: {done.error}"
@@ -71,13 +67,13 @@ def run_batches(
 
 
 def _batches(
-    function: Callable[[Job, int, np.random.Generator], Answer], job: Job, *, runs: int, size: int, seed: Seed
-) -> Iterator[_Batch[Job, Answer]]:
+    function: Callable[[int, np.random.Generator], Answer], *, runs: int, size: int, seed: Seed
+) -> Iterator[_Batch[Answer]]:
     root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
     for index, start in enumerate(range(0, runs, size)):
         stream = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index))
-        yield _Batch(index, function, job, min(size, runs - start), stream)
+        yield _Batch(index, function, min(size, runs - start), stream)
 
 
-def _compute(batch: _Batch[Job, Answer]) -> Answer:
-    return batch.function(batch.job, batch.runs, np.random.default_rng(batch.seed))
+def _compute(batch: _Batch[Answer]) -> Answer:
+    return batch.function(batch.runs, np.random.default_rng(batch.seed))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,16 +56,6 @@ class LossStudy:
     power: Array
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """What all batches share; `roots` belong to the spectrum of each input, see `dense_roots`."""
-
-    problem: LoopErrorProblem
-    desired: DesiredLoop
-    roots: dict[str, ComplexArray]
-    samples: int
-
-
 def study_losses(
     problem: LoopErrorProblem,
     inputs: Mapping[str, Lines],
@@ -87,23 +78,27 @@ def study_losses(
     if problem.law.desired is None:
         raise ValueError("only laws that state the loop are simulated")
     roots = {name: dense_roots(lines, samples) for name, lines in inputs.items()}
-    trial = _Trial(problem, problem.law.desired, roots, samples)
+    tried = partial(_losses, problem, problem.law.desired, roots, samples)
     size = max(1, _BATCH_SAMPLES // samples)
-    parts = run_batches(_losses, trial, runs=runs, size=size, seed=seed, executor=executor)
+    parts = run_batches(tried, runs=runs, size=size, seed=seed, executor=executor)
     return {name: _joined([part[name] for part in parts]) for name in inputs}
 
 
 def _losses(
-    trial: _Trial, runs: int, rng: np.random.Generator
+    problem: LoopErrorProblem,
+    desired: DesiredLoop,
+    roots: Mapping[str, ComplexArray],
+    samples: int,
+    runs: int,
+    rng: np.random.Generator,
 ) -> dict[str, tuple[Array, Array, Array, Array]]:
     """For each input loss (runs,), exact loss (runs,), estimates (runs, k), mean squares (runs, inputs)."""
-    problem, desired, samples = trial.problem, trial.desired, trial.samples
     plant = problem.plant
     entering = _entering(problem, desired, runs, samples, rng)
     drive = noise_drive(plant.inputs, samples, runs, rng)
     noise = _noise(plant, runs, samples, rng)
     found = {}
-    for name, root in trial.roots.items():
+    for name, root in roots.items():
         u = shaped_noise(root, drive, samples)
         theta = least_squares(plant, u, plant.simulate(u, np.zeros((1, 1, plant.outputs)), 1.0)[0] + noise)
         filters = error_filters(plant, desired, *estimated_polynomials(plant, theta))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -27,15 +28,6 @@ class Estimates:
     error: Array
 
 
-@dataclass(frozen=True)
-class _Record:
-    """y = quiet + sigma e (N,), and the matrix (m, N) that takes it to the least-squares estimate."""
-
-    quiet: Array
-    sigma: float
-    smoother: Array
-
-
 def run_experiments(
     regression: Regression,
     Phi: Array,
@@ -47,11 +39,10 @@ def run_experiments(
 ) -> Estimates:
     """Least-squares estimates of theta_1 from `runs` records of the regressors Phi (N, n)."""
     samples, m = Phi.shape[0], regression.m
-    record = _Record(
-        Phi @ theta, float(np.sqrt(regression.variance)), np.asarray(np.linalg.pinv(Phi[:, :m]), float)
-    )
+    smoother = np.asarray(np.linalg.pinv(Phi[:, :m]), dtype=float)
+    estimated = partial(_estimates, Phi @ theta, float(np.sqrt(regression.variance)), smoother)
     size = max(1, _BATCH_SAMPLES // samples)
-    parts = run_batches(_estimates, record, runs=runs, size=size, seed=seed, executor=executor)
+    parts = run_batches(estimated, runs=runs, size=size, seed=seed, executor=executor)
     estimates = np.concatenate(parts)
     truth = regression.estimated @ theta[:m] + regression.neglected @ theta[m:]
     return Estimates(estimates, estimates @ regression.estimated - truth)
@@ -71,6 +62,9 @@ def contending_regressors(
     return np.asarray(Phi * np.sqrt(energy / np.sum(Phi**2)))
 
 
-def _estimates(record: _Record, runs: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    y = record.quiet + record.sigma * rng.standard_normal((runs, record.quiet.size))
-    return np.asarray(y @ record.smoother.T)
+def _estimates(
+    quiet: Array, sigma: float, smoother: Array, runs: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return estimates (runs, m) from y = quiet + sigma e (N,) by their matrix, `smoother` (m, N)."""
+    y = quiet + sigma * rng.standard_normal((runs, quiet.size))
+    return np.asarray(y @ smoother.T)

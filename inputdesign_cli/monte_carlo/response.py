@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +26,6 @@ class ResponseStudy:
     runs: int
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """What all batches share: the system, its input, what the input alone causes, and the lines."""
-
-    model: Model
-    u: Array
-    answer: Array
-    periods: Periods
-    harmonics: NDArray[np.int_]
-
-
 def study_response(
     model: Model,
     u: Array,
@@ -52,23 +41,22 @@ def study_response(
     Args:
         executor: where batches of the runs are computed (default: in this process).
     """
-    silent = np.zeros((1, 1, model.outputs))
-    trial = _Trial(model, u, model.simulate(u[None], silent, 1.0)[0][0], periods, harmonics)
+    answer = model.simulate(u[None], np.zeros((1, 1, model.outputs)), 1.0)[0][0]
     size = max(1, _BATCH_SAMPLES // len(u))
-    parts: Sequence[tuple[ComplexArray, NDArray[np.float64]]] = run_batches(
-        _sums, trial, runs=runs, size=size, seed=seed, executor=executor
-    )
-    U, Y = (periods.means(signal, harmonics) for signal in (u, trial.answer))
+    summed = partial(_sums, model, u, periods, harmonics)
+    parts = run_batches(summed, runs=runs, size=size, seed=seed, executor=executor)
+    U, Y = (periods.means(signal, harmonics) for signal in (u, answer))
     quiet, total = response_at(U, Y), sum(part[0] for part in parts)
     squares = sum(part[1] for part in parts) - np.abs(total) ** 2 / runs
     return ResponseStudy(quiet + total / runs, np.sqrt(squares / max(runs - 1, 1)), runs)
 
 
-def _sums(trial: _Trial, runs: int, rng: np.random.Generator) -> tuple[ComplexArray, NDArray[np.float64]]:
+def _sums(
+    model: Model, u: Array, periods: Periods, harmonics: NDArray[np.int_], runs: int, rng: np.random.Generator
+) -> tuple[ComplexArray, NDArray[np.float64]]:
     """Return sums (L, p, r) over the runs of the errors by noise, and of their squared moduli."""
-    model, samples = trial.model, len(trial.u)
-    e = rng.standard_normal((runs, samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    e = rng.standard_normal((runs, len(u), model.outputs)) @ np.linalg.cholesky(model.covariance).T
     noise = model.simulate(np.zeros((1, 1, model.inputs)), e, 1.0)[1]
-    U, V = (trial.periods.means(signal, trial.harmonics) for signal in (trial.u, noise))
+    U, V = (periods.means(signal, harmonics) for signal in (u, noise))
     errors = response_at(U, V)
     return np.sum(errors, axis=0), np.sum(np.abs(errors) ** 2, axis=0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,49 +71,40 @@ def tried_on_model(study: Study, excitation: Excitation, executor: Executor | No
 
 def _tried(study: Study, experiment: Experiment, excitation: Excitation, executor: Executor | None) -> Tried:
     model = study.nominal.model
-    job = _Job(experiment, model, excitation, study.step)
+    run = partial(_run, experiment, model, excitation, study.step)
     # The same seed for every excitation: they meet the same noise.
     size = max(1, _OUTPUTS_AT_ONCE // model.outputs)
-    parts = run_batches(_run, job, runs=study.runs, size=size, seed=study.seed, executor=executor)
+    parts = run_batches(run, runs=study.runs, size=size, seed=study.seed, executor=executor)
     same = experiment.model.names == model.names
     return Tried(excitation.name, Trials.joined(parts), excitation.information(experiment) if same else None)
 
 
-@dataclass(frozen=True)
-class _Job:
-    """What all batches of one study share.
-
-    Attributes:
-        true: the true system and the length of its experiment.
-        model: of which the structure is estimated; the search begins at its parameters.
-        step: time between samples in the unit of the experiment's frequencies.
-    """
-
-    true: Experiment
-    model: Model
-    excitation: Excitation
-    step: float
-
-
-def _run(job: _Job, runs: int, rng: np.random.Generator) -> Trials:
+def _run(
+    true: Experiment, model: Model, excitation: Excitation, step: float, runs: int, rng: np.random.Generator
+) -> Trials:
     """Simulate a batch of experiments from rest on the true system and identify each of them.
 
     The noise is drawn first, so that every excitation meets the same. Runs where the search does not
     settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
     with an error of its own in each run.
+
+    Args:
+        model: of which the structure is estimated; the search begins at its parameters.
     """
-    true, system = job.true, job.true.model
+    system = true.model
     e = _noise(true, runs, rng)
-    r = job.excitation.draw(runs, true.samples, rng)
-    (u_r, u), (y_r, y) = _responses(true, r, e, job.step)
-    found = _again_where_lost(job, u, y, fit_batch(job.model, u, y, job.step, start=job.model.theta))
+    r = excitation.draw(runs, true.samples, rng)
+    (u_r, u), (y_r, y) = _responses(true, r, e, step)
+    found = fit_batch(model, u, y, step, start=model.theta)
+    again = partial(identify, model, step=step, start=model.theta, feedback=true.loop is not None, rest=True)
+    found = _again_where_lost(again, u, y, found)
     theta = found.theta
-    if true.prior is not None and system.names == job.model.names:
+    if true.prior is not None and system.names == model.names:
         theta = _with_prior(found, true.prior, system.theta, rng)
     caused: dict[PowerKind, Array] = {"input": u_r, "output": y_r, "excitation": r}
     power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
     total: dict[PowerKind, list[float]] = {"input": _mean_squares(u), "output": _mean_squares(y)}
-    return Trials(true, job.model, theta, found.converged, power, total, first=np.array(r[0]))
+    return Trials(true, model, theta, found.converged, power, total, first=np.array(r[0]))
 
 
 def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> Array:
@@ -130,18 +123,17 @@ def _responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple
     return (u_r, u_r + u_e), (y_r, y_r + y_e)
 
 
-def _again_where_lost(job: _Job, u: Array, y: Array, found: BatchEstimate) -> BatchEstimate:
+def _again_where_lost(
+    again: Callable[[Array, Array], Estimate], u: Array, y: Array, found: BatchEstimate
+) -> BatchEstimate:
     """The same, each run whose search did not settle estimated anew from several starts."""
     theta, noise, information = found.theta.copy(), found.noise.copy(), found.information.copy()
     converged, steps = found.converged.copy(), found.steps.copy()
-    feedback = job.true.loop is not None
     lost = np.flatnonzero(~converged).tolist()
     for done, run in enumerate(lost):
         tell(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))
         try:
-            other = identify(
-                job.model, u[run], y[run], job.step, start=job.model.theta, feedback=feedback, rest=True
-            )
+            other = again(u[run], y[run])
         except SpecError:  # the noise of this run leaves some parameter without an estimate
             continue
         theta[run], noise[run], information[run] = other.theta, other.noise, other.information

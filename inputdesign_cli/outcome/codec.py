@@ -136,12 +136,11 @@ def _read_tuple(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
         data = data.tolist()
     if not isinstance(data, _SEQUENCES):
         raise OutcomeError(f"{_named(where)} is no list")
-    if len(arguments) == 2 and arguments[1] is Ellipsis:
-        return tuple(_read(arguments[0], item, f"{where}[{i}]") for i, item in enumerate(data))
-    if len(arguments) != len(data):
-        raise OutcomeError(f"{_named(where)} has {len(data)} entries, not {len(arguments)}")
+    kinds = arguments[:1] * len(data) if arguments[1:] == (Ellipsis,) else arguments
+    if len(kinds) != len(data):
+        raise OutcomeError(f"{_named(where)} has {len(data)} entries, not {len(kinds)}")
     return tuple(
-        _read(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(arguments, data, strict=True))
+        _read(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, data, strict=True))
     )
 
 
@@ -181,18 +180,15 @@ def _one_of(values: tuple[Any, ...], data: Any, where: str) -> Any:
     return data
 
 
-def _float(data: float, where: str) -> float:
-    try:
-        return float(data)
-    except OverflowError as error:
-        raise OutcomeError(f"{_named(where)} is too large for a number in double precision") from error
-
-
 def _scalar(kind: Any, data: Any, where: str) -> Any:
     if isinstance(data, np.generic | np.ndarray) and np.ndim(data) == 0:
         data = data.item()
     if kind is float and isinstance(data, int | float) and not isinstance(data, bool):
-        return _float(data, where)
+        try:
+            return float(data)
+        except OverflowError as error:
+            message = f"{_named(where)} is too large for a number in double precision"
+            raise OutcomeError(message) from error
     if issubclass(kind, Enum):
         return _one_of(tuple(kind), kind(data) if data in tuple(kind) else data, where)
     if not isinstance(data, kind) or (kind is int and isinstance(data, bool)):

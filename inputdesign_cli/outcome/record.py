@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 import math
 import os
+import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.version import __version__
 
 RESULT, SPEC, SIGNAL, PAGE = "result.json", "spec.yaml", "signal.csv", "report.html"
 FIGURES = "figures.json"
@@ -20,6 +24,7 @@ STANDARD_FILES = (
     SPEC,
     *(f"{stem}.{kind}" for stem in ("spectrum", "signal", "bound") for kind in ("csv", "png")),
 )
+_LIBRARIES = ("numpy", "scipy", "cvxpy", "clarabel")
 _LONGEST_NAME = 255  # bytes, of a file system
 # How each page that `idesign report` writes begins: one of the user's own is not removed.
 PAGE_MARK = b'<meta name="generator" content="idesign '
@@ -113,3 +118,25 @@ def is_plain(name: object) -> bool:
         return len(os.fsencode(name)) <= _LONGEST_NAME
     except UnicodeEncodeError:
         return False
+
+
+def environment() -> dict[str, str | None]:
+    """Versions of Python, of this package and of the numerical libraries, and the platform.
+
+    The libraries are looked up in the installation's metadata, not imported; one that is not
+    installed is None.
+    """
+    return {
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "idesign": __version__,
+        **{name: _version(name) for name in _LIBRARIES},
+    }
+
+
+@cache
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None

@@ -19,8 +19,16 @@ from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
 from inputdesign_cli.outcome.curves_file import curves_json
 from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, not_a_run
-from inputdesign_cli.outcome.provenance import environment
-from inputdesign_cli.outcome.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files, unreadable
+from inputdesign_cli.outcome.record import (
+    FIGURES,
+    RESULT,
+    SIGNAL,
+    SPEC,
+    environment,
+    load_result,
+    owned_files,
+    unreadable,
+)
 from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain
@@ -94,8 +102,7 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         OutputError: `output-not-writable`, `output-full`.
     """
-    with output_errors(path):
-        _write(path, text)
+    write_bytes(path, _encoded(text))
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -168,27 +175,23 @@ def _write_files(
     results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
 ) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
-    texts = {SPEC: results.resolved_spec}
-    texts |= {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
-    for name, text in texts.items():
-        _write(folder / name, text)
-    contents = {**results.files, **figures}
+    tables = {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
+    texts = {name: _encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
+    contents = {**texts, **results.files, **figures}
     if results.curves:
         contents[FIGURES] = curves_json(results.curves)
+    told = {"signal_sha256": digest(tables[SIGNAL])} if SIGNAL in tables else {}
+    contents[RESULT] = _encoded(json_text({**result, **told, "files": list(contents)}))
     for name, content in contents.items():
         (folder / name).write_bytes(content)
-    names = [*texts, *contents]
-    told = {"signal_sha256": digest(texts[SIGNAL])} if SIGNAL in texts else {}
-    _write(folder / RESULT, json_text({**result, **told, "files": names}))
-    names.append(RESULT)
-    for name in names:
+    for name in contents:
         sync(folder / name)
     sync(folder)
-    return names
+    return list(contents)
 
 
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+def _encoded(text: str) -> bytes:
+    return text.encode(errors="backslashreplace")
 
 
 def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, *, shown: Path) -> None:

@@ -101,8 +101,7 @@ def run_sweep(
 
     Args:
         spec: the file, or with `text` where it would lie.
-        settings: `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points; or a mapping of keys to
-            values in place of the `sweep` block.
+        settings: see `parse_settings`.
         confine: the folder outside of which the spec may name no files.
         text: of the spec, where it is in no file.
         executor: where the points are computed (default: in this process).

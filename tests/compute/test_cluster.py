@@ -178,7 +178,11 @@ SPECS = Path(__file__).parents[2] / "specs"
     ("name", "overrides"),
     [
         ("regression", ["simulation.runs=500", "simulation.compare=[binary]"]),
-        ("distillation_column", ["experiment.samples=1000", "simulation.runs=450", "signal.candidates=1"]),
+        pytest.param(
+            "distillation_column",
+            ["experiment.samples=1000", "simulation.runs=450", "signal.candidates=1"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_simulated_runs_are_the_same_wherever_they_are_computed(loopback, name, overrides):

@@ -49,6 +49,21 @@ def test_adjugate_and_determinant(n):
             np.testing.assert_allclose(product[:, i, j], expected, atol=1e-10)
 
 
+def filtered(plant, desired, theta):
+    """Return the filters (runs, len(W), n, n) behind r - v, and their denominators."""
+    numerator, denominator = error_filters(plant, desired, *estimated_polynomials(plant, theta))
+    q = np.exp(-1j * W)
+    above = np.einsum("kl,rijl->rkij", q[:, None] ** np.arange(numerator.shape[-1]), numerator)
+    below = denominator @ (q ** np.arange(denominator.shape[-1])[:, None])
+    return above / below[:, :, None, None] @ prefilter(desired).at(W), denominator
+
+
+def difference(plant, law, controller):
+    """Return the loop with a controller (len(W), n, n) less the loop that the law asks for."""
+    L = plant.plant_at(W) @ controller
+    return np.linalg.solve(np.eye(plant.outputs) + L, L) - law.complementary(W)
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("matrix", [False, True])
 @pytest.mark.parametrize("common", [False, True])
@@ -58,29 +73,10 @@ def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
     T = target(n, matrix=matrix)
     law, theta = ModelReference(T), bare.theta
     theta = theta + 0.01 * rng.standard_normal((2, theta.size)) * np.abs(theta)
-    A, B = estimated_polynomials(bare, theta)
-    numerator, denominator = error_filters(bare, DesiredLoop(T), A, B)
+    found, denominator = filtered(bare, DesiredLoop(T), theta)
     for run in range(2):
-        q = np.exp(-1j * W)
-        G_hat = np.array(
-            [
-                [
-                    [
-                        np.polynomial.polynomial.polyval(x, B[run, i, j])
-                        / np.polynomial.polynomial.polyval(x, A[run, i])
-                        for j in range(n)
-                    ]
-                    for i in range(n)
-                ]
-                for x in q
-            ]
-        )
-        L = bare.plant_at(W) @ law.controller(G_hat, W)
-        expected = np.linalg.solve(np.eye(n) + L, L) - law.complementary(W)
-        powers = q[:, None] ** np.arange(denominator.shape[-1])
-        above = np.einsum("kl,ijl->kij", q[:, None] ** np.arange(numerator.shape[-1]), numerator[run])
-        got = above / (powers @ denominator[run])[:, None, None] @ prefilter(DesiredLoop(T)).at(W)
-        np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
+        expected = difference(bare, law, law.controller(bare.at(theta[run]).plant_at(W), W))
+        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
         assert abs(denominator[run, 0]) > 0
 
 
@@ -105,20 +101,14 @@ def test_each_estimate_keeps_its_own_zeros_in_the_loop(name):
     """The filters against the loop of the controller that the law designs on each estimate."""
     problem = internal_model(name)
     plant, desired = problem.plant, problem.law.desired
-    n, q = plant.outputs, np.exp(-1j * W)
     rng = np.random.default_rng(5)
     theta = plant.theta * (1 + 0.05 * rng.standard_normal((4, plant.theta.size)))
-    numerator, denominator = error_filters(plant, desired, *estimated_polynomials(plant, theta))
-    first = prefilter(desired).at(W)
+    found, denominator = filtered(plant, desired, theta)
     for run in range(4):
         model = plant.at(theta[run])
         law = InternalModel.build(model, Rational.build([0.4], [1, -0.6]))
-        L = plant.plant_at(W) @ law.controller(model.plant_at(W), W)
-        expected = np.linalg.solve(np.eye(n) + L, L) - problem.law.complementary(W)
-        above = np.einsum("kl,ijl->kij", q[:, None] ** np.arange(numerator.shape[-1]), numerator[run])
-        below = q[:, None] ** np.arange(denominator.shape[-1]) @ denominator[run]
-        got = above / below[:, None, None] @ first
-        np.testing.assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
+        expected = difference(plant, problem.law, law.controller(model.plant_at(W), W))
+        np.testing.assert_allclose(found[run], expected, atol=1e-9 * np.abs(expected).max())
         # No factor outside the circle is left: a loop with such a model is stable.
         assert np.abs(np.roots(denominator[run])).max() < 1
 

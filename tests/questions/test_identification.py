@@ -1,13 +1,9 @@
-import json
-
 import numpy as np
 import pytest
 import scipy.signal
 import yaml
-from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
-from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
 
 SPEC = "specs/first_order.yaml"
@@ -106,22 +102,6 @@ def test_a_top_up_makes_up_for_what_is_missing(write):
     assert result["cost"] < scratch.result["cost"]
 
 
-def test_the_command_exits_with_one_when_the_target_is_missed(data, tmp_path):
-    run = CliRunner().invoke(
-        app, ["assess", SPEC, str(data), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
-    )
-    assert run.exit_code == 1
-    result = json.loads(run.stdout)
-    assert result["status"] == "missed"
-    assert "signal.csv" in result["files"]
-    assert "model.yaml" in result["files"]
-    run = CliRunner().invoke(
-        app, ["identify", str(data), "--spec", SPEC, "-o", str(tmp_path / "id"), "--no-figures"]
-    )
-    assert run.exit_code == 0
-    assert "estimate" in run.stdout
-
-
 def test_offsets_and_outliers_are_told(write):
     columns = record(np.random.default_rng(3).standard_normal(500))
     columns["y1"] = columns["y1"] + 100.0
@@ -189,29 +169,11 @@ def test_an_unknown_channel_is_refused(data):
     assert caught.value.diagnostics[0].code == "unknown-channel"
 
 
-@pytest.mark.parametrize("names", [("u", "y"), ("U_volt", "y1_bar"), ("u1_V", "y")])
-def test_columns_may_carry_units(names, write):
-    columns = record(np.random.default_rng(3).standard_normal(300))
-    plain = identify(load_spec(SPEC), write(columns)).result["identification"]
-    renamed = {"time_s": columns["time_s"], names[0]: columns["u1"], names[1]: columns["y1"]}
-    found = identify(load_spec(SPEC), write(renamed)).result["identification"]
-    assert found["theta"] == plain["theta"]
-
-
-def _without(name):
-    return lambda c: {k: v for k, v in c.items() if k != name}
-
-
 @pytest.mark.parametrize(
     ("change", "code"),
     [
-        (_without("y1"), "data-missing-column"),
         (lambda c: {k: v[:5] for k, v in c.items()}, "too-few-samples"),
         (lambda c: {**c, "u1": np.ones(500)}, "constant-input"),
-        (lambda c: {**c, "time_s": 0.1 * c["time_s"]}, "data-not-uniform"),
-        (lambda c: {**c, "time_s": c["time_s"] - 2 * (c["time_s"] > 99)}, "data-not-uniform"),
-        (lambda c: {**c, "time_s": c["time_s"] + 0.3 * np.sin(c["time_s"])}, "data-not-uniform"),
-        (lambda c: {"time_ms": c["time_s"], "u1": c["u1"], "y1": c["y1"]}, "data-wrong-unit"),
         (lambda c: {**c, "y1": scipy.signal.lfilter([0, 3.6], [1, -0.7], c["u1"])}, "noise-free-data"),
     ],
 )
@@ -234,16 +196,6 @@ def test_an_output_that_the_start_alone_explains_has_no_noise(samples, first, pl
     with pytest.raises(DataError) as caught:
         identify(spec, write({"u1": pulse, "y1": y}))
     assert caught.value.diagnostics[0].code == "noise-free-data"
-
-
-def test_text_is_refused_with_its_line(data):
-    lines = data.read_text().splitlines()
-    lines[7] = "6,fast,1"
-    data.write_text("\n".join(lines))
-    with pytest.raises(DataError) as caught:
-        identify(load_spec(SPEC), data)
-    assert caught.value.diagnostics[0].code == "data-not-a-number"
-    assert caught.value.diagnostics[0].location.line == 8
 
 
 def test_there_must_be_a_target(data):

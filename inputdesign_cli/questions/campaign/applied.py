@@ -91,9 +91,9 @@ def standing_in(plan: Array, applied: Array, columns: Mapping[str, Array]) -> tu
     for j in range(plan.shape[1]):
         least = max(LIKE, abs(likeness(plan[:, j], applied[:, j])) + _BETTER)
         for name, column in columns.items():
-            found = likeness(plan[:, j], column)
-            if found > least and not _scale(plan[:, j], column)[1]:
-                return j + 1, name, found
+            each = [likeness(due, column) for due in plan.T]
+            if each[j] > least and each[j] == max(each) and not _scale(plan[:, j], column)[1]:
+                return j + 1, name, each[j]
     return None
 
 
@@ -173,7 +173,7 @@ def _scale(plan: Array, applied: Array) -> tuple[float, bool]:
         return scale, False
     low, high = float(np.min(applied)), float(np.max(applied))
     inner = np.abs(applied - 0.5 * (low + high)) < _CLIPPED * 0.5 * (high - low)
-    return scale, np.sum(inner) <= 2 or _fitted(plan[inner], applied[inner])[1]
+    return scale, int(np.sum(inner)) <= 2 or _fitted(plan[inner], applied[inner])[1]
 
 
 def _fitted(plan: Array, applied: Array) -> tuple[float, bool]:
@@ -184,4 +184,5 @@ def _fitted(plan: Array, applied: Array) -> tuple[float, bool]:
         return 1.0, False
     scale = float(plan @ applied) / size
     rest = float(np.sum((applied - scale * plan) ** 2)) / size
-    return scale, abs(scale - 1.0) > max(_OFF, _SURE * np.sqrt(rest / max(len(plan) - 2, 1)), np.sqrt(rest))
+    least = max(_OFF, _SURE * np.sqrt(rest / max(len(plan) - 2, 1)), np.sqrt(rest))
+    return scale, bool(abs(scale - 1.0) > least)

@@ -218,23 +218,9 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
         outcome, tables, curves = assessed.outcome, dict(assessed.tables), dict(assessed.curves)
         files[f"model_{number:02d}.yaml"] = assessed.files["model.yaml"]
     said = said.saying(decision.findings)
-    entry = Round(
-        samples=campaign.done,
-        energy=sum((record.energy for record in campaign.records), start=0.0),
-        records=tuple(n for n, record in enumerate(campaign.records, 1) if not record.withdrawn),
-        state=decision.state,
-    )
-    if (stands := decision.standing) is not None:
-        names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
-        entry = replace(
-            entry,
-            estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
-            standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
-            worst_ratio=stands.ratio,
-            share=stands.share,
-        )
-        if stands.share == 1.0:
-            campaign = replace(campaign, last=entry.estimate)
+    entry = _entry(decision, campaign)
+    if entry.share == 1.0:
+        campaign = replace(campaign, last=entry.estimate)
     plan = decision.plan
     if plan is not None and decision.part is not None:
         file = f"plan_{number + 1:02d}.csv"
@@ -270,6 +256,27 @@ def _decided(decision: Decision, campaign: Campaign, files: dict[str, bytes], sa
     )
     time_unit, curves = header.units.time_unit, curves | progress
     return Results(outcome, header.resolved_spec, time_unit, tables, curves, files)
+
+
+def _entry(decision: Decision, campaign: Campaign) -> Round:
+    """Return the round of a decision without its plan."""
+    entry = Round(
+        samples=campaign.done,
+        energy=sum((record.energy for record in campaign.records), start=0.0),
+        records=tuple(n for n, record in enumerate(campaign.records, 1) if not record.withdrawn),
+        state=decision.state,
+    )
+    stands = decision.standing
+    if stands is None:
+        return entry
+    names, deviation = stands.model.names, np.sqrt(np.diag(np.linalg.inv(stands.information)))
+    return replace(
+        entry,
+        estimate=dict(zip(names, stands.model.theta.tolist(), strict=True)),
+        standard_deviation=dict(zip(names, deviation.tolist(), strict=True)),
+        worst_ratio=stands.ratio,
+        share=stands.share,
+    )
 
 
 def _planned(file: str, plan: Planned, decision: Decision) -> PlannedPart:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 
 from inputdesign_cli.compute.executor import Executor
@@ -95,7 +96,7 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
 
 def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
     """Return the runs of one way of experimenting."""
-    job = replace(study, rules=rules)
+    run = partial(run_campaigns, replace(study, rules=rules))
     # One run a batch: all ways meet the same noise in the same run.
-    parts = run_batches(run_campaigns, job, runs=study.runs, size=1, seed=study.seed, executor=executor)
+    parts = run_batches(run, runs=study.runs, size=1, seed=study.seed, executor=executor)
     return [run for part in parts for run in part]

@@ -95,6 +95,9 @@ def test_every_channel_is_looked_at():
     assert stand_in(alike, alike[:, ::-1]) == (1, "u2")
     for other in (alike, alike + 0.05, noise):
         assert stand_in(other, other) is None
+    # The second channel resembles the plan of the first, but its own still more.
+    alike[:, 1] = plan[:, 0] + 0.3 * planned("white", 60, 2)
+    assert stand_in(alike, alike + np.column_stack([planned("white", 60, 9), np.zeros(60)])) is None
 
 
 def stand_in(plan, applied):
