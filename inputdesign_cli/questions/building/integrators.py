@@ -43,13 +43,9 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
         unbounded = _growing(experiment, source.noise_gradient)
         if unbounded:
             first = unbounded.split(", ")[0]
-            of_plant = experiment.model.in_plant[experiment.model.names.index(first)]
             part, other = "noise", "say noise: {drift: true}, and leave that root out of D"
-            if of_plant:
-                part, other = (
-                    "plant",
-                    "in q^-1 let it be a root of A, where the noise passes through it as well",
-                )
+            if experiment.model.in_plant[experiment.model.names.index(first)]:
+                part, other = "plant", "in q^-1 let it be a root of A, through which the noise passes, too"
             hint = f"list it in {part}.known: [{first}], or {other}"
             if any(spec.noise.drifts) and not all(spec.noise.drifts):
                 hint = "let every output drift (noise: {drift: true}): the inputs wander with each drift"

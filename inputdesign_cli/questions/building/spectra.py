@@ -64,8 +64,8 @@ def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
             basis = LinesBasis.at(_line_frequencies(spec, stated, band), inputs)
         case None if not spec.plant.sampled:
             message = "a design in continuous time needs a family of spectra"
-            band = f"[0, {0.5 * np.pi / spec.sample_time:.3g}]"
-            own = f"spectrum: {{type: polynomial, order: 10, band: {band}}}"
+            end = f"{0.5 * np.pi / spec.sample_time:.3g}"
+            own = f"spectrum: {{type: polynomial, order: 10, band: [0, {end}]}}"
             hint = f"add sample: zoh to the plant, or {own}"
             raise spec.complain("missing-key", message, hint=hint, key="spectrum")
         case None:

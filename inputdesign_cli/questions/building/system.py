@@ -82,10 +82,8 @@ def _check(spec: Spec, plant: StateSpacePlant, model: StateSpaceModel) -> None:
     key = "plant.state_space"
     coloured = any(spec.noise.drifts) or any(len(np.ravel(x)) > 1 for x in (spec.noise.C, spec.noise.D))
     if plant.state_space.K is not None and coloured:
-        message, hint = (
-            "K says how the noise is coloured, and noise does so, too",
-            "remove K, or C, D and drift",
-        )
+        message = "K says how the noise is coloured, and noise does so, too"
+        hint = "remove K, or C, D and drift"
         raise spec.complain("conflicting-keys", message, hint=hint, key=f"{key}.K")
     away = np.abs(model.predictor_poles[:, None] - model.poles).min(axis=1, initial=np.inf)
     own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # the poles that K makes
@@ -245,12 +243,12 @@ def _stated_band(spec: Spec) -> tuple[float, float] | None:
             return band
         case MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
             return _around(given)
-        case GivenSpectrum(given=given) if spec.limits.band is None and not spec.plant.sampled:
-            match given:
+        case GivenSpectrum(given=stated) if spec.limits.band is None and not spec.plant.sampled:
+            match stated:
                 case GivenSignal():
                     return 0.0, np.pi / spec.sample_time
                 case GivenMultisine():
-                    return _around(given.frequencies)
+                    return _around(stated.frequencies)
                 case GivenTable(file=name):
                     rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)
                     return _around(rows["frequency"].tolist())

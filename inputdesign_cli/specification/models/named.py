@@ -115,10 +115,8 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
     try:
         expression = Expression.of(value)
     except ExpressionError as error:
-        message, hint = (
-            f"{{key}} {error.message}: {clip(value)}",
-            without_unit(value, None, None) or error.hint,
-        )
+        message = f"{{key}} {error.message}: {clip(value)}"
+        hint = without_unit(value, None, None) or error.hint
         found.append(PathDiagnostic("bad-expression", message, hint, path))
         return 1.0
     unknown = sorted(expression.names - parameters.keys())
