@@ -122,6 +122,7 @@ def test_the_command_exits_with_one_when_the_target_is_missed(data, tmp_path):
     assert "estimate" in run.stdout
 
 
+@pytest.mark.slow
 def test_offsets_and_outliers_are_told(write):
     columns = record(np.random.default_rng(3).standard_normal(500))
     columns["y1"] = columns["y1"] + 100.0
