@@ -77,8 +77,8 @@ def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
     search = estimate.search
     begun = "its only start" if search.starts == 1 else f"the best of {search.starts} starts"
     message = (
-        f"the search did not settle after {search.steps} steps from {begun}: the estimate may be far from the "
-        "minimum; the orders may be too high for these data"
+        f"the search did not settle after {search.steps} steps from {begun}: the estimate may be far from "
+        "the minimum; the orders may be too high for these data"
     )
     found = [NOT_SETTLED.found(message, steps=search.steps, starts=search.starts)]
     return [*([] if search.converged else found), *stopped_at_ends(model, estimate)]

@@ -39,9 +39,9 @@ WILD = {
 
 
 @pytest.mark.parametrize(
-    "cost", ["{input_power: 1}", "{output_power: 1}", "{input_power: 1, output_power: 1}"]
+    ("block", "cost"),
+    [(5, "{input_power: 1}"), (60, "{output_power: 1}"), (5, "{input_power: 1, output_power: 1}")],
 )
-@pytest.mark.parametrize("block", [5, 60])
 @pytest.mark.parametrize("name", WILD)
 def test_no_estimate_makes_a_part_dearer_than_the_cap(name, block, cost):
     """At the plant of the spec: the cap times the first plan, ten times that where outputs are paid for."""

@@ -75,6 +75,7 @@ def test_outputs_have_noise_of_their_own():
     assert "c1[1]" in analyse(white).result["information"]["standard_deviation"]
 
 
+@pytest.mark.slow
 def test_a_study_on_a_system_that_drifts():
     """The relative frequency of errors within r_u is what 95 % of 60 runs leaves open."""
     rest = REST.replace("samples: 100", "samples: 300") + "simulation: {runs: 60, seed: 2}\n"

@@ -51,6 +51,7 @@ def plain_program(design, order, upper, lower, power):
         return program.solve(solver=cp.CLARABEL)
 
 
+@pytest.mark.slow
 def test_the_best_information_between_two_bounds_is_that_of_a_plain_program():
     design = designed(FIR, "spectrum={type: fir, order: 2}")
     found = design.result

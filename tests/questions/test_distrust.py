@@ -53,6 +53,7 @@ def test_the_plant_of_a_loop_whose_reference_hardly_moves_is_not_the_inverse_of_
     assert static_gain(found["identification"]["theta"]) == pytest.approx(1.0, abs=0.6)
 
 
+@pytest.mark.slow
 def test_an_unstable_plant_is_told_with_a_spec_that_identifies_it(tmp_path):
     rng = np.random.default_rng(4)
     r, y, u, x = np.repeat(rng.choice([-1.0, 1.0], 20), 12), np.zeros(240), np.zeros(240), 0.0

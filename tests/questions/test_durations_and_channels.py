@@ -56,7 +56,7 @@ def test_an_excitation_has_the_unit_of_its_input():
     assert units.header("r2") == "r2 (V)"
 
 
-@pytest.mark.parametrize("lengths", [("duration", 0.5), ("samples", 1)], ids=["in seconds", "in samples"])
+@pytest.mark.parametrize("lengths", [("duration", 0.5), pytest.param(("samples", 1), marks=pytest.mark.slow)])
 def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
     """The hint can be copied into the spec, and then suffices."""
     word, unit = lengths

@@ -73,6 +73,7 @@ def test_the_model_is_judged_on_other_data(run, tmp_path):
     assert validation["prediction_fit_percent"] == pytest.approx(fit, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_real_record_without_a_header_whose_times_jitter():
     """Its noise integrates: D comes out on the unit circle, as near as a spec may have it."""
     found = explore(STEP, Preparation(columns={"time": "1", "u1": "2", "y1": "3"}))

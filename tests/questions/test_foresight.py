@@ -64,7 +64,8 @@ def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
 
 
 @pytest.mark.parametrize(
-    ("spectrum", "undecided"), [("{type: multisine, lines: 120}", True), (RICHER, False)]
+    ("spectrum", "undecided"),
+    [("{type: multisine, lines: 120}", True), pytest.param(RICHER, False, marks=pytest.mark.slow)],
 )
 def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undecided, tmp_path):
     _, u = solved(f"spectrum={spectrum}")
@@ -82,7 +83,9 @@ def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undeci
     assert "contradict the model" not in said(found.results)
 
 
-@pytest.mark.parametrize("spectrum", [RICHER, "{type: multisine, lines: 40}"])
+@pytest.mark.parametrize(
+    "spectrum", [pytest.param(RICHER, marks=pytest.mark.slow), "{type: multisine, lines: 40}"]
+)
 def test_where_a_plain_scan_finds_none_none_is_told(spectrum):
     result, u = solved(f"spectrum={spectrum}")
     assert valleys(u) == []
@@ -140,9 +143,12 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("override", OTHERS.values(), ids=OTHERS)
-def test_all_kinds_of_experiments_are_foreseen(override):
-    assert "rivals" in solved(override)[0]["foreseen"]
+@pytest.mark.parametrize(
+    "kind",
+    ["loop", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("duration", "held", "shortest"))],
+)
+def test_all_kinds_of_experiments_are_foreseen(kind):
+    assert "rivals" in solved(OTHERS[kind])[0]["foreseen"]
 
 
 CHANNELS = """
@@ -158,6 +164,7 @@ signal: {type: multisine, samples: 150, seed: 1}
 """
 
 
+@pytest.mark.slow
 def test_names_of_several_channels_can_be_pasted():
     result = solve(parse_spec(CHANNELS)).result
     for note in result.get("notes", []):
@@ -166,6 +173,7 @@ def test_names_of_several_channels_can_be_pasted():
     assert "rivals" in result["foreseen"]
 
 
+@pytest.mark.slow
 def test_a_given_signal_is_looked_at_too(tmp_path):
     _, u = solved()
     np.savetxt(

@@ -16,8 +16,9 @@ def saved(path, rows):
     return path
 
 
-@pytest.mark.parametrize("options", [{}, {"preparation": Preparation(detrend="linear")}])
-@pytest.mark.parametrize("digits", [12, 0])
+@pytest.mark.parametrize(
+    ("digits", "options"), [(12, {}), (0, {"preparation": Preparation(detrend="linear")})]
+)
 def test_a_frozen_sensor_is_named_and_leaves_the_verdict_open(digits, options, tmp_path):
     rows = rows_of(3, 560)
     rows[:, 1] = np.round(rows[:, 1], digits)

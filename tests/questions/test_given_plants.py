@@ -34,7 +34,11 @@ def alone(text, values, *overrides):
 
 
 @pytest.mark.parametrize(
-    ("text", "given"), [*itertools.product([FIRST, LOOP], [WHITE, SINE, "signal"]), (PROCESS, WHITE)]
+    ("text", "given"),
+    [
+        *itertools.product([FIRST, LOOP], [WHITE, SINE, "signal"]),
+        pytest.param(PROCESS, WHITE, marks=pytest.mark.slow),
+    ],
 )
 def test_every_plant_has_the_ratio_that_it_has_alone(text, given, tmp_path):
     if given == "signal":

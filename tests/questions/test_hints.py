@@ -26,7 +26,7 @@ LIMITS = {
 }
 TRIED = [
     ("open", "power of noise", 0.02, 0.05),
-    ("loop", "power of sinusoids", 0.2, 0.5),
+    pytest.param("loop", "power of sinusoids", 0.2, 0.5, marks=pytest.mark.slow),
     ("loop", "binary", 0.2, 0.3),
     ("resonant", "power of noise", 0.4, 0.2),
 ]
@@ -92,6 +92,7 @@ def test_an_error_as_large_as_the_plant_is_remarked_upon(relative, told):
     assert any("wrong sign" in note for note in notes) == told
 
 
+@pytest.mark.slow
 def test_a_record_that_is_too_short_for_its_spectrum_is_told():
     text = """
 sample_time: 1

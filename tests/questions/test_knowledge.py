@@ -33,7 +33,7 @@ def record(seed, folder):
     return path, float(np.sum((y - late) ** 2)) / VARIANCE
 
 
-@pytest.mark.parametrize("known", [INTERVALS, COVARIANCE], ids=["intervals", "covariance"])
+@pytest.mark.parametrize("known", [INTERVALS, pytest.param(COVARIANCE, marks=pytest.mark.slow)])
 def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
     path, excess = record(5, tmp_path)
     assert excess < 2.0 * np.log(1000.0)
@@ -70,6 +70,7 @@ def test_knowledge_that_the_data_refute_rules_nothing_out(tmp_path):
     assert identification["theta"]["L"] == pytest.approx(HEATER[2], abs=10.0)
 
 
+@pytest.mark.slow
 def test_what_is_foreseen_heeds_it_too(tmp_path):
     u = np.tile(0.17 * ONCE, 25)
     path = tmp_path / "u.csv"

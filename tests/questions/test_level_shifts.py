@@ -51,7 +51,8 @@ def shifts_in(notes):
     return [note for note in notes if "stays so, though no input does that" in note]
 
 
-@pytest.mark.parametrize("at", [150, pytest.param(260, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("at", [150, 260])
 def test_explore_leaves_it_out_and_finds_the_plant(at, tmp_path):
     log = saved(tmp_path / "log.csv", rows_of(400, at, 2))
     found = explore([log], Preparation())
@@ -73,6 +74,7 @@ def test_explore_leaves_it_out_and_finds_the_plant(at, tmp_path):
     assert not shifts_in(again["notes"])
 
 
+@pytest.mark.slow
 def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
     log, spec = saved(tmp_path / "log.csv", rows_of(400, 200, 3)), parse_spec(SPEC)
     (told,) = shifts_in(identify(spec, log).result["notes"])
@@ -85,6 +87,7 @@ def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
     assert assess(spec, saved(tmp_path / "good.csv", rows_of(400, None, 3))).verdict == "met"
 
 
+@pytest.mark.slow
 def test_of_several_files_the_note_says_in_which_it_is(tmp_path):
     files = [
         saved(tmp_path / "a.csv", rows_of(200, None, 4)),

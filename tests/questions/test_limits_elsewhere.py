@@ -42,6 +42,7 @@ def test_drawn_plants_keep_limits_and_others_are_counted():
     assert f"of 60 more {told['draws']} go beyond, up to {100 * max(others):.3g} %" in lines["limits there"]
 
 
+@pytest.mark.slow
 def test_limits_that_no_plant_changes_are_not_counted():
     found = solve(parse_spec(SPEC, overrides=["limits={amplitude: 1}"]))
     assert "beyond_limits" not in found.result["robust"]["fresh"]

@@ -92,7 +92,7 @@ signal: {samples: 100, candidates: 1}
 """
 
 
-@pytest.mark.parametrize("exact", [[], [EXACT]], ids=["asymptotic", "parametric"])
+@pytest.mark.parametrize("exact", [[], pytest.param([EXACT], marks=pytest.mark.slow)])
 def test_states_of_several_channels(exact):
     """One input of two acts late; the same entries in s."""
     parameters = "parameters: {k: 1.5, T: 4.0, c: 0.4}"

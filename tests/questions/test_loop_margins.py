@@ -125,6 +125,7 @@ def test_the_margin_is_kept_by_the_plants_that_the_data_leave_over():
     assert kept >= 0.95 * 500
 
 
+@pytest.mark.slow
 def test_the_cost_is_that_of_a_plain_program():
     """r_adm by the formula of the loop, lines by cvxpy; alpha for three parameters."""
     found = solve(load_spec("specs/heater_loop.yaml")).result
@@ -167,6 +168,7 @@ def test_margins_are_told_as_the_peak_that_keeps_them(margin, expected):
     assert LoopMargin(**{key: float(value)}).peak == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
     rng = np.random.default_rng(2)
     u = 2.0 * np.sign(rng.standard_normal(72)).repeat(10)
@@ -183,7 +185,13 @@ def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
     assert asked["loop"]["Kp"] == pytest.approx(200.0 / (2.4 * 57.5), rel=0.1)
 
 
-@pytest.mark.parametrize("margin", ["max_sensitivity_db: 3", "phase_margin: 50", "gain_margin: 4"])
+@pytest.mark.parametrize(
+    "margin",
+    [
+        "phase_margin: 50",
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("max_sensitivity_db: 3", "gain_margin: 4")),
+    ],
+)
 def test_a_weaker_margin_is_named_as_the_margin_was_stated(margin):
     """The first value is one at which the nominal plant just keeps it, the second is one to work with."""
     key, stated = margin.split(": ")[0], "accuracy={loop: {tuning: {simc: {tau_c: 30}}, MARGIN}}"

@@ -177,6 +177,7 @@ def test_sinusoids_of_several_inputs_given_as_a_table(tmp_path):
     np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
 
 
+@pytest.mark.slow
 def test_the_spectrum_of_a_design_given_back_as_a_table(tmp_path):
     design = solve(load_spec(SPECS / "two_by_two.yaml", ["spectrum.order=3"]))
     columns = design.tables["spectrum"].columns

@@ -79,6 +79,7 @@ def test_bases_agree_and_print_their_own_coefficients():
     assert np.abs(S[0] - S[1]).max() > 1e-3 * np.abs(S[0]).max()
 
 
+@pytest.mark.slow
 def test_few_columns_have_a_lower_value_under_the_same_bound():
     full = solve(changed(CONTINUOUS)).result["objective"]
     few = solve(changed(CONTINUOUS, "spectrum.factor_columns=1")).result

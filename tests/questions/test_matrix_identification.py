@@ -88,7 +88,7 @@ def recorded_in_s(spec, samples, hold, rng):
 
 
 @pytest.mark.parametrize("hold", [True, pytest.param(False, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("denominator", [EACH, "[1, 1.5, 1.5]"])
+@pytest.mark.parametrize("denominator", [pytest.param(EACH, marks=pytest.mark.slow), "[1, 1.5, 1.5]"])
 def test_plants_in_s_come_back(hold, denominator, write):
     overrides = ["plant.sample=zoh"] if hold else []
     spec = parse_spec(IN_S.replace("DENOMINATOR", denominator), overrides=overrides)
@@ -106,7 +106,9 @@ def test_plants_in_s_come_back(hold, denominator, write):
     np.testing.assert_allclose(build_model(again).theta, list(found["theta"].values()))
 
 
-@pytest.mark.parametrize(("relative", "enough"), [(2.0, True), (0.1, False)])
+@pytest.mark.parametrize(
+    ("relative", "enough"), [(2.0, True), pytest.param(0.1, False, marks=pytest.mark.slow)]
+)
 def test_plants_in_s_are_assessed(relative, enough, write):
     overrides = [f"accuracy.model_error.relative={relative}", "plant.sample=zoh"]
     spec = parse_spec(IN_S.replace("DENOMINATOR", "[1, 1.5, 1.5]"), overrides=overrides)
