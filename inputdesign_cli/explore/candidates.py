@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
-from inputdesign_cli.explore.orders import Orders
-from inputdesign_cli.explore.processes import Process
+from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import Sweep, delay_ranges
 from inputdesign_cli.plant import Model
 
@@ -49,6 +48,7 @@ class Candidate:
         criterion: log of the variance of the prediction errors, and the price of the parameters.
         steady: whether its plant is stable, as far as the record shows.
         certain: whether no parameter of the plant deviates by more than half its value.
+        failed: names of the tests of its residuals that fail.
         by_prediction: whether prediction errors alone rank it, as in a loop.
     """
 
@@ -62,6 +62,7 @@ class Candidate:
     converged: bool
     steady: bool
     certain: bool
+    failed: tuple[str, ...]
     by_prediction: bool
 
 

@@ -18,25 +18,25 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.explore.candidates import Candidate, Chosen, Shape, certain, price, ranked
 from inputdesign_cli.explore.division import busiest
-from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady, simulation_fit
-from inputdesign_cli.explore.orders import Orders
-from inputdesign_cli.explore.processes import Process
+from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady
+from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import (
+    Regressed,
     Sweep,
     arx_models,
     lingering,
     noise_model,
-    output_error,
-    output_errors,
     sweep,
     whitened,
     whitening,
 )
+from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
+from inputdesign_cli.identification.white import White
 from inputdesign_cli.plant import Model
 
 Family = Literal["fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"]
@@ -88,8 +88,10 @@ class _Records:
         parts = self.first if orders.shared else self.white
         near = self.swept.near(orders.order)
         if not orders.physical and near.delays != orders.delays:
-            near = output_error(parts, near.order, orders.delays, F=near.F)
-        theta, deviations, variance, converged = _estimated(orders.model(), parts, orders.start(near))
+            near = Regressed(parts, near.order).output_error(orders.delays, near.F)
+        theta, deviations, variance, converged, failing = self._estimated(
+            orders.model(), parts, orders.start(near)
+        )
         orders = orders.at(theta)
         if max(orders.delays) > _RUN_OFF * self.swept.most:
             raise ArithmeticError("a dead time has run off to where nothing answers")
@@ -103,7 +105,7 @@ class _Records:
             orders.coloured(self.C, self.D),
             model,
             plant,
-            simulation_fit(model, self.first, self.late)[0],
+            fits(model, self.first, self.late).simulation[0],
             judged.simulation[0],
             judged.prediction[0],
             float(np.log(max(variance, 1e-300))) + price(unknowns, self.samples),
@@ -115,21 +117,26 @@ class _Records:
                 model.dead_times[model.in_plant],
                 self.step if orders.physical else 0.0,
             ),
+            failing,
             self.feedback,
         )
 
-
-def _estimated(structure: Model, parts: Parts, start: Array) -> tuple[Array, Array, float, bool]:
-    """Return parameters (k,), their deviations, the variance of the errors, and whether a search settled."""
-    kind = estimator(structure, 1.0).kind
-    check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
-    records = Records(tuple(kind.record(*part) for part in centred(parts)))
-    records = records.begun_freely(records.lateness(start))
-    found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
-    noise = noise_of(found.point, kind.own())
-    factor = factor_at(kind.names, records, found.point, noise)
-    half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
-    return found.point.theta, np.linalg.norm(half, axis=0), float(noise[0, 0]), found.converged
+    def _estimated(
+        self, structure: Model, parts: Parts, start: Array
+    ) -> tuple[Array, Array, float, bool, tuple[str, ...]]:
+        """Return parameters (k,), deviations, variance of the errors, whether it settled, failing tests."""
+        kind = estimator(structure, 1.0).kind
+        check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
+        records = Records(tuple(kind.record(*part) for part in centred(parts)))
+        records = records.begun_freely(records.lateness(start))
+        found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
+        point, white = found.point, White.of(records, found.point)
+        tests = score_tests(records, point, white, recent=kind.recent, feedback=self.feedback)
+        noise = noise_of(point, kind.own())
+        factor = factor_at(kind.names, records, point, noise)
+        half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
+        failing = tuple(test.name for test in failed(tests))
+        return point.theta, np.linalg.norm(half, axis=0), float(noise[0, 0]), found.converged, failing
 
 
 def explore_structure(
@@ -179,7 +186,8 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
     swept, white, A = sweep(first, highest, least=int(feedback)), first, np.ones(1)
     C = D = np.ones(1)
     for _ in range(0 if only == "oe" else _ROUNDS_IN_LOOP if feedback else _ROUNDS):
-        left = output_errors(first, swept.best(samples))
+        best = swept.best(samples)
+        left = Regressed(first, best.order).errors(best)
         A = whitening(left)
         C, D = noise_model(left, int(feedback or only == "bj"))
         white = whitened(first, A)

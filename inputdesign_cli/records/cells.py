@@ -15,11 +15,11 @@ from inputdesign_cli.records.moments import is_moment, moments_column
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.sheet import Column, Sheet
 
-_MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
-# What sheets write in place of a number that they do not have.
+# What says that there is no value, with what sheets write in place of a number that they do not have.
 _ERROR = re.compile(
     r"#(N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)", re.IGNORECASE
 )
+_MISSING = re.compile(rf"|nan|na|n/a|null|none|-|\?|{_ERROR.pattern}", re.IGNORECASE)
 _UNIT = re.compile(
     r"\W*([munk]?(s|v|a|w|hz|m|g|l|n|pa|bar)|sec|min|h|d|c|f|deg[cfk]?|celsius|kelvin|percent|pct|mpa|psi|cm|rpm|"
     r"rad|samples?)?\W*|.*[%°/²³^℃℉].*",
@@ -49,7 +49,7 @@ def is_comma(cell: str) -> bool:
 
 def is_missing(cell: str) -> bool:
     """Return whether a cell says that there is no value, or holds an error of a spreadsheet."""
-    return cell.strip().lower() in _MISSING or is_error(cell)
+    return _MISSING.fullmatch(cell.strip()) is not None
 
 
 def is_error(cell: str) -> bool:
@@ -104,20 +104,18 @@ def column_of(cells: Sequence[str], decimal: str = ".", *, stated: bool = False)
     row = next((int(i) for i in np.flatnonzero(np.isnan(numbers)) if not is_missing(plain[i])), None)
     pointed = [i for i, text in enumerate(texts) if "." in text and is_number(text)]
     if decimal == "," and stated and pointed:
-        wrong = "has a point, and --decimal says that commas are the decimal marks"
-        return Column(numbers, (pointed[0], texts[pointed[0]]), wrong, _SAY)
-    if row is None and not stated and (decimal == "," or pointed) and _like_thousands(plain):
-        first = next(i for i, text in enumerate(plain) if "." in text)
-        return Column(
-            numbers, (first, texts[first]), "may have a mark between thousands, or three decimals", _SAY
-        )
-    if row is None:
+        wrong, row = "has a point, and --decimal says that commas are the decimal marks", pointed[0]
+    elif row is None and not stated and (decimal == "," or pointed) and _like_thousands(plain):
+        wrong = "may have a mark between thousands, or three decimals"
+        row = next(i for i, text in enumerate(plain) if "." in text)
+    elif row is None:
         return Column(numbers)
-    if is_comma(texts[row]):
+    elif is_comma(texts[row]):
         wrong = "has a comma, which may be a decimal mark or stand between thousands"
-        return Column(numbers, (row, texts[row]), wrong, _SAY)
-    dates = moments_column(["" if is_missing(text) else text for text in texts])
-    return Column(numbers, (row, texts[row])) if dates is None else dates
+    else:
+        dates = moments_column(["" if is_missing(text) else text for text in texts])
+        return dates or Column(numbers, (row, texts[row]))
+    return Column(numbers, (row, texts[row]), wrong, _SAY)
 
 
 def _like_thousands(texts: Sequence[str]) -> bool:
@@ -137,19 +135,23 @@ def in_stated_form(sheet: Sheet, cells: Sequence[Sequence[str]], given: Preparat
         return sheet
     own = given.columns.get("time", "").strip().lower()
     named = named_columns(sheet, own) if own else []
-    columns, read = list(sheet.columns), False
-    for i, column in enumerate(columns):
-        likely = column.fault is not None or column.dated or is_called_time(sheet.name_of(i))
-        if i in named or (likely and not named):
-            texts = ["" if is_missing(cell) else cell.strip().removesuffix(".0") for cell in cells[i]]
-            found = moments_column(texts, given.time_format)
-            if found is not None and found.dated:
-                columns[i], read = found, True
-    if not read:
-        message = f"no column of {sheet.path.name} holds times in the form {given.time_format}"
-        hint = "mind its marks and digits, name the column (--columns time=NAME), or leave --time-format out"
-        raise sheet.error("data-not-a-number", message, hint, 0)
-    return replace(sheet, columns=tuple(columns))
+    likely = named or [
+        i
+        for i, column in enumerate(sheet.columns)
+        if column.fault is not None or column.dated or is_called_time(sheet.name_of(i))
+    ]
+    columns = dict(enumerate(sheet.columns))
+    read = {}
+    for i in likely:
+        texts = ["" if is_missing(cell) else cell.strip().removesuffix(".0") for cell in cells[i]]
+        found = moments_column(texts, given.time_format)
+        if found is not None and found.dated:
+            read[i] = found
+    if read:
+        return replace(sheet, columns=tuple((columns | read).values()))
+    message = f"no column of {sheet.path.name} holds times in the form {given.time_format}"
+    hint = "mind its marks and digits, name the column (--columns time=NAME), or leave --time-format out"
+    raise sheet.error("data-not-a-number", message, hint, 0)
 
 
 def written_out(values: NDArray) -> list[str]:

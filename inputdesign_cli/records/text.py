@@ -17,10 +17,8 @@ from inputdesign_cli.records.cells import (
     column_of,
     decimal_of,
     in_stated_form,
-    is_comma,
     is_error,
     is_missing,
-    is_number,
     is_plain,
     is_unit,
     is_value,
@@ -47,6 +45,7 @@ _LOOKED_AT = 200
 _MOST_FIELDS = 16_384
 # What may separate fields; None stands for blanks. Of equally good ones the first.
 _SEPARATORS = ("\t", ";", "|", None, ",")
+_SAID = {"tab": "\t", "\\t": "\t", "blank": None, " ": None}
 _EXTRA = (
     "write a name in the header for each column; if commas are decimal marks, not the decimal point, "
     "separate the columns with semicolons, or say --sep and --decimal"
@@ -90,12 +89,11 @@ def read_text(path: Path, key: str, text: str, given: Preparation) -> Sheet:
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    said = {"tab": "\t", "\\t": "\t", "blank": None, " ": None}
-    separator = said.get(given.separator, given.separator) if given.separator else _separator_of(text)
+    separator = _SAID.get(given.separator, given.separator) if given.separator else _separator_of(text)
     rows, passed, comment = _rows_of(path, key, text, separator)
     filled = [i for i, (_, row) in enumerate(rows) if any(map(str.strip, row))]
     rows = rows[filled[0] : filled[-1] + 1] if filled else []
-    head, names, body = _headed(rows[_table_begins(rows) :], comment, separator)
+    head, names, body = _headed(rows, comment, separator)
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
     sheet = sheet_of(path, key, head, names, body, given, separator)
@@ -124,16 +122,12 @@ def sheet_of(
     width = len(names) or max(len(row) for _, row in body)
     cells = [[row[i] if i < len(row) else "" for _, row in body] for i in range(width)]
     every = [cell for column in cells for cell in column if cell.strip()]
-    decimal, stated = (
-        given.decimal or decimal_of(every, between_commas=separator == ","),
-        bool(given.decimal),
-    )
-    columns = tuple(column_of(column, decimal, stated=stated) for column in cells)
+    decimal = given.decimal or decimal_of(every, between_commas=separator == ",")
+    columns = tuple(column_of(column, decimal, stated=bool(given.decimal)) for column in cells)
     # Messages may show what is a table of numbers, and no secret.
-    plain = (
-        sum(map(is_value, every)) if len(every) < 10**4 else sum(is_number(c) or is_comma(c) for c in every)
-    )
-    shown = 2 * (plain + len(body) * sum(one.dated for one in columns)) >= max(len(every), 1)
+    some = every[:: max(len(every) // 10**4, 1)]
+    dates = sum(one.dated for one in columns) / width
+    shown = not every or sum(map(is_value, some)) / len(some) + dates >= 0.5
     lines = np.array([line for line, _ in body])
     texts = [(separator or " ").join(row) for _, row in body]
     sheet = Sheet(path, key, tuple(names), columns, lines, head, texts, shown)
@@ -145,7 +139,7 @@ def sheet_of(
 
 
 def _separator_of(text: str) -> str | None:
-    """What stands between the fields: that by which most cells are values, then most rows alike."""
+    """Return what stands between the fields: that by which most cells are values, then most rows alike."""
     used = [line for line in text.splitlines() if line.strip() and not line.strip().startswith(_COMMENTS)]
     sample = used[:_LOOKED_AT] + used[_LOOKED_AT:][-_LOOKED_AT:]
 
@@ -168,10 +162,8 @@ def _separator_of(text: str) -> str | None:
 def _rows_of(
     path: Path, key: str, text: str, separator: str | None
 ) -> tuple[Rows, list[tuple[int, str]], str]:
-    """Line numbers and fields of the rows, the other lines by kind, and the last comment above the rows."""
-    rows: Rows = []
-    passed: list[tuple[int, str]] = []
-    comment = ""
+    """Return line numbers and fields of the rows, the other lines by kind, and the last comment above."""
+    rows, passed, comment = Rows(), list[tuple[int, str]](), ""
     for line, row in _split(path, key, text, separator):
         if len(row) > _MOST_FIELDS:
             what = f"has a line of {len(row)} fields (line {line}), and at most {_MOST_FIELDS} are taken"
@@ -190,13 +182,16 @@ def _rows_of(
 
 
 def _split(path: Path, key: str, text: str, separator: str | None) -> Rows:
-    """Every line or, where fields in quotes have several, its last one, and its fields."""
-    lines, begun, rows = text.splitlines(), 1, []
+    """Return every line or, where fields in quotes have several, its last one, and its fields."""
+    lines, begun, rows = text.splitlines(), 1, Rows()
     if separator is None:
         return [(number, line.split()) for number, line in enumerate(lines, start=1)]
     # Behind a quote that is never closed this is no separate row.
-    reader = csv.reader(
-        io.StringIO("\n".join([*lines, "\x00"]), newline=""), delimiter=separator, strict=True
+    ended = io.StringIO("\n".join([*lines, "\x00"]), newline="")
+    reader = csv.reader(ended, delimiter=separator, strict=True)
+    what, hint = (
+        "a quote that opens there is never closed",
+        "close it, or take it out; numbers need no quotes",
     )
     try:
         for row in reader:
@@ -205,57 +200,51 @@ def _split(path: Path, key: str, text: str, separator: str | None) -> Rows:
         if rows.pop()[1] == ["\x00"]:
             return rows
     except csv.Error as error:
-        if "field larger" in str(error) and '"' not in lines[begun - 1]:
-            what = f"is no table: line {begun} has a field of more than {csv.field_size_limit()} characters"
-            raise unreadable(path, key, what, "keep one sample a line", begun) from None
-    what = f"is no CSV file: a quote that opens in line {begun} is never closed"
-    raise unreadable(path, key, what, "close it, or take it out; numbers need no quotes", begun)
-
-
-def _table_begins(rows: Rows) -> int:
-    """The row where the table begins, its names if it has any: loggers write other lines above it."""
-    sample = rows[:_LOOKED_AT] + rows[_LOOKED_AT:][-_LOOKED_AT:]
-    widths = Counter(len(row) for _, row in sample if _of_values(row))
-    if not widths:
-        return 0
-    width = widths.most_common(1)[0][0]
-    # Sheets fill every row up to the width of the table, with nothing.
-    full = next((i for i, (_, row) in enumerate(sample) if len(row) == width and all(map(str.strip, row))), 0)
-    if 0 < full < _LOOKED_AT and _of_words(rows[full][1], width):
-        return full
-    first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and _of_values(row))
-    names = [row for _, row in rows[max(first - 2, 0) : first] if _of_words(row, width)]
-    if first < 2:
-        return 0
-    if not names or not _of_words(rows[first - 1][1], width):
-        return first if any(len(row) != width for _, row in rows[:first]) else 0
-    return first - 2 if len(names) == 2 and (first == 2 or all(map(is_unit, names[1]))) else first - 1
-
-
-def _of_values(row: Sequence[str]) -> bool:
-    filled = [cell for cell in row if cell.strip()]
-    return bool(filled) and len(filled) <= 2 * sum(map(is_value, filled))
-
-
-def _of_words(row: Sequence[str], width: int) -> bool:
-    return len(row) == width and not any(map(is_plain, row))
+        what, hint = (what, hint) if '"' in lines[begun - 1] else (str(error), "keep one sample a line")
+    raise unreadable(path, key, f"is no CSV file from line {begun} on: {what}", hint, begun)
 
 
 def _headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
     """Return line and text of the header, the names (empty if there are none), and the rows below.
 
-    A row of units below the names joins them: `valve` over `%` is `valve (%)`.
+    Loggers write other lines above the table. A row of units below the names joins them: `valve` over `%` is
+    `valve (%)`.
     """
     if not rows:
         return (1, ""), [], []
-    line, first = rows[0]
-    head = (line, (separator or " ").join(first))
-    cells = [" ".join(cell.split()) for cell in first]
+    begin, units = _table_begins(rows)
+    line, first = rows[begin]
+    head, cells = (line, (separator or " ").join(first)), [" ".join(cell.split()) for cell in first]
     if any(map(is_plain, cells)) and all(is_plain(cell) or is_missing(cell) for cell in cells):
         named = [part.strip() for part in (comment.split(separator) if comment else [])]
-        return head, named if len(named) == len(first) else [], rows
-    units = [cell.strip() for cell in rows[1][1]] if len(rows) > 2 else []
-    worded = any(units) and not any(is_missing(one) or is_value(one) for one in units if one)
-    if worded and len(units) == len(cells) and all(is_missing(one) or is_plain(one) for one in rows[2][1]):
-        return head, [f"{n} ({u})" if u else n for n, u in zip(cells, units, strict=True)], rows[2:]
-    return head, cells, rows[1:]
+        return head, named if len(named) == len(first) else [], rows[begin:]
+    if units:
+        row = [cell.strip() for cell in rows[begin + 1][1]]
+        cells = [f"{name} ({unit})" if unit else name for name, unit in zip(cells, row, strict=True)]
+    return head, cells, rows[begin + 1 + units :]
+
+
+def _table_begins(rows: Rows) -> tuple[int, bool]:
+    """Return the row where the table begins, its names if it has any, and whether a row of units follows."""
+
+    def of_values(row: Sequence[str]) -> bool:
+        filled = [cell for cell in row if cell.strip()]
+        return bool(filled) and len(filled) <= 2 * sum(map(is_value, filled))
+
+    def of_words(at: int) -> bool:
+        return at >= 0 and len(rows[at][1]) == width and not any(map(is_plain, rows[at][1]))
+
+    sample = rows[:_LOOKED_AT] + rows[_LOOKED_AT:][-_LOOKED_AT:]
+    widths = Counter(len(row) for _, row in sample if of_values(row))
+    if not widths:
+        return 0, False
+    width = widths.most_common(1)[0][0]
+    first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and of_values(row))
+    if not of_words(first - 1):  # nothing above, or a header of another width
+        return (first if first > 1 and any(len(row) != width for _, row in rows[:first]) else 0), False
+    # Sheets fill every row up to the width of the table with nothing: names are there for all columns.
+    above, below = (all(map(str.strip, rows[at][1])) for at in (first - 2, first - 1))
+    two = of_words(first - 2) and above
+    two = two and (first == 2 or not below or all(map(is_unit, rows[first - 1][1])))
+    plain = all(is_missing(cell) or is_plain(cell) for cell in rows[first][1])
+    return first - 1 - two, two and plain and any(map(str.strip, rows[first - 1][1]))

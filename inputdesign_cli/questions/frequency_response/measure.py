@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.findings.frequency_responses import REMEDY, UNLIKE, inputs_do_not_repeat, unexcited_lines
-from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
+from inputdesign_cli.findings.periods import Distorted, distorted, drifting_periods, spiked_periods
 from inputdesign_cli.findings.places import places
-from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
 from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.cubes import cubes
 from inputdesign_cli.identification.distortion import response_error
