@@ -1,6 +1,5 @@
 """Find a model in a record alone: delays, orders and families, judged on data that they have not seen."""
 
-from inputdesign_cli.explore.candidates import Candidate as Candidate, Chosen as Chosen
 from inputdesign_cli.explore.drift import levelled as levelled
 from inputdesign_cli.explore.fits import (
     NOT_COMPUTED as NOT_COMPUTED,
@@ -23,4 +22,9 @@ from inputdesign_cli.explore.relation import (
     unhelpful as unhelpful,
     unstable_pole as unstable_pole,
 )
-from inputdesign_cli.explore.search import Family as Family, explore_structure as explore_structure
+from inputdesign_cli.explore.search import (
+    Candidate as Candidate,
+    Chosen as Chosen,
+    Family as Family,
+    explore_structure as explore_structure,
+)

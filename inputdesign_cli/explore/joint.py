@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.explore.candidates import Candidate, Chosen, Ranges, certain
 from inputdesign_cli.explore.division import Division, cut, divided, windows
 from inputdesign_cli.explore.drift import levelled, slopes_of
 from inputdesign_cli.explore.fits import (
@@ -25,7 +24,7 @@ from inputdesign_cli.explore.fits import (
     percent,
 )
 from inputdesign_cli.explore.regressors import moving_in
-from inputdesign_cli.explore.search import Family, explore_structure
+from inputdesign_cli.explore.search import Candidate, Chosen, Family, Ranges, certain, explore_structure
 from inputdesign_cli.explore.structures import process_models
 from inputdesign_cli.explore.sweep import lingering
 from inputdesign_cli.identification.checks import signal_name

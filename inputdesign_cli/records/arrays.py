@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.records.cells import is_number, written_out
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.sheet import Sheet, unreadable
-from inputdesign_cli.records.text import sheet_of
+from inputdesign_cli.records.text import is_number, sheet_of, written_out
 
 MOST_UNPACKED = 2**30
 _MOST_DENSE = 10_000_000

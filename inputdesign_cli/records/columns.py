@@ -108,7 +108,7 @@ def is_called_time(name: str) -> bool:
 
 
 def time_unit_in(sheet: Sheet, name: str, *, dated: bool) -> str | None:
-    """Return the unit of times that a file states: by its column (`time_ms`, `Time (sec)`), or by itself.
+    """Return the unit of times that a file states: by its column (`time_ms`, `Time (sec)`) or elsewhere.
 
     Dates are counted in seconds.
     """

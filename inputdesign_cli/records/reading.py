@@ -11,11 +11,10 @@ from typing import Any
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError
 from inputdesign_cli.records.arrays import MOST_UNPACKED, check_unpacked, read_mat, read_npz
-from inputdesign_cli.records.cells import written_out
 from inputdesign_cli.records.moments import with_days
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.sheet import Sheet, unreadable
-from inputdesign_cli.records.text import decoded, read_text, sheet_of
+from inputdesign_cli.records.text import decoded, read_text, sheet_of, written_out
 from inputdesign_cli.regular_file import read_regular
 
 _MOST_BYTES = 100 * 2**20
