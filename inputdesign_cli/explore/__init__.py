@@ -1,13 +1,6 @@
 """Find a model in a record alone: delays, orders and families, judged on data that they have not seen."""
 
-from inputdesign_cli.explore.candidates import Candidate as Candidate, Chosen as Chosen
 from inputdesign_cli.explore.drift import levelled as levelled
-from inputdesign_cli.explore.feedback import (
-    answers_output as answers_output,
-    early_answers as early_answers,
-    like_answers as like_answers,
-    only_answers as only_answers,
-)
 from inputdesign_cli.explore.fits import (
     NOT_COMPUTED as NOT_COMPUTED,
     Fits as Fits,
@@ -21,5 +14,17 @@ from inputdesign_cli.explore.regressors import (
     left_of_inputs as left_of_inputs,
     order_of_excitation as order_of_excitation,
 )
-from inputdesign_cli.explore.relation import unhelpful as unhelpful, unstable_pole as unstable_pole
-from inputdesign_cli.explore.search import Family as Family, explore_structure as explore_structure
+from inputdesign_cli.explore.relation import (
+    answers_output as answers_output,
+    early_answers as early_answers,
+    like_answers as like_answers,
+    only_answers as only_answers,
+    unhelpful as unhelpful,
+    unstable_pole as unstable_pole,
+)
+from inputdesign_cli.explore.search import (
+    Candidate as Candidate,
+    Chosen as Chosen,
+    Family as Family,
+    explore_structure as explore_structure,
+)

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
 
-Cut = Literal[
-    "the first 60 % and the rest",
-    "the first 50 % and the rest",
-    "the first 40 % and the rest",
-    "the first 70 % and the rest",
-    "the first 30 % and the rest",
-]
-Split = Cut | Literal["blocks in turn", "none"]
-
 # Where an input rests beyond one cut, another may leave steps on either side, with what comes after them.
-_CUTS: tuple[tuple[float, Cut], ...] = (
-    (0.6, "the first 60 % and the rest"),
-    (0.5, "the first 50 % and the rest"),
-    (0.4, "the first 40 % and the rest"),
-    (0.7, "the first 70 % and the rest"),
-    (0.3, "the first 30 % and the rest"),
-)
+_CUTS = (60, 50, 40, 70, 30)
 # Where an input steps in blocks of one kind only, fewer or more of them may part its steps.
 _BLOCKS = (10, 9, 11, 8, 12, 7, 13, 6, 14)
 # An input whose rms about its level is less than this share of that in all records rests.
@@ -39,7 +23,7 @@ class Division(NamedTuple):
 
     first: Parts
     second: Parts
-    split: Split
+    split: str
 
 
 def divided(parts: Parts) -> Division:
@@ -56,8 +40,8 @@ def divided(parts: Parts) -> Division:
 
 def _divisions(parts: Parts) -> Iterator[Division]:
     total = sum(len(y) for _, y in parts)
-    for share, cut in _CUTS:
-        yield _cut(parts, int(share * total), cut)
+    for share in _CUTS:
+        yield _parted(parts, share * total // 100, f"the first {share} % and the rest")
     for count in _BLOCKS:
         length = max(total // count, 1)
         blocks = [
@@ -73,17 +57,13 @@ def _divisions(parts: Parts) -> Iterator[Division]:
         yield Division(first, second, "blocks in turn")
 
 
-def _cut(parts: Parts, left: int, cut: Cut) -> Division:
+def _parted(parts: Parts, left: int, split: str) -> Division:
     """Return the first samples of the records, `left` in all, and the others."""
-    first, second = list[tuple[Array, Array]](), list[tuple[Array, Array]]()
-    for u, y in parts:
-        at = min(max(left, 0), len(y))
-        left -= len(y)
-        if at:
-            first.append((u[:at], y[:at]))
-        if at < len(y):
-            second.append((u[at:], y[at:]))
-    return Division(first, second, cut)
+    begins = np.cumsum([0, *(len(y) for _, y in parts)])
+    at = [min(max(left - int(begin), 0), len(y)) for begin, (_, y) in zip(begins, parts, strict=False)]
+    first = [(u[:k], y[:k]) for k, (u, y) in zip(at, parts, strict=True) if k]
+    second = [(u[k:], y[k:]) for k, (u, y) in zip(at, parts, strict=True) if k < len(y)]
+    return Division(first, second, split)
 
 
 def _moves(some: Parts, whole: Parts) -> bool:
@@ -98,14 +78,20 @@ def _moves(some: Parts, whole: Parts) -> bool:
 
 def busiest(parts: Parts, most: int) -> list[tuple[Array, Array]]:
     """Return at most `most` samples: of a long record the stretch in which the inputs move most."""
-    share = most // len(parts)
-    return [(u[at], y[at]) for u, y in parts for at in [_window(u, share if len(parts) > 1 else most)]]
+    return cut(parts, windows(parts, most))
 
 
-def _window(u: NDArray[np.float64], length: int) -> slice:
-    if len(u) <= length:
-        return slice(0, len(u))
-    moves = np.sum((np.diff(u, axis=0) / np.maximum(u.std(axis=0), 1e-300)) ** 2, axis=1)
-    total = np.concatenate([[0.0], np.cumsum(moves)])
-    begin = int(np.argmax(total[length - 1 :] - total[: len(total) - length + 1]))
-    return slice(begin, begin + length)
+def cut(parts: Parts, at: Sequence[slice]) -> list[tuple[Array, Array]]:
+    """Return a stretch of each record."""
+    return [(u[own], y[own]) for (u, y), own in zip(parts, at, strict=True)]
+
+
+def windows(parts: Parts, most: int) -> list[slice]:
+    """Return the stretches of the records in which the inputs move most, `most` samples in all."""
+    length, found = max(most // len(parts), 2), list[slice]()
+    for u, _ in parts:
+        moves = np.sum((np.diff(u, axis=0) / np.maximum(u.std(axis=0), 1e-300)) ** 2, axis=1)
+        total = np.concatenate([[0.0], np.cumsum(moves)])
+        begin = int(np.argmax(total[length - 1 :] - total[: 1 - length])) if len(u) > length else 0
+        found.append(slice(begin, min(begin + length, len(u))))
+    return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
-from inputdesign_cli.explore.sweep import output_errors, sweep, whitening
+from inputdesign_cli.explore.sweep import Regressed, sweep, whitening
 from inputdesign_cli.plant.filtering import filtered
 
 _HIGHEST = 3
@@ -54,7 +54,7 @@ def _line(parts: Parts, known: bool) -> float:
         return best.slope
     if abs(best.slope) * samples < _RISES * float(np.sqrt(best.loss)):
         return 0.0
-    errors = output_errors(parts, best, line=True)
+    errors = Regressed(parts, best.order, line=True).errors(best)
     A = whitening(errors)
     if float(np.max(np.roots(A).real, initial=0.0)) > 1.0 - _WALKS / samples:
         return 0.0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.identification.records import Records, centred
+from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametrised, SampledModel
 
 Parts = Sequence[tuple[Array, Array]]
@@ -57,13 +57,27 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
     Raises:
         TypeError: see `output_error_form`.
     """
-    simulation, simulated, counted, varying, unexplained = _simulated(model, parts, late)
+    simulated, errors, kept, missing, spread = [], [], [], [], []
     kind = estimator(model, 1.0)
-    with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-        free = [Records(kind, (part,)).begun_freely(kind.lateness(model.theta)) for part in centred(parts)]
-        errors = np.concatenate([record.at(model.theta).errors for record in free])
-        errors[unexplained] = varying[unexplained[counted]]
-    return Fits(simulation, percent(errors[counted], varying), simulated, errors, counted)
+    for u, y in parts:
+        own, delay = simulate_free(model, u - u.mean(axis=0), y)
+        samples = np.arange(len(y))
+        counted = samples >= (delay if late is None else late)
+        unexplained = counted & (samples < delay)
+        own[unexplained] = y[counted].mean(axis=0) if np.any(counted) else 0.0
+        varying = y - (y[counted].mean(axis=0) if np.any(counted) else 0.0)
+        with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
+            record = Records(kind, ((u - u.mean(axis=0), y - y.mean(axis=0)),))
+            predicted = record.begun_freely(kind.lateness(model.theta)).at(model.theta).errors
+        simulated.append(own)
+        errors.append(np.where(unexplained[:, None], varying, predicted))
+        kept.append(counted)
+        spread.append(varying)
+        missing.append(y - own)
+    at, every = np.concatenate(kept), np.concatenate(errors)
+    varies = np.concatenate(spread)[at]
+    simulation = percent(np.concatenate(missing)[at], varies)
+    return Fits(simulation, percent(every[at], varies), np.concatenate(simulated), every, at)
 
 
 def beside(found: Sequence[Fits]) -> Fits:
@@ -75,32 +89,6 @@ def beside(found: Sequence[Fits]) -> Fits:
         np.concatenate([one.errors for one in found], axis=1),
         np.all([one.counted for one in found], axis=0),
     )
-
-
-def simulation_fit(model: Model, parts: Parts, late: int | None = None) -> tuple[float, ...]:
-    """Return the fits of the simulation alone."""
-    return _simulated(model, parts, late)[0]
-
-
-def _simulated(
-    model: Model, parts: Parts, late: int | None
-) -> tuple[tuple[float, ...], Array, NDArray[np.bool_], Array, NDArray[np.bool_]]:
-    """Return fits, simulations (N, p), counted samples (N,), what varies there, and what delays miss."""
-    simulated, left, counted, varying, unexplained = [], [], [], [], []
-    for u, y in parts:
-        own, delay = simulate_free(model, u - u.mean(axis=0), y)
-        samples = np.arange(len(y))
-        kept = samples >= (delay if late is None else late)
-        missing = kept & (samples < delay)
-        own[missing] = y[kept].mean(axis=0) if np.any(kept) else 0.0
-        simulated.append(own)
-        counted.append(kept)
-        unexplained.append(missing)
-        left.append((y - own)[kept])
-        varying.append(y[kept] - y[kept].mean(axis=0) if np.any(kept) else y[kept])
-    spread = np.concatenate(varying)
-    fit = percent(np.concatenate(left), spread)
-    return fit, np.concatenate(simulated), np.concatenate(counted), spread, np.concatenate(unexplained)
 
 
 def by_chance(samples: int, unknowns: int, tried: int) -> float:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.explore.candidates import Candidate, Chosen, Ranges, certain
-from inputdesign_cli.explore.division import Division, Split, busiest, divided
+from inputdesign_cli.explore.division import Division, cut, divided, windows
 from inputdesign_cli.explore.drift import levelled, slopes_of
 from inputdesign_cli.explore.fits import (
     NOT_COMPUTED,
@@ -24,9 +23,9 @@ from inputdesign_cli.explore.fits import (
     output_error_form,
     percent,
 )
-from inputdesign_cli.explore.processes import process_models
 from inputdesign_cli.explore.regressors import moving_in
-from inputdesign_cli.explore.search import Family, explore_structure
+from inputdesign_cli.explore.search import Candidate, Chosen, Family, Ranges, certain, explore_structure
+from inputdesign_cli.explore.structures import process_models
 from inputdesign_cli.explore.sweep import lingering
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.estimate import Estimate
@@ -66,7 +65,7 @@ class Found:
     samples: NDArray[np.int64]
     validation: Fits
     helped: tuple[float, ...]
-    split: Split
+    split: str
     still: tuple[int, ...]
     slopes: Array
 
@@ -89,23 +88,15 @@ class Found:
     def wanders(self) -> tuple[bool, ...]:
         """Return of each output whether its noise does not fade within the record, as if it integrated."""
         longest = max(len(y) for _, y in self.used)
-        return tuple(lingering(D, longest) > 0 for D in _noise_poles(self.model))
+        named = dict(zip(self.model.names, self.model.theta.tolist(), strict=True))
+        suffixes = [f"[{i + 1}]" for i in range(self.model.outputs)] if self.model.outputs > 1 else [""]
+        poles = [[1.0, *(named.get(f"d{k}{suffix}", 0.0) for k in range(1, 9))] for suffix in suffixes]
+        return tuple(lingering(np.array(D), longest) > 0 for D in poles)
 
 
 def _steady(taken: Sequence[Candidate], model: Model, samples: int) -> bool:
     """Return whether a plant is stable, as far as `samples` samples show, or integrates by its structure."""
     return is_steady(model, samples) or any(c.orders.integrates for c in taken)
-
-
-def _noise_poles(model: Model) -> list[Array]:
-    """Return D of each output, one for white noise."""
-    found = []
-    for i in range(model.outputs):
-        suffix = "" if model.outputs == 1 else f"[{i + 1}]"
-        named = dict(zip(model.names, model.theta.tolist(), strict=True))
-        d = [named[f"d{k}{suffix}"] for k in range(1, 9) if f"d{k}{suffix}" in named]
-        found.append(np.array([1.0, *d]))
-    return found
 
 
 def explore_records(
@@ -128,20 +119,23 @@ def explore_records(
     lines = (ramp or bool(np.any(slopes))) and len(parts) <= _MOST_LINES
     division = divided(moved)
     found = _structures(division, feedback, step, only, physical=not still)
-    used = busiest(moved, _MOST_SAMPLES)
-    taken, estimate, model = _estimated(found, used, feedback, lines)
+    at = windows(moved, _MOST_SAMPLES)
+    begins = np.cumsum([0, *(len(y) for _, y in parts)])[:-1].tolist()
+    together = _estimated(found, cut(moved, at), feedback, lines)
+    taken = together.taken
     own = [_output(division.second, i) for i in range(len(taken))]
     judged = [fits(c.model, second) for c, second in zip(taken, own, strict=True)]
     idle = [fits(c.model, [(0.0 * u, y) for u, y in second]) for c, second in zip(taken, own, strict=True)]
-    whole = joined(taken, parts[0][0].shape[1], moving).at(model.theta, model.covariance)
+    whole = joined(taken, parts[0][0].shape[1], moving)
+    whole = whole.at(together.model.theta, together.model.covariance)
     return Found(
         tuple(found),
         taken,
         tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
         whole,
-        replace(estimate, names=whole.names),
-        busiest(parts, _MOST_SAMPLES),
-        _busiest_samples(moved),
+        replace(together.estimate, names=whole.names),
+        cut(parts, at),
+        np.concatenate([np.arange(b + k.start, b + k.stop) for b, k in zip(begins, at, strict=True)]),
         beside(judged),
         tuple(percent(own.errors, none.errors)[0] for own, none in zip(judged, idle, strict=True)),
         division.split,
@@ -178,15 +172,26 @@ def _output(parts: Parts, output: int) -> list[tuple[Array, Array]]:
     return [(u, y[:, output : output + 1]) for u, y in parts]
 
 
-def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
-    ends = np.cumsum([len(y) for _, y in parts])
-    every = np.split(np.arange(ends[-1], dtype=float)[:, None], ends[:-1])
-    counted = [(u, at) for (u, _), at in zip(parts, every, strict=True)]
-    return np.concatenate([at[:, 0] for _, at in busiest(counted, _MOST_SAMPLES)]).astype(np.int64)
+@dataclass(frozen=True)
+class _Together:
+    """Structures of all outputs, and their estimate from `samples` samples, the whole record."""
 
+    taken: tuple[Candidate, ...]
+    estimate: Estimate
+    model: Model
+    samples: int
 
-_Together = tuple[tuple[Candidate, ...], Estimate, Model]
-"""Structures of all outputs, and their estimate from the whole record."""
+    @property
+    def steady(self) -> bool:
+        """Return whether the plant is stable, or integrates by its structure."""
+        return _steady(self.taken, self.model, self.samples)
+
+    @property
+    def certain(self) -> bool:
+        """Return whether no parameter of the plant deviates by more than half its value."""
+        step = max(c.orders.step if c.orders.physical else 0.0 for c in self.taken)
+        plant, deviations = self.model.in_plant, np.sqrt(np.diag(self.estimate.covariance))
+        return certain(self.model.theta[plant], deviations[plant], self.model.dead_times[plant], step)
 
 
 def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool) -> _Together:
@@ -194,15 +199,14 @@ def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool)
 
     Where all of them stand on the limit of stability, the first that is stable: it is like an integrator.
     """
-    samples, reason = sum(len(y) for _, y in used), None
-    made = list[_Together]()
-    for taken in _combinations(found):
-        if made and not _good(found, taken):
+    reason, made = None, list[_Together]()
+    for taken, good in _combinations(found):
+        if made and not good:
             break
         names = " and ".join(dict.fromkeys(c.orders.family for c in taken))
         tell(Counted(f"models of the whole record, now {names}", len(made), len(made) + 1))
         try:
-            together = _together(taken, used, feedback, ramp)
+            made.append(_together(taken, used, feedback, ramp))
         except SpecError as error:
             reason = error
         except NOT_COMPUTED:
@@ -212,11 +216,10 @@ def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool)
                 raise
             break
         else:
-            if _steady(together[0], together[2], samples) and _certain(together):
-                return together
-            made.append(together)
+            if made[-1].steady and made[-1].certain:
+                return made[-1]
     if made:
-        return min(made, key=lambda one: _order_of(one, samples))
+        return min(made, key=lambda one: (not one.steady, output_error_form(one.model).radius > 1.0))
     raise reason or bad_spec(
         "no-structure",
         "no stable model explains the record",
@@ -225,25 +228,8 @@ def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool)
     )
 
 
-def _good(found: Sequence[Chosen], taken: Sequence[Candidate]) -> bool:
-    """Return whether all explain their part of the record about as well as any."""
-    return all(any(c is own for own in chosen.good) for chosen, c in zip(found, taken, strict=True))
-
-
-def _order_of(one: _Together, samples: int) -> tuple[bool, bool]:
-    return not _steady(one[0], one[2], samples), output_error_form(one[2]).radius > 1.0
-
-
-def _certain(made: _Together) -> bool:
-    taken, estimate, model = made
-    step = max(c.orders.step if c.orders.physical else 0.0 for c in taken)
-    plant, deviations = model.in_plant, np.sqrt(np.diag(estimate.covariance))
-    return certain(model.theta[plant], deviations[plant], model.dead_times[plant], step)
-
-
 def _together(taken: tuple[Candidate, ...], used: Parts, feedback: bool, ramp: bool) -> _Together:
-    inputs = used[0][0].shape[1]
-    begun = taken
+    inputs, begun = used[0][0].shape[1], taken
     if len(taken) > 1:
         # Where one output has several minima, a search for all of them seldom leaves a wrong one.
         begun = tuple(
@@ -251,7 +237,7 @@ def _together(taken: tuple[Candidate, ...], used: Parts, feedback: bool, ramp: b
             for i, c in enumerate(taken)
         )
     estimate, model = _identified(joined(begun, inputs, range(inputs)), used, feedback, ramp)
-    return taken, estimate, model
+    return _Together(taken, estimate, model, sum(len(y) for _, y in used))
 
 
 def _identified(structure: Model, used: Parts, feedback: bool, ramp: bool) -> tuple[Estimate, Model]:
@@ -271,19 +257,25 @@ def _identified(structure: Model, used: Parts, feedback: bool, ramp: bool) -> tu
     return estimate, structure.at(estimate.theta, estimate.noise)
 
 
-def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
-    """Yield what may be taken for all outputs together, all in s or all in q^-1, the best first."""
-    first = found[0].best.orders.physical
-    last = list[tuple[Candidate, ...]]()
+def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
+    """Yield what may be taken for all outputs together, all in s or all in q^-1, the best first.
+
+    With it whether all explain their part of the record about as well as any.
+    """
+    first, last = found[0].best.orders.physical, list[tuple[Candidate, ...]]()
     for kind in (first, not first):
-        every = [[c for c in chosen.candidates if c.orders.physical == kind] for chosen in found]
-        # What is open on one part seldom is certain on the whole: after the best it is left out.
-        good = [[c for c in chosen.good if c.orders.physical == kind] for chosen in found]
-        ranked = [own[:1] + [c for c in own[1:] if c.certain][: _MOST_TRIED - 1] for own in good]
-        for rank in range(max(map(len, ranked)) if all(ranked) else 0):
-            yield tuple(own[min(rank, len(own) - 1)] for own in ranked)
-        last += [tuple(own[0] for own in every)] if all(every) and not all(ranked) else []
-    yield from last
+        good, every = (
+            [[c for c in own if c.orders.physical == kind] for own in chosen]
+            for chosen in ([one.good for one in found], [one.candidates for one in found])
+        )
+        if all(good):
+            # What is open on one part seldom is certain on the whole: after the best it is left out.
+            ranked = [own[:1] + [c for c in own[1:] if c.certain][: _MOST_TRIED - 1] for own in good]
+            for rank in range(max(map(len, ranked))):
+                yield tuple(own[min(rank, len(own) - 1)] for own in ranked), True
+        elif all(every):
+            last.append(tuple(own[0] for own in every))
+    yield from ((taken, False) for taken in last)
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:

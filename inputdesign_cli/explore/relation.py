@@ -1,7 +1,8 @@
-"""See whether the inputs move the outputs at all, and whether the plant is unstable, by regressions.
+"""Regressions without a model: do inputs answer outputs, do they move them at all, is the plant unstable?
 
-Two signals that wander, drift, or follow one cycle agree over long stretches though neither moves the other,
-and a model of the one by the other simulates unseen data, too ([granger-newbold-1974]). What is new in the
+Past innovations of the outputs help to predict an input in a loop only ([ljung-1999], Section 13.4). Future
+inputs help to predict an output only if the input was logged late. Two signals that wander, drift, or follow
+one cycle agree for long though neither moves the other ([granger-newbold-1974]). What is new in the
 output from sample to sample then answers nothing that the input does.
 """
 
@@ -14,12 +15,23 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.explore.division import busiest
 from inputdesign_cli.explore.fits import Parts, output_error_form
 from inputdesign_cli.explore.regressors import past, residuals
+from inputdesign_cli.identification import ScoreTest
 from inputdesign_cli.plant import Model
 
-_LAGS, _PER_LAG = 20, 12
-_CERTAIN = 1e-3
+_LAGS, _AHEAD, _PER_LAG = 20, 8, 12
+# Of more samples even what lies beyond the lags would show.
+_MOST_SAMPLES = 10_000
+# Levels: an input answers, an output comes before an input, an input helps to predict an output.
+_CERTAIN, _EARLY, _HELPS = 1e-4, 1e-6, 1e-3
+# An input follows from outputs and its own past if they leave less than this share of its power.
+_FOLLOWS = 1e-9
+# What is new in u and in y goes together beyond this correlation.
+_TOGETHER = 0.1
+# A jump is this multiple of an input's median innovation; fewest samples to compare jumps with the rest.
+_JUMP, _FEWEST = 6.0, 5
 # In -2 log likelihood: what the choice among some thousands of structures and delays gains by chance.
 _BY_CHOICE = 25.0
 _HIGHEST = 5
@@ -28,6 +40,164 @@ _BEYOND, _STEP = 5.0, 0.01
 # What would grow by less over the whole record may be drift, or several integrators, without a loop.
 _GROWN = 1e4
 _DEPENDENT = 1e-9
+
+
+def answers_output(parts: Parts) -> list[tuple[int, float]]:
+    """Return the inputs that answer the outputs, with the probability of that by chance.
+
+    Each input is regressed on its own past and the other inputs', then on past innovations of the outputs as
+    well. An input that follows from outputs and its own past without an error is a controller, too.
+
+    Args:
+        parts: records u (n, r), y (n, p).
+    """
+    lags = _lags(parts)
+    kept = _centred(parts, 3 * lags)
+    if not kept:
+        return []
+    own = np.concatenate([past(u, 2 * lags) for u, _ in kept])
+    more = np.concatenate([past(e, lags) for e in _new(kept, lags)[1]])
+    targets = np.concatenate([u[2 * lags :] for u, _ in kept])
+    laws, at_once = only_answers(parts), _moved_at_once(kept, lags)
+    chances = [
+        0.0 if j in laws else min(_by_chance(own, more, x), at_once[j]) for j, x in enumerate(targets.T)
+    ]
+    return [(j, probability) for j, probability in enumerate(chances) if probability < _CERTAIN]
+
+
+def only_answers(parts: Parts) -> list[int]:
+    """Return the inputs that are an exact linear function of present and past outputs and of past inputs.
+
+    Inputs that follow from past inputs alone are not among them.
+    """
+    lags = min(_lags(parts), 5)
+    long = _centred(parts, 3 * lags)
+    if not long:
+        return []
+    own = np.concatenate([past(u, lags) for u, _ in long])
+    outputs = np.concatenate([np.column_stack([y[lags:], past(y, lags)]) for _, y in long])
+    found = []
+    for j, target in enumerate(np.concatenate([u[lags:] for u, _ in long]).T):
+        power = float(target @ target)
+        alone, together = _left(own, target), _left(np.column_stack([own, outputs]), target)
+        if power > 0.0 and alone > 1e-3 * power and together <= _FOLLOWS * power:
+            found.append(j)
+    return found
+
+
+def _moved_at_once(parts: Parts, lags: int) -> list[float]:
+    """Return of each input the probability, by chance, that it answers y(t) between jumps of its own.
+
+    Past inputs hold all that a controller has made of past outputs between two steps of its reference. News
+    of u and of y goes together there. If y answered u at once, it would do so at the jumps as well.
+    """
+    new_u, new_y = (np.concatenate(new) for new in _new(parts, lags))
+    found = []
+    for x in new_u.T:
+        jumps, chance = np.abs(x) > _JUMP * np.median(np.abs(x)), 1.0
+        for e in new_y.T if np.sum(jumps) >= _FEWEST and np.sum(~jumps) >= lags * _FEWEST else ():
+            (small, own), (large, other) = (_slope(x[at], e[at]) for at in (~jumps, jumps))
+            apart = min(abs(small) / own, abs(small - large) / np.hypot(own, other))
+            chance = min(chance, float(scipy.special.erfc(apart / np.sqrt(2.0))))
+        found.append(chance)
+    return found
+
+
+def _slope(x: Array, y: Array) -> tuple[float, float]:
+    """Return the slope of y (n,) over x (n,), and its deviation."""
+    power = max(float(x @ x), 1e-300)
+    slope = float(x @ y) / power
+    return slope, max(float(np.std(y - slope * x)) / np.sqrt(power), 1e-300)
+
+
+def early_answers(parts: Parts) -> list[ScoreTest]:
+    """Return the outputs that what is new in a future input helps to predict, up to eight samples ahead.
+
+    Args:
+        parts: records u (n, r), y (n, p) of an open loop.
+    """
+    lags, parts = _lags(parts), busiest(parts, _MOST_SAMPLES)
+    long = _centred(parts, 4 * (lags + _AHEAD))
+    if not long:
+        return []
+    rows, targets, ahead = list[Array](), list[Array](), list[Array]()
+    news = residuals([past(u, lags) for u, _ in long], [u[lags:] for u, _ in long])
+    for (u, y), new in zip(long, news, strict=True):
+        last = len(y) - _AHEAD
+        rows.append(np.column_stack([past(y, lags), past(u, lags), u[lags:]])[: last - lags])
+        targets.append(y[lags:last])
+        ahead.append(np.stack([new[k : len(new) - _AHEAD + k] for k in range(1, _AHEAD + 1)], axis=1))
+    own, columns = np.concatenate(rows), np.concatenate(ahead)
+    found = list[ScoreTest]()
+    for i, target in enumerate(np.concatenate(targets).T):
+        for j in range(columns.shape[2]):
+            together = _by_chance(own, columns[:, :, j], target, held=False)
+            single = [_by_chance(own, columns[:, [k], j], target, held=False) for k in range(_AHEAD)]
+            if max(together, min(single)) < _EARLY:
+                last = max(k for k, p in enumerate(single) if p < _EARLY)
+                found.append(ScoreTest("future_inputs", "feedback", 0.0, _AHEAD, together, last + 1, i, j))
+    return found
+
+
+def like_answers(parts: Parts, output: int, j: int) -> bool:
+    """Return whether u(t) may have been made from y(t): both have news at once, and nobody has set the input.
+
+    An input that is held, white, or follows from its own past was set without a look at the output.
+    """
+    moves = np.concatenate([np.diff(u[:, j]) != 0.0 for u, _ in parts])
+    lags = _lags(parts)
+    long = _centred(parts, 3 * lags)
+    if not long or np.mean(moves) < 0.5:
+        return False
+    new_u, new_y = (np.concatenate(new) for new in _new(long, lags))
+    size = float(np.linalg.norm(new_u[:, j]) * np.linalg.norm(new_y[:, output]))
+    lagged = np.concatenate([past(u[:, j : j + 1], 5) for u, _ in long])
+    now = np.concatenate([u[5:, j] for u, _ in long])
+    own = _left(lagged, now) <= 1e-6 * float(now @ now)
+    white = _by_chance(np.ones((len(now), 1)), lagged, now) > 0.01
+    return abs(float(new_u[:, j] @ new_y[:, output])) > _TOGETHER * max(size, 1e-300) and not (own or white)
+
+
+def _by_chance(own: Array, more: Array, target: Array, *, held: bool = True) -> float:
+    """Return the probability that columns `more` explain as much by chance beside `own` (n, m).
+
+    The likelihood ratio says so. Of a target that may be held, and moves at few samples only, so must a score
+    test whose covariance allows for errors of any size at any time ([white-1980]).
+    """
+    both = np.column_stack([own, more])
+    alone, together = _left(own, target), _left(both, target)
+    if alone <= 1e-12 * float(target @ target) or len(target) <= both.shape[1]:
+        return 1.0  # the input follows from its own past: a deterministic signal
+    ratio = (len(target) - both.shape[1]) * float(np.log(alone / max(together, 1e-300)))
+    if held:
+        (errors,), (rest,) = residuals([own], [target]), residuals([own], [more])
+        weighted = rest * errors[:, None]
+        total = weighted.sum(axis=0)
+        score = float(total @ np.linalg.lstsq(weighted.T @ weighted, total, rcond=1e-10)[0])
+        ratio = min(ratio, score)
+    return float(scipy.special.chdtrc(more.shape[1], ratio))
+
+
+def _left(*regression: Array) -> float:
+    """Return the sum of squares that columns (n, m) leave of a target (n,)."""
+    (errors,) = residuals(*([one] for one in regression))
+    return float(errors @ errors)
+
+
+def _lags(parts: Parts) -> int:
+    channels = parts[0][0].shape[1] + parts[0][1].shape[1]
+    return max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * channels)), 1)
+
+
+def _centred(parts: Parts, shortest: int) -> list[tuple[Array, Array]]:
+    """Return the records of more than `shortest` samples, about their means."""
+    return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > shortest]
+
+
+def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
+    """Return what past inputs and outputs do not explain of inputs and of outputs, (n - lags, ..) each."""
+    rows = [np.column_stack([past(u, lags), past(y, lags)]) for u, y in parts]
+    return residuals(rows, [u[lags:] for u, _ in parts]), residuals(rows, [y[lags:] for _, y in parts])
 
 
 def unhelpful(model: Model, parts: Parts) -> list[int]:
@@ -60,18 +230,18 @@ def _idle(signals: Sequence[tuple[Array, Array]], lags: int) -> bool:
         own.append(np.column_stack([level, past(y[:, None], lags)]))
         more.append(np.column_stack([own[-1], x[lags:], past(x[:, None], lags)]))
         left.append(np.column_stack([level, past((y - x)[:, None], lags)]))
-    targets, others = [y[lags:] for y, _ in signals], [(y - x)[lags:] for y, x in signals]
+    target = np.concatenate([y[lags:] for y, _ in signals])
+    rest = np.concatenate([(y - x)[lags:] for y, x in signals])
     alone, along, simulated = (
-        max(sum(float(e @ e) for e in residuals(rows, those)), 1e-300)
-        for rows, those in ((own, targets), (more, targets), (left, others))
+        max(_left(np.concatenate(rows), wanted), 1e-300)
+        for rows, wanted in ((own, target), (more, target), (left, rest))
     )
-    samples = sum(map(len, targets))
-    free = samples - more[0].shape[1]
+    free = target.size - more[0].shape[1]
     if free < 1:
         return False
     statistic = (alone - along) / (lags + 1) / (along / free)
     probability = float(scipy.special.fdtrc(lags + 1, free, max(statistic, 0.0)))
-    return probability > _CERTAIN and samples * float(np.log(simulated / alone)) > -_BY_CHOICE
+    return probability > _HELPS and target.size * float(np.log(simulated / alone)) > -_BY_CHOICE
 
 
 @dataclass(frozen=True)
@@ -94,8 +264,7 @@ def unstable_pole(parts: Parts, output: int) -> UnstablePole | None:
     A loop that holds an unstable plant excites it, and what ARX models predict does not care where their
     poles are ([ljung-1999], Section 13.4).
     """
-    own = [(u - u.mean(axis=0), y[:, output : output + 1] - y[:, output].mean()) for u, y in parts]
-    long = [part for part in own if len(part[1]) > 4 * _HIGHEST]
+    long = [(u, y[:, output : output + 1]) for u, y in _centred(parts, 4 * _HIGHEST)]
     best, found = np.inf, None
     for n in range(1, _HIGHEST + 1) if long else ():
         rows = [np.column_stack([past(y, n), past(u, n)])[_HIGHEST - n :] for u, y in long]

@@ -8,7 +8,7 @@ Before a record the inputs count as what they are at its beginning.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -98,7 +98,7 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
         wide: dict[int, list[tuple[int, int] | None]] = {1: [short, (most, most)], 2: [short, None]}
         denominators = [np.ones(1), *(one.F for one in list(found.values())[-1:])]
         tried = [
-            _settled(parts, n, begin, way, F, least, line)
+            Regressed(parts, n, line).settled(begin, way, F, least)
             for F in denominators
             for way in wide.get(n, [None])
         ]
@@ -107,116 +107,155 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
     return Sweep(found, most, longest)
 
 
-def _settled(
-    parts: Parts,
-    n: int,
-    delays: tuple[int, ...],
-    way: tuple[int, int] | None,
-    F: Array,
-    least: int,
-    line: bool,
-) -> Regression:
-    """Return a model of order n: its delays from a wide range first, then from the next ones.
+@dataclass(frozen=True)
+class Regressed:
+    """Regressions of order n of one output.
 
-    Args:
-        way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
+    Attributes:
+        parts: records u (n, r), y (n, 1).
+        line: whether the output drifts along one line through all records.
     """
-    for _ in range(_WIDE if way else 0):
-        most, skipped = way or (0, 0)
+
+    parts: Parts
+    n: int
+    line: bool = False
+
+    def settled(
+        self, delays: tuple[int, ...], way: tuple[int, int] | None, F: Array, least: int
+    ) -> Regression:
+        """Return a model, its delays from a wide range first, then from the next ones.
+
+        Args:
+            way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
+            F: where the search begins.
+            least: the shortest delay.
+        """
+        for _ in range(_WIDE if way else 0):
+            most, skipped = way or (0, 0)
+            for j in range(len(delays)):
+                delays = self._best_delay(F, delays, j, (least, max(most, least + 1)), skipped)
+            F = self._denominator(F, delays)
+        best = self.output_error(delays, F)
         for j in range(len(delays)):
-            delays = _best_delay(parts, F, delays, n, j, (least, max(most, least + 1)), line, skipped)
-        F = _denominator(parts, F, n, delays, line)
-    best = output_error(parts, n, delays, line=line, F=F)
-    for j in range(len(delays)):
-        for step in (1, -1):
-            at, misses, tried = best.delays[j] + step, 0, 0
-            while least <= at and misses < 2 and tried < _BESIDE:
-                other = (*best.delays[:j], at, *best.delays[j + 1 :])
-                new = output_error(parts, n, other, line=line, F=best.F, rounds=_POLISH)
-                misses, tried = (0 if new.loss < best.loss else misses + 1), tried + 1
-                best = min(best, new, key=lambda one: one.loss)
-                at += step
-    return best
+            for step in (1, -1):
+                at, misses, tried = best.delays[j] + step, 0, 0
+                while least <= at and misses < 2 and tried < _BESIDE:
+                    other = (*best.delays[:j], at, *best.delays[j + 1 :])
+                    new = self.output_error(other, best.F, _POLISH)
+                    misses, tried = (0 if new.loss < best.loss else misses + 1), tried + 1
+                    best = min(best, new, key=lambda one: one.loss)
+                    at += step
+        return best
 
+    def output_error(
+        self, delays: Sequence[int], F: Array | None = None, rounds: int = _ROUNDS
+    ) -> Regression:
+        """Return the model with given delays, the search begun from F (one: an ARX model)."""
+        F = np.ones(1) if F is None else F
+        best = self._at(F, delays)
+        for _ in range(rounds):
+            F = self._denominator(F, delays)
+            new = self._at(F, delays)
+            if new.loss < best.loss * (1.0 - 1e-6) or best.order != self.n:
+                best = new
+            elif not new.loss < 1.5 * best.loss:
+                break
+        return best
 
-def output_error(
-    parts: Parts,
-    n: int,
-    delays: Sequence[int],
-    *,
-    line: bool = False,
-    F: Array | None = None,
-    rounds: int = _ROUNDS,
-) -> Regression:
-    """Return the model of order n with given delays, the search begun from F (one: an ARX model)."""
-    F = np.ones(1) if F is None else F
-    best = _at(parts, F, n, delays, line)
-    for _ in range(rounds):
-        F = _denominator(parts, F, n, delays, line)
-        new = _at(parts, F, n, delays, line)
-        if new.loss < best.loss * (1.0 - 1e-6) or best.order != n:
-            best = new
-        elif not new.loss < 1.5 * best.loss:
-            break
-    return best
+    def errors(self, model: Regression) -> list[Array]:
+        """Return the output errors (n,) of every record, level, drift and start projected out."""
+        near = self._near(model.delays)
+        solution, _ = _solved(self._products(model.F, near, through=False))
+        blocks = self._blocks(model.F, near, through=False)
+        return [block[:, -1] - block[:, :-1] @ solution for block in blocks]
 
+    def _near(self, delays: Sequence[int]) -> list[tuple[int, int]]:
+        """Return the lags of B behind a dead time of any size."""
+        return [(delay, delay + self.n + 1) for delay in delays]
 
-def _blocks(
-    parts: Parts,
-    F: Array,
-    n: int,
-    ranges: Sequence[tuple[int, int]],
-    line: bool,
-    *,
-    through: bool,
-    skipped: int = 0,
-) -> Iterator[Array]:
-    """Yield of every record the columns and the target (n, m + 1), its own unknowns projected out.
+    def _blocks(
+        self, F: Array, ranges: Sequence[tuple[int, int]], *, through: bool, skipped: int = 0
+    ) -> Iterator[Array]:
+        """Yield of every record the columns and the target (n, m + 1), its own unknowns projected out.
 
-    Args:
-        ranges: of each input the first lag, and the one after the last.
-        through: whether lags of y stand among the columns, all signals through 1/F; else y is as it is.
-        skipped: samples of each record that are left out.
-    """
-    total, begin = sum(len(y) for _, y in parts), 0
-    for u, y in parts:
-        samples = len(y)
-        drift = (begin + np.arange(samples)) / total - 0.5
-        begin += samples
-        raw = np.stack(
-            [y[:, 0] - y[:, 0].mean(), drift, np.ones(samples), np.eye(1, samples)[0], *(u - u[0]).T]
-        )
-        smooth, sloped, held, impulse, *inputs = filtered([1.0], F, raw)
-        arrived = held
-        if not through:
-            smooth, sloped, held = raw[:3]
-        columns = [-lagged(smooth, lag) for lag in range(1, n + 1)] if through else []
-        columns += [sloped] if line else []
-        for x, (low, high) in zip(inputs, ranges, strict=True):
-            columns += [lagged(x, lag) for lag in range(low, high)]
-        own = [held, *(lagged(impulse, lag) for lag in range(n))]
-        # Before a long delay acts what held before the record, which may differ from its first value.
-        late = (low for low, high in ranges if samples // _LONG < low < samples and high - low <= n + 2)
-        own += [lagged(arrived, low) for low in late]
-        unknown, _ = np.linalg.qr(np.stack(own, axis=1)[skipped:])
-        both = np.column_stack([*columns, smooth])[skipped:]
-        yield both - unknown @ (unknown.T @ both)
+        Args:
+            ranges: of each input the first lag, and the one after the last.
+            through: whether lags of y stand among the columns, all signals through 1/F; else y is as it is.
+            skipped: samples of each record that are left out.
+        """
+        total, begin, n = sum(len(y) for _, y in self.parts), 0, self.n
+        for u, y in self.parts:
+            samples = len(y)
+            drift = (begin + np.arange(samples)) / total - 0.5
+            begin += samples
+            raw = np.stack(
+                [y[:, 0] - y[:, 0].mean(), drift, np.ones(samples), np.eye(1, samples)[0], *(u - u[0]).T]
+            )
+            smooth, sloped, held, impulse, *inputs = filtered([1.0], F, raw)
+            arrived = held
+            if not through:
+                smooth, sloped, held = raw[:3]
+            columns = [-lagged(smooth, lag) for lag in range(1, n + 1)] if through else []
+            columns += [sloped] if self.line else []
+            for x, (low, high) in zip(inputs, ranges, strict=True):
+                columns += [lagged(x, lag) for lag in range(low, high)]
+            own = [held, *(lagged(impulse, lag) for lag in range(n))]
+            # Before a long delay acts what held before the record, which may differ from its first value.
+            late = (low for low, high in ranges if samples // _LONG < low < samples and high - low <= n + 2)
+            own += [lagged(arrived, low) for low in late]
+            unknown, _ = np.linalg.qr(np.stack(own, axis=1)[skipped:])
+            both = np.column_stack([*columns, smooth])[skipped:]
+            yield both - unknown @ (unknown.T @ both)
 
+    def _products(
+        self, F: Array, ranges: Sequence[tuple[int, int]], *, through: bool, skipped: int = 0
+    ) -> Array:
+        """Return the products (m + 1, m + 1) of columns and target, of all records."""
+        with np.errstate(all="ignore"):
+            blocks = self._blocks(F, ranges, through=through, skipped=skipped)
+            return np.asarray(sum(block.T @ block for block in blocks))
 
-def _products(
-    parts: Parts,
-    F: Array,
-    n: int,
-    ranges: Sequence[tuple[int, int]],
-    line: bool,
-    *,
-    through: bool,
-    skipped: int = 0,
-) -> Array:
-    """Return the products (m + 1, m + 1) of columns and target, of all records."""
-    with np.errstate(all="ignore"):
-        blocks = _blocks(parts, F, n, ranges, line, through=through, skipped=skipped)
-        return np.asarray(sum(block.T @ block for block in blocks))
+    def _denominator(self, F: Array, delays: Sequence[int]) -> Array:
+        """Return the next F, mirrored into the circle."""
+        solution, _ = _solved(self._products(F, self._near(delays), through=True))
+        usable = np.all(np.isfinite(solution))
+        return reflected(np.concatenate([[1.0], solution[: self.n]])) if usable else F
+
+    def _at(self, F: Array, delays: Sequence[int]) -> Regression:
+        """Return the model whose denominator is F: B, line, levels and starts by least squares."""
+        samples = sum(len(y) for _, y in self.parts)
+        solution, left = _solved(self._products(F, self._near(delays), through=False))
+        slope = float(solution[0]) / samples if self.line else 0.0
+        loss = left / samples if np.isfinite(left) else np.inf
+        B = solution[int(self.line) :].reshape(len(delays), self.n + 1)
+        return Regression(F, B, tuple(delays), loss, slope)
+
+    def _best_delay(
+        self, F: Array, delays: tuple[int, ...], j: int, reach: tuple[int, int], skipped: int
+    ) -> tuple[int, ...]:
+        """Return the delays with that of input j replaced by the best within reach: one factor for all."""
+        b, (low, high), ranges = self.n + 1, reach, self._near(delays)
+        ranges[j] = (low, high + b)
+        long = [part for part in self.parts if len(part[1]) > skipped + 4 * b]
+        if not long:
+            return delays
+        gram = replace(self, parts=long)._products(F, ranges, through=True, skipped=skipped)
+        if not np.all(np.isfinite(gram)):
+            return delays
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        gram = gram / np.outer(scale, scale)
+        begin = self.n + self.line + sum(last - first for first, last in ranges[:j])
+        wide = np.arange(begin, begin + high + b - low)
+        fixed = np.setdiff1d(np.arange(len(gram) - 1), wide)
+        rest = np.append(wide, len(gram) - 1)
+        across = gram[np.ix_(fixed, rest)]
+        known = gram[np.ix_(fixed, fixed)] + _RIDGE * np.eye(len(fixed))
+        left = gram[np.ix_(rest, rest)] - across.T @ np.linalg.solve(known, across)
+        at = np.arange(len(wide) - b + 1)[:, None] + np.arange(b)
+        squares = left[at[:, :, None], at[:, None, :]] + _RIDGE * np.eye(b)
+        moments = left[at, -1]
+        gains = np.sum(moments * np.linalg.solve(squares, moments[:, :, None])[:, :, 0], axis=1)
+        return (*delays[:j], low + int(np.argmax(gains)), *delays[j + 1 :])
 
 
 def _solved(gram: Array) -> tuple[Array, float]:
@@ -231,69 +270,6 @@ def _solved(gram: Array) -> tuple[Array, float]:
     return solution, max(float(left), 0.0)
 
 
-def _near(n: int, delays: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the lags of B of a plant of order n behind a dead time of any size."""
-    return [(delay, delay + n + 1) for delay in delays]
-
-
-def _denominator(parts: Parts, F: Array, n: int, delays: Sequence[int], line: bool) -> Array:
-    """Return the next F, mirrored into the circle."""
-    solution, _ = _solved(_products(parts, F, n, _near(n, delays), line, through=True))
-    return reflected(np.concatenate([[1.0], solution[:n]])) if np.all(np.isfinite(solution)) else F
-
-
-def _at(parts: Parts, F: Array, n: int, delays: Sequence[int], line: bool) -> Regression:
-    """Return the model whose denominator is F: B, line, levels and starts by least squares."""
-    samples = sum(len(y) for _, y in parts)
-    solution, left = _solved(_products(parts, F, n, _near(n, delays), line, through=False))
-    slope = float(solution[0]) / samples if line else 0.0
-    loss = left / samples if np.isfinite(left) else np.inf
-    return Regression(F, solution[int(line) :].reshape(len(delays), n + 1), tuple(delays), loss, slope)
-
-
-def output_errors(parts: Parts, model: Regression, *, line: bool = False) -> list[Array]:
-    """Return the output errors (n,) of every record, level, drift and start projected out."""
-    n, near = model.order, _near(model.order, model.delays)
-    solution, _ = _solved(_products(parts, model.F, n, near, line, through=False))
-    blocks = _blocks(parts, model.F, n, near, line, through=False)
-    return [block[:, -1] - block[:, :-1] @ solution for block in blocks]
-
-
-def _best_delay(
-    parts: Parts,
-    F: Array,
-    delays: tuple[int, ...],
-    n: int,
-    j: int,
-    reach: tuple[int, int],
-    line: bool,
-    skipped: int,
-) -> tuple[int, ...]:
-    """Return the delays with that of input j replaced by the best within reach: one factor for all."""
-    b, (low, high), ranges = n + 1, reach, _near(n, delays)
-    ranges[j] = (low, high + b)
-    long = [part for part in parts if len(part[1]) > skipped + 4 * b]
-    if not long:
-        return delays
-    gram = _products(long, F, n, ranges, line, through=True, skipped=skipped)
-    if not np.all(np.isfinite(gram)):
-        return delays
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    gram = gram / np.outer(scale, scale)
-    begin = n + line + sum(last - first for first, last in ranges[:j])
-    wide = np.arange(begin, begin + high + b - low)
-    fixed = np.setdiff1d(np.arange(len(gram) - 1), wide)
-    rest = np.append(wide, len(gram) - 1)
-    across = gram[np.ix_(fixed, rest)]
-    known = gram[np.ix_(fixed, fixed)] + _RIDGE * np.eye(len(fixed))
-    left = gram[np.ix_(rest, rest)] - across.T @ np.linalg.solve(known, across)
-    at = np.arange(len(wide) - b + 1)[:, None] + np.arange(b)
-    squares = left[at[:, :, None], at[:, None, :]] + _RIDGE * np.eye(b)
-    moments = left[at, -1]
-    gains = np.sum(moments * np.linalg.solve(squares, moments[:, :, None])[:, :, 0], axis=1)
-    return (*delays[:j], low + int(np.argmax(gains)), *delays[j + 1 :])
-
-
 def delay_ranges(parts: Parts, model: Regression, *, least: int, most: int) -> tuple[tuple[int, int], ...]:
     """Return the delays of each input that the likelihood ratio leaves at 95 % confidence."""
     samples = sum(len(y) for _, y in parts)
@@ -302,7 +278,7 @@ def delay_ranges(parts: Parts, model: Regression, *, least: int, most: int) -> t
         losses = {}
         for delay in range(max(chosen - _BESIDE, least), min(chosen + _BESIDE, most) + 1):
             delays = (*model.delays[:j], delay, *model.delays[j + 1 :])
-            losses[delay] = output_error(parts, model.order, delays, F=model.F, rounds=_POLISH).loss
+            losses[delay] = Regressed(parts, model.order).output_error(delays, model.F, _POLISH).loss
         smallest = max(min(losses.values(), default=1.0), 1e-300)
         kept = [d for d, loss in losses.items() if samples * np.log(loss / smallest) <= limit]
         found.append((min(*kept, chosen), max(*kept, chosen)))

@@ -1,4 +1,4 @@
-"""What speaks for or against data, a model or a design: one kind of finding in one file.
+"""What speaks for or against data, a model or a design: a file holds the kinds of one cause.
 
 A file says when its finding holds and what its sentence is. It is found by its place: nothing else lists it.
 """

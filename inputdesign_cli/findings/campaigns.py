@@ -69,8 +69,7 @@ CAMPAIGN_REFUTED = refuted(
     "campaign-refuted",
     "The campaign ends because the data refute the model. Tests of the residuals after every part refute "
     "its structure. More samples of the same experiment would not mend that.",
-    "Look for another structure with `idesign explore` and begin another campaign with it. To go on with "
-    "this structure, use `idesign next DIR --regardless`.",
+    "Look for another structure with `idesign explore`, or use `idesign next DIR --regardless`.",
 )
 PART_WITHOUT_DESIGN = note(
     "part-without-design",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.finding import Finding, doubt, note, unsure
-from inputdesign_cli.findings.remedies import quantities
+from inputdesign_cli.findings.refuted_structure import quantities
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.outcome.model_words import blocks_of, predictor_of
@@ -41,9 +41,8 @@ START = note(
 )
 ON_CIRCLE = doubt(
     "noise-on-the-circle",
-    "A polynomial of the noise has a root on the unit circle. As far as these samples show, it is one of C, "
-    "D or F. The covariance is not to be trusted there, and a design would count on noise that vanishes or "
-    "never fades.",
+    "A polynomial of the noise has a root on the unit circle. The covariance is not to be trusted there, and "
+    "a design would count on noise that vanishes or never fades.",
     "Take more data, or a lower order.",
 )
 NEAR_ZERO = note(

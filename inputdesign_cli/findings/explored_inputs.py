@@ -22,8 +22,6 @@ DRIVE = "move the reference of the loop, or add dither to the input, and record 
 _FOLLOWS = 0.02
 # A parameter is not determined at all where it deviates by more than this share of its value.
 _OPEN = 100.0
-# The static gain is as good as none below this share of the largest one.
-_NO_GAIN, _FALLS = 0.05, 0.6
 
 UNDRIVEN = doubt(
     "input-only-answers",
@@ -34,8 +32,7 @@ UNDRIVEN = doubt(
 INVERSE = doubt(
     "like-inverse-controller",
     "The model may be the inverse of a controller. The output answers in the same sample, and nobody seems "
-    "to have set the input without a look at the output. In a loop -1/C explains such data ([ljung-1999], "
-    "Section 13.4).",
+    "to have set the input. In a loop -1/C explains such data ([ljung-1999], Section 13.4).",
     "Move the reference of the loop, or add dither to the input.",
 )
 TOO_SIMPLE = doubt(
@@ -69,62 +66,50 @@ def doubtful_inputs(found: Found, parts: Parts, *, loop: bool) -> list[Finding]:
 
 def undriven(parts: Parts) -> list[Finding]:
     """Return a finding for each input that only answers the outputs."""
-    inputs = parts[0][0].shape[1]
-    return [
-        UNDRIVEN.found(
-            f"{signal_name('u', j, inputs)} follows from the outputs and its own past: data from a loop "
-            "without excitation, from which a plant is not identifiable (the inverse of the controller "
-            f"explains them as well): {DRIVE}",
-            where=signal_name("u", j, inputs),
+    found = []
+    for j in only_answers(parts):
+        name = signal_name("u", j, parts[0][0].shape[1])
+        message = (
+            f"{name} follows from the outputs and its own past: data from a loop without excitation, from "
+            "which a plant is not identifiable (the inverse of the controller explains them as well): "
         )
-        for j in only_answers(parts)
-    ]
+        found.append(UNDRIVEN.found(f"{message}{DRIVE}", where=name))
+    return found
 
 
 def _inverses(found: Found, moving: Parts) -> Iterator[Finding]:
-    single = found.model.inputs == found.model.outputs == 1
     for i, candidate in enumerate(found.taken):
         for k, j in enumerate(found.moving):
-            if candidate.orders.delays[k]:
-                continue
-            G = np.abs(found.model.plant_at(np.linspace(1e-6, np.pi, 100))[:, i, j])
-            highest = np.maximum.accumulate(G)
-            integrates = single and G[0] <= _NO_GAIN * highest[-1] and np.all(_FALLS * highest <= G)
-            if integrates or like_answers(moving, i, k):
-                y, u = signal_name("y", i, found.model.outputs), signal_name("u", j, found.model.inputs)
-                yield INVERSE.found(
-                    f"{y} answers {u} in the same sample, as the inverse of a controller does (-1/C): if "
-                    f"{u} was made from {y}, as in a loop, this is no model of the plant: {DRIVE}",
-                    where=y,
-                )
+            y, u = signal_name("y", i, found.model.outputs), signal_name("u", j, found.model.inputs)
+            message = (
+                f"{y} answers {u} in the same sample, as the inverse of a controller does (-1/C): if {u} "
+                f"was made from {y}, as in a loop, this is no model of the plant: {DRIVE}"
+            )
+            if not candidate.orders.delays[k] and like_answers(moving, i, k):
+                yield INVERSE.found(message, where=y)
 
 
 def _too_simple(found: Found, moving: Parts) -> Iterator[Finding]:
     needed = max(candidate.orders.unknowns for candidate in found.taken)
     order = order_of_excitation(moving)
     if order < needed:
-        alone = min(
-            order_of_excitation([(u[:, [j]], y) for u, y in moving]) for j in range(len(found.moving))
+        single = [[(u[:, [j]], y) for u, y in moving] for j in range(len(found.moving))]
+        together = min(map(order_of_excitation, single)) >= needed
+        message = (
+            f"{'the inputs move together' if together else 'the input moves too simply'}: persistently "
+            f"exciting of order {order}, and the model needs {needed}. Other models explain this record as "
+            "well; apply inputs that move more, and independently (idesign signal makes some)"
         )
-        why = "the inputs move together" if alone >= needed else "the input moves too simply"
-        yield TOO_SIMPLE.found(
-            f"{why}: persistently exciting of order {order}, and the model needs {needed}. Other models "
-            "explain this record as well; apply inputs that move more, and independently (idesign signal "
-            "makes some)",
-            order=order,
-            needed=needed,
-        )
+        yield TOO_SIMPLE.found(message, order=order, needed=needed)
         return
-    for j, left in zip(found.moving, left_of_inputs(moving), strict=True):
-        if left < _FOLLOWS:
-            yield TOO_SIMPLE.found(
-                f"u{j + 1} follows from the other inputs and their pasts but for {100.0 * left:.2g} % of "
-                "its power: models in which the inputs exchange their effects explain this record about as "
-                "well; move them one by one, or independently",
-                where=f"u{j + 1}",
-                left=left,
-            )
-            return
+    left, j = min(zip(left_of_inputs(moving), found.moving, strict=True))
+    message = (
+        f"u{j + 1} follows from the other inputs and their pasts but for {100.0 * left:.2g} % of its power: "
+        "models in which the inputs exchange their effects explain this record about as well; move them one "
+        "by one, or independently"
+    )
+    if left < _FOLLOWS:
+        yield TOO_SIMPLE.found(message, where=f"u{j + 1}", left=left)
 
 
 def _open(found: Found) -> list[Finding]:

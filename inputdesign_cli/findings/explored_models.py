@@ -30,7 +30,7 @@ UNJUDGED = doubt(
     "No data are left to judge the model by. An input moves in one stretch of the record only. That stretch "
     "estimates the model, so that nothing judges it.",
     "Judge it by another record (`idesign explore OTHER --validate model.yaml`), or let the inputs step "
-    "several times.",
+    "more.",
 )
 EXPLAINS_LITTLE = doubt(
     "simulation-explains-little",
@@ -46,9 +46,8 @@ UNRELATED = doubt(
 )
 UNEXPLAINED = doubt(
     "structure-unexplained",
-    "No structure that was tried explains an output. The simulation explains less than half of the output, "
-    "and tests of the residuals refute the model. The plant may be nonlinear, vary with time, or have "
-    "inputs that the log lacks.",
+    "No structure that was tried explains an output. The simulation explains less than half of it, and tests "
+    "refute the model. The plant may be nonlinear, vary with time, or have inputs that the log lacks.",
     "Record about one operating point, or log what else acts on the output.",
 )
 LIKE_INTEGRATOR = doubt(
@@ -56,12 +55,6 @@ LIKE_INTEGRATOR = doubt(
     "The plant may be an integrator. G rises towards low frequencies for as long as the record shows. "
     "Static gain and time constant follow from no such record, only the slope.",
     "Record until the output settles. If it never does, use `idesign explore DATA --structure integrator`.",
-)
-UNSTEADY = doubt(
-    "mode-hardly-decays",
-    "A mode hardly decays within the record. A mode of the plant loses less than a hundredth in the whole "
-    "record. It may be an integrator or drift.",
-    "Record in a loop or until the output settles, or remove the drift with `--detrend linear`.",
 )
 UNSTABLE = doubt(
     "plant-unstable",
@@ -227,7 +220,7 @@ def _rivalled(found: Found) -> list[Finding]:
 
 
 def _unsteady() -> Finding:
-    return UNSTEADY.found(
+    return LIKE_INTEGRATOR.found(
         "a mode of the plant loses less than a hundredth in the whole record: it may be an integrator, or "
         "drift. Record in a loop or until the output settles, or remove the drift: --detrend linear"
     )

@@ -33,9 +33,8 @@ MATTERS = doubt(
 )
 RESTS_ON_STRUCTURE = note(
     "verdict-rests-on-structure",
-    "The verdict rests on the structure. The data do not rule out one more parameter, or a gain that "
-    "changes evenly, which would move G by more than is admitted. With 95 % confidence it moves G by no "
-    "more than the message says.",
+    "The verdict rests on the structure. The data do not rule out one more parameter, or a gain that changes "
+    "evenly. It would move G by more than is admitted, and by what the message says at most (95 %).",
     "Excite the frequencies where G would move, if the structure is not known from physics.",
 )
 

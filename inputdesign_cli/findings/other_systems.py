@@ -26,8 +26,7 @@ PRIOR_LEFT_OUT = note(
     "prior-left-out",
     "The prior does not count. `experiment.prior` is information without the parameters that it belongs to. "
     "It cannot count for an estimate, nor for a verdict.",
-    "Write its parameters beside the matrix, name the `model.yaml` of the earlier data, or give their "
-    "records as further files.",
+    "Write its parameters beside the matrix, or name the `model.yaml` or the records of the earlier data.",
 )
 PRIOR_CONTRADICTED = refuted(
     "prior-contradicted",
@@ -159,6 +158,6 @@ def samples_repeated(paths: Sequence[Path], records: Sequence[Array]) -> list[Fi
             f"{count} of {len(ours)} samples of {path.name} stand in {other.name} as well. Counted twice, "
             "they make the estimate look more accurate than it is."
         )
-        of = {"samples": count, "of": len(ours), "other": other.name}
-        found += [SAMPLES_REPEATED.found(message, where=path.name, **of)] if share >= _PART else []
+        own = SAMPLES_REPEATED.found(message, where=path.name, samples=count, of=len(ours), other=other.name)
+        found += [own] if share >= _PART else []
     return found

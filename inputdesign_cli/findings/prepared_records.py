@@ -14,9 +14,8 @@ from inputdesign_cli.outcome.shares import per_cent
 
 TIMES_READ = note(
     "times-read",
-    "Times were made from what the file holds. A column of dates and one of times of day are joined. A time "
-    "of day that falls by more than half a day belongs to the next day. Milli-, micro- and nanoseconds "
-    "since 1970 are known by their size.",
+    "Times were made from what the file holds. Columns of dates and of times of day are joined. Times of day "
+    "that fall belong to the next day. Counts since 1970 are known by their size.",
     "Nothing, if that is right. Otherwise name the column of times: `--columns time=NAME`.",
 )
 TIMES_ASSUMED = note(
@@ -38,16 +37,14 @@ INPUTS_MOVE_BETWEEN = doubt(
 )
 COLUMNS_JOINED = note(
     "columns-joined",
-    "Columns were written at different times. The times of the output that was written most often count, or "
-    "all rows if it misses only some. Inputs are held until they are written again. If they move in "
-    "between, their means count. Other outputs are interpolated.",
+    "Columns were written at different times. The times of the output that was written most often count. "
+    "Inputs are held until written again, and their means count. Other outputs are interpolated.",
     "Log all channels in one row, if the logger can.",
 )
 RECORD_CUT = note(
     "record-cut",
-    "The record has segments. A segment ends at a step of time longer than 1.5 sample times and at a row "
-    "that is left out; without times, at a blank line. One model is estimated of all segments. Each has a "
-    "start and levels of its own. Segments of fewer than ten samples are left out.",
+    "The record has segments. One ends at a step longer than 1.5 sample times and at a row that is left out. "
+    "Each has a start and levels of its own. Segments of fewer than ten samples are left out.",
     "Nothing, if the gaps are known. Otherwise see why the logger lost samples.",
 )
 ROWS_LEFT_OUT = note(
@@ -58,8 +55,8 @@ ROWS_LEFT_OUT = note(
 )
 LINES_PASSED_OVER = note(
     "lines-passed-over",
-    "Lines between the rows hold no samples. With times, the times show whether samples are missing. "
-    "Without times a blank line, or a row that is commented out, cuts the record.",
+    "Lines between the rows hold no samples. Without times a blank line, or a row that is commented out, "
+    "cuts the record.",
     "Take the lines out of the file if no sample is missing there.",
 )
 COLUMNS_UNUSED = note(
@@ -173,15 +170,10 @@ def record_cut(
     yield RECORD_CUT.found(said, segments=count, gaps=len(gaps), samples_left_out=len(short))
 
 
-def lines_passed_over(what: str, lines: Sequence[int], *, cuts: bool, timed: bool) -> Finding:
-    """Say what lines between rows of numbers mean for the record: whether it is cut there, or has times."""
-    follows = "the rows before and after follow each other"
-    if cuts:
-        follows = "samples may be missing there, so the record is cut"
-    elif timed:
-        follows = "the times show whether samples are missing"
-    said = f"{listed(lines, 'line').capitalize()} between the numbers: {what}; {follows}."
-    return LINES_PASSED_OVER.found(said, lines=len(lines), cuts=cuts)
+def lines_passed_over(what: str, lines: Sequence[int]) -> Finding:
+    """Say that lines between rows of numbers cut a record without times."""
+    said = f"{listed(lines, 'line').capitalize()} between the numbers: {what}; samples may be missing there, "
+    return LINES_PASSED_OVER.found(f"{said}so the record is cut.", lines=len(lines))
 
 
 def columns_against_spec(

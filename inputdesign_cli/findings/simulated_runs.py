@@ -39,8 +39,7 @@ ONE_MINIMUM = note(
 UNSTABLE = doubt(
     "unstable-runs",
     "Controllers of some simulated runs make the loop unstable. Each run designs a controller on its "
-    "estimate. Where the true loop is unstable the loss is infinite. Means and deviations are of the other "
-    "runs.",
+    "estimate. Where the true loop is unstable the loss is infinite, and means are of the other runs.",
     "Take more samples or more power, or ask for a slower loop.",
 )
 

@@ -23,8 +23,7 @@ ANSWERING = refuted(
     "input-answers-output",
     "An input answers the outputs. Prediction errors help to predict an input. In open loop no input "
     "answers the noise.",
-    "See whether the input was logged late or columns are swapped. If the data come from a loop, state it "
-    "as `experiment.controller`.",
+    "Mend columns that are late or swapped, or state a loop as `experiment.controller`.",
 )
 LATE = refuted(
     "input-logged-late",

@@ -127,7 +127,8 @@ class Validation:
 class Structure:
     """A structure that was tried: its orders and delays, and how it fits.
 
-    `certain` is whether no parameter of the plant deviates by more than half its value.
+    `failed` are the tests of its residuals that fail. `certain` is whether no parameter of the plant deviates
+    by more than half its value.
     """
 
     family: str
@@ -135,6 +136,7 @@ class Structure:
     delay: tuple[int, ...]
     parameters: int
     criterion: float
+    failed: tuple[str, ...]
     converged: bool
     certain: bool
     estimation_fit_percent: float | None = field(default=None, metadata=NULL)

@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.records.cells import is_number, written_out
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.sheet import Sheet, unreadable
-from inputdesign_cli.records.text import sheet_of
+from inputdesign_cli.records.text import is_number, sheet_of, written_out
 
 MOST_UNPACKED = 2**30
 _MOST_DENSE = 10_000_000
 _NUMPY = "write it with numpy.savez(file, u=.., y=..)"
 _MATLAB = (
-    "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  "
-    "then: save('data.mat', '-struct', 's', '-v7')"
+    "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  then: "
+    "save('data.mat', '-struct', 's', '-v7')"
 )
 # The fields of a saved iddata, and how its columns are called here.
 _IDDATA = {"InputData": "u", "OutputData": "y", "SamplingInstants": "time"}
@@ -34,26 +33,34 @@ _PLAIN, _ARRAY, _COMPRESSED = {*range(1, 8), 9, 12, 13, 16, 17, 18}, 14, 15
 _DEEPEST = 30
 
 
+def check_unpacked(path: Path, key: str, raw: bytes) -> None:
+    """Raise `DataError` (`data-unreadable`) for an archive that unpacks to too much."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except Exception:  # its reader says what is wrong with a broken one
+        return
+    if size > MOST_UNPACKED:
+        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
+
+
 def read_npz(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
     """Return the arrays of an .npz file by their names, or only the one that is `named`.
 
     Raises:
         DataError: `data-unreadable`.
     """
+    check_unpacked(path, key, raw)
+    arrays: dict[str, Any] = {}
     try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            large = sum(entry.file_size for entry in archive.infolist()) > MOST_UNPACKED
-        arrays: dict[str, Any] = {}
         with np.load(io.BytesIO(raw), allow_pickle=False) as found:
-            for name in [] if large else found.files:
+            for name in found.files:
                 try:
                     arrays[name] = found[name]
                 except ValueError:  # objects of Python are never unpickled
                     arrays[name] = np.array([None])
     except Exception:  # a broken archive makes its reader raise anything
         raise unreadable(path, key, "is no .npz file of numbers", _NUMPY) from None
-    if large:
-        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
     return _sheet(path, key, arrays, named, given, _NUMPY)
 
 

@@ -43,14 +43,20 @@ _SHORT = re.compile(
     r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
 )
 _MOSTLY = 0.9
-# Words that say, or make it likely, that a column holds the input, the output or the reference. They are
-# proposed, and never taken unasked.
-_WORDS = {
-    "u": "u input op mv co out heater heating valve pump fan motor actuator duty command cmd drive steam",
-    "y": "y output pv meas measured cv temperature temp level flow pressure speed position sensor response",
-    "r": "sp setpoint ref reference w",
-}
-_ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
+# Words that make it likely that a column holds the input, the output or the reference: first those of control
+# systems, which decide. They are proposed, and never taken unasked.
+_WORDS: tuple[dict[str, str], ...] = (
+    {
+        "u": "op mv co out cmd command u input",
+        "y": "pv meas measured y output",
+        "r": "sp sv setpoint ref r w",
+    },
+    {
+        "u": "heater heating valve pump fan motor actuator duty drive steam",
+        "y": "cv temperature temp level flow pressure speed position sensor response",
+        "r": "reference",
+    },
+)
 
 
 def named_columns(sheet: Sheet, start: str) -> list[int]:
@@ -73,31 +79,25 @@ def time_columns(sheet: Sheet) -> list[str]:
     If no name is one of times, columns that are called as clocks are and rise, or hold dates or times of day.
     At last columns whose dates cannot be read: to do without them would be to guess.
     """
-    header = sheet.header
-    called = [
-        (header[i] if i < len(header) and header[i] else str(i + 1), column)
-        for i, column in enumerate(sheet.columns)
-    ]
-    found = [
-        name
-        for name, column in called
-        if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly(column.numbers, rises=True))
-    ]
-    if found:
-        return found
-    clocks = [
-        (name, column)
-        for name, column in called
-        if _mostly(column.numbers, rises=not column.dated) and (column.dated or _CLOCK.fullmatch(name))
-    ] or [(name, column) for name, column in called if column.undated]
-    # Dates and times of day that were joined are the same column.
-    once = [name for i, (name, column) in enumerate(clocks) if column is not clocks[i - 1][1] or i == 0]
-    dates = [name for name in once if name.startswith("dat")]
-    return dates if dates or (len(once) > 1 and clocks[0][1].fault is None) else once
+    header, columns = sheet.header, sheet.columns
+    called = [(header[i] if i < len(header) and header[i] else str(i + 1)) for i in range(len(columns))]
+    rises = [_mostly(column.numbers, rises=True) for column in columns]
+    changing = [column.dated and _mostly(column.numbers, rises=False) for column in columns]
+    every = list(zip(called, columns, rises, changing, strict=True))
+    for found in (
+        [(n, c) for n, c, up, _ in every if _TIME.fullmatch(n) or (up and _SHORT.fullmatch(n))],
+        [(n, c) for n, c, up, dated in every if dated or (up and not c.dated and _CLOCK.fullmatch(n))],
+        [(n, c) for n, c, _, _ in every if c.undated],
+    ):
+        if found:
+            # Dates and times of day that were joined are the same column.
+            once = [n for i, (n, c) in enumerate(found) if c is not found[i - 1][1] or i == 0]
+            return [name for name in once if name.startswith("dat")] or once
+    return []
 
 
 def _mostly(x: Array, *, rises: bool) -> bool:
-    """Whether numbers rise from row to row, or at least change."""
+    """Return whether numbers rise from row to row, or at least change."""
     steps = np.diff(x[~np.isnan(x)])
     return bool(np.mean(steps > 0.0 if rises else steps != 0.0) > _MOSTLY) if steps.size else False
 
@@ -107,15 +107,14 @@ def is_called_time(name: str) -> bool:
     return any(pattern.fullmatch(name.lower()) for pattern in (_TIME, _CLOCK, _SHORT))
 
 
-def time_unit_of(name: str) -> str | None:
-    """Return the unit in the name of a column of times: `time_ms`, `Time (sec)`."""
+def time_unit_in(sheet: Sheet, name: str, *, dated: bool) -> str | None:
+    """Return the unit of times that a file states: by its column (`time_ms`, `Time (sec)`) or elsewhere.
+
+    Dates are counted in seconds.
+    """
     words = re.findall(r"[a-z]+", name.lower())
-    return _UNITS.get(words[-1]) if len(words) > 1 else None
-
-
-def plain_time_unit(unit: str | None) -> str | None:
-    """Return our spelling of a unit of time; None if it is none."""
-    return None if unit is None else _UNITS.get(unit.strip().lower())
+    own = _UNITS.get(words[-1]) if len(words) > 1 else None
+    return "s" if dated else own or _UNITS.get((sheet.time_unit or "").strip().lower())
 
 
 def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
@@ -143,16 +142,17 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
             raise sheet.error("data-missing-column", message, hint)
         if column.fault is not None:
             row, text = column.fault
-            message = f"{repr(text) if sheet.shown else 'a value'} in column {wanted[role]} {column.wrong}"
+            message = f"{text!r} in column {wanted[role]} {column.wrong}"
             raise sheet.error("data-not-a-number", message, column.hint, row)
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
 
 def _unclear(sheet: Sheet, what: str, missing: Sequence[str], wanted: Mapping[str, str]) -> DataError:
-    """The error about roles of which there is no column, or several."""
+    """Return the error about roles of which there is no column, or several."""
     starts = [wanted[role] for role in missing]
     names = [
-        wanted[role] if role.startswith(wanted[role]) else f"{wanted[role]} ({role})" for role in missing
+        start if role.startswith(start) else f"{start} ({role})"
+        for role, start in zip(missing, starts, strict=True)
     ]
     message = f"{sheet.path.name} has {what} for {', '.join(names)} ({_contents(sheet)})"
     if starts == ["frequency"]:
@@ -165,12 +165,9 @@ def _unclear(sheet: Sheet, what: str, missing: Sequence[str], wanted: Mapping[st
 
 
 def _contents(sheet: Sheet) -> str:
-    """The header of a file for messages, if it may be shown."""
-    count = f"{len(sheet.columns)} columns"
-    if not sheet.shown:
-        return count
+    """Return the header of a file for messages."""
     header = f"its header is: {', '.join(map(str.strip, sheet.names))}" if sheet.names else "it has no header"
-    return f"{header}; {count}"
+    return f"{header}; {len(sheet.columns)} columns"
 
 
 def column_named(sheet: Sheet, name: str) -> Column:
@@ -192,9 +189,9 @@ def channel_columns(letter: str, count: int, sheet: Sheet, columns: Mapping[str,
         for start in (letter, f"{letter}1")
     )
     if plain and numbered:
-        shown = f": {', '.join([*plain, *numbered])}" if sheet.shown else ""
-        message = f"{sheet.path.name} has several columns that may be {letter}1{shown}"
-        hint = f"say which one counts: --columns {letter}1={plain[0] if sheet.shown else 'NAME'}"
+        listed = ", ".join([*plain, *numbered])
+        message = f"{sheet.path.name} has several columns that may be {letter}1: {listed}"
+        hint = f"say which one counts: --columns {letter}1={plain[0]}"
         raise sheet.error("data-missing-column", message, hint)
     begun = any(header.startswith(f"{letter}1") for header in sheet.header)
     return {f"{letter}1": f"{letter}1" if begun else letter}
@@ -211,10 +208,9 @@ def time_column(sheet: Sheet, columns: Mapping[str, str]) -> str:
     claimed = {column.strip().lower() for column in columns.values()}
     timed = [name for name in time_columns(sheet) if name not in claimed]
     if len(timed) > 1:
-        shown = f": {', '.join(timed)}" if sheet.shown else ""
         which = timed[0] if timed.count(timed[0]) == 1 else str(sheet.header.index(timed[0]) + 1)
-        hint = f"say which one counts: --columns time={which if sheet.shown else 'NAME'}"
-        message = f"{sheet.path.name} has several columns of times{shown}"
+        message = f"{sheet.path.name} has several columns of times: {', '.join(timed)}"
+        hint = f"say which one counts: --columns time={which}"
         raise sheet.error("data-missing-column", message, hint)
     return timed[0] if timed else ""
 
@@ -237,11 +233,11 @@ def reference_columns(
         DataError: `data-missing-column`, only some are named.
     """
     channels = [f"r{i + 1}" for i in range(inputs)]
-    named = [name for name in channels if name in columns]
     found = {name: columns.get(name, name) for name in channels if name in columns or name in sheet.header}
     if inputs == 1 and not found and "r" in sheet.header:
         found = {"r1": "r"}
-    if len(found) < inputs and named:
+    named = [name for name in channels if name in columns]
+    if named and len(found) < inputs:
         missing = next(name for name in channels if name not in found)
         message = f"--columns names {', '.join(named)}, and {sheet.path.name} has no column for {missing}"
         hint = f"name the reference of every input, or none: --columns {missing}=NAME"
@@ -279,7 +275,7 @@ def with_headers(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
     for channel, column in columns.items():
         unread = channel == "time" and without_times(sheet, columns)
         at = [] if unread else named_columns(sheet, column.strip().lower())
-        name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names and sheet.shown else ""
+        name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names else ""
         whole[channel] = name if sheet.header.count(name.lower()) == 1 else column
     return whole
 
@@ -296,9 +292,8 @@ def count_of(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
     what = "input" if letter == "u" else "output"
     message = f"which column of {sheet.path.name} is the {what}? ({_contents(sheet)})"
     if named:
-        message = (
-            f"the {what}s are {', '.join(sorted(named))}, but they are numbered {letter}1, {letter}2, .."
-        )
+        listed = ", ".join(sorted(named))
+        message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
     first = [f"{x}{i + 1}" for x in "uy" for i in range(max(sum(name[0] == x for name in columns), 1))]
     kept = {channel: name for channel, name in columns.items() if channel in ("time", *first)}
     option = columns_option(sheet, kept, [channel for channel in first if channel not in columns])
@@ -314,22 +309,21 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
     timed = time_columns(sheet)
     times = [i for i, name in enumerate(sheet.header) if name in timed] or rising(sheet)
     times = [] if "time" in named else [i for i in times if i not in taken][:1]
-    free = [
-        i
+    roles = {
+        i: _role(sheet.name_of(i))
         for i, column in enumerate(sheet.columns)
         if i not in (*taken, *times) and column.fault is None and not np.isnan(column.numbers).all()
-    ]
-    roles = [_role(sheet.name_of(i)) if sheet.shown else "" for i in range(len(sheet.columns))]
+    }
     found = {"time": called(sheet, times[0])} if times else {}
     found |= {channel: name for channel, name in named.items() if channel[0] in "uyt"}
     left = sorted(set(wanted) - found.keys() - {"time"})
     for surely in (True, False):
         for channel in (one for one in left if one not in found):
-            fit = [i for i in free if sheet.shown and (not surely or roles[i] == channel[0])]
+            fit = [i for i, role in roles.items() if role == channel[0] or not surely]
             if fit:
-                best = min(fit, key=lambda i: roles[i] != "" and not surely)
+                best = min(fit, key=lambda i: roles[i] != "")
                 found[channel] = called(sheet, best)
-                free.remove(best)
+                del roles[best]
     found |= {channel: "NAME" for channel in left if channel not in found}
     in_order = sorted(found, key=lambda channel: (channel != "time", channel))
     return f'--columns "{",".join(f"{channel}={found[channel]}" for channel in in_order)}"'
@@ -337,14 +331,17 @@ def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]
 
 def _role(name: str) -> str:
     """Return `u`, `y` or `r` (a reference) where the words of a name agree, as in `FIC101.OP`."""
-    words = re.split(r"[\W_\d]+", name_and_unit(name)[0].lower())
-    found = {_ROLES[word] for word in words if word in _ROLES}
-    return found.pop() if len(found) == 1 else ""
+    words = set(re.split(r"[\W_\d]+", name_and_unit(name)[0].lower()))
+    for roles in _WORDS:
+        found = [role for role, own in roles.items() if words & set(own.split())]
+        if found:
+            return found[0] if len(found) == 1 else ""
+    return ""
 
 
 def called(sheet: Sheet, at: int) -> str:
     """Return how an option calls a column: by a name that names no other one, else by its number."""
-    name = sheet.names[at].strip() if at < len(sheet.names) and sheet.shown else ""
+    name = sheet.names[at].strip() if at < len(sheet.names) else ""
     plain = bool(name) and not _SEPARATORS & set(name) and named_columns(sheet, name.lower()) == [at]
     return name if plain else str(at + 1)
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +18,44 @@ _DAYS = (
     *("%Y/%m/%d", "%Y.%m.%d", "%d-%b-%Y", "%d %b %Y"),
 )
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
-_FORMS = (*_CLOCKS, *(f"{day} {clock}".strip() for day in _DAYS for clock in ("", *_CLOCKS)))
-_ISO = re.compile(r"\d{4}-\d\d-\d\d([T ]\d\d(:?\d\d(:?\d\d(\.\d{1,9})?)?)?)?\s*(Z|[+-]\d\d:?\d\d)?")
+_PARTS = {
+    "%d": r"\d\d?",
+    "%m": r"\d\d?",
+    "%Y": r"\d{4}",
+    "%y": r"\d\d",
+    "%b": r"[A-Za-z]{3}",
+    "%H": r"\d\d?",
+    "%I": r"\d\d?",
+    "%M": r"\d\d",
+    "%S": r"\d\d",
+    "%f": r"\d{1,9}",
+    "%p": "[AaPp][Mm]",
+    ".": r"\.",
+}
+_ISO_FORM, _ISO = "ISO8601", r"\d{4}-\d\d-\d\d([T ]\d\d(:?\d\d(:?\d\d(\.\d{1,9})?)?)?)?\s*(Z|[+-]\d\d:?\d\d)?"
+_FORMS = {
+    _ISO_FORM: re.compile(_ISO),
+    **{
+        form: re.compile(re.sub(r"%\w|\.", lambda part: _PARTS[part[0]], form))
+        for form in (*_CLOCKS, *(f"{day} {clock}".strip() for day in _DAYS for clock in ("", *_CLOCKS)))
+    },
+}
+_ANY = re.compile("|".join(f"({pattern.pattern})" for pattern in _FORMS.values()))
 _ZONE = re.compile(r"\d\s*(Z|[+-]\d\d:?\d\d)$")
-_ISO_FORM = "ISO8601"
-_MINUTES, _SECONDS, _PARTS = map(re.compile, (r"(\d:\d\d)$", r"(:\d\d:\d\d)(?![.\d])", r":\d\d\.\d+"))
+_MINUTES, _SECONDS, _FRACTION = map(re.compile, (r"(\d:\d\d)$", r"(:\d\d:\d\d)(?![.\d])", r":\d\d\.\d+"))
 _COMMA = re.compile(r"(:\d\d),(\d+)$")
-_BEGIN = re.compile(r"\d{1,4}([/-]\d|\.\d{1,2}\.|[- ]\w{3}[- ]|:\d\d)")
 # What dates and times of any language and order have in them.
-_CLOCK = re.compile(r"\d:\d\d")
-_DATE = re.compile(
-    r"(?=.*(?<!\d)(19|20)\d\d(?!\d))(?=.*(?<!\d)\d{1,2}(?!\d))(?=.*[^\W\d_]{3}|(\D*\d+){3})"
-    r"|\d{1,2}[./-]\s?[^\W\d_]{3,}\.?[./-]\s?\d\d(?!\d)|\d{1,4}[./-]\d{1,2}[./-]\d"
+_LIKE = re.compile(
+    r".*\d:\d\d.*|(?=.*(?<!\d)(19|20)\d\d(?!\d))(?=.*(?<!\d)\d{1,2}(?!\d))(?=.*[^\W\d_]{3}|(\D*\d+){3}).*"
+    r"|\d{1,2}[./-]\s?[^\W\d_]{3,}\.?[./-]\s?\d\d(?!\d).*|\d{1,4}[./-]\d{1,2}[./-]\d.*"
 )
 # YYYYMMDD alone or before HHMM, HHMMSS or milliseconds more.
 _DIGITS = re.compile(r"(19[7-9]|20\d)\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])(\d{4}|\d{6}|\d{9})?")
 _DAY, _HALF = 86_400.0, 43_200.0
 _MOSTLY, _DIFFERENT = 0.9, 3
 SAY = (
-    "say how they are written, as in --time-format '%d.%m.%Y %H:%M:%S', or write the year first: "
-    "2024-03-12 10:15:00"
+    "say how they are written, as in --time-format '%d.%m.%Y %H:%M:%S', or write the year first: 2024-03-12 "
+    "10:15:00"
 )
 
 
@@ -54,24 +69,24 @@ def moments_column(cells: Sequence[str], form: str | None = None) -> Column | No
     if not there:
         return None
     texts = _even([cells[i] for i in there])
-    forms = [form] if form else _forms_of(texts[0])
-    readings = [(one, found) for one in forms if (found := _read(texts, one)) is not None]
-    if readings:
-        (one, first), *others = readings
+    forms = [form] if form else [one for one, pattern in _FORMS.items() if pattern.fullmatch(texts[0])]
+    every = {one: _read(texts, one) for one in forms}
+    whole = {one: found for one, found in every.items() if not np.isnat(found).any()}
+    if whole:
+        (one, first), *others = whole.items()
         if any(not np.array_equal(first - first[0], found - found[0]) for _, found in others):
             return _unread(cells, there[0], "may have the day or the month first")
         numbers = np.full(len(cells), np.nan)
         numbers[there] = (first - first[0]) / np.timedelta64(1, "s")
         of_day = one != _ISO_FORM and not re.search("%[djDFxcyYGUWu]", one)
         since = first[0].astype("datetime64[D]") if of_day else np.datetime64(0, "s")
-        return Column(
-            numbers, dated=True, began=float((first[0] - since) / np.timedelta64(1, "s")), of_day=of_day
-        )
-    alike = [text for text in texts if _CLOCK.search(text) or _DATE.match(text)]
-    many = len(set(alike)) >= _DIFFERENT and len(alike) > _MOSTLY * len(texts)
+        began = float((first[0] - since) / np.timedelta64(1, "s"))
+        return Column(numbers, dated=True, began=began, of_day=of_day)
+    alike = {text for text in texts if _LIKE.fullmatch(text)}
+    many = len(alike) >= _DIFFERENT and sum(text in alike for text in texts) > _MOSTLY * len(texts)
     if not many and (form is not None or not forms):
         return None
-    at = next((i for i, text in enumerate(texts) if not any(_parses(text, one) for one in forms)), 0)
+    at = int(np.argmax(np.all([np.isnat(found) for found in every.values()], axis=0))) if every else 0
     wrong = "is no date or time as those above are" if at else "is no date or time that can be read"
     return _unread(cells, there[at], wrong)
 
@@ -81,49 +96,28 @@ def _unread(cells: Sequence[str], row: int, wrong: str) -> Column:
 
 
 def _even(texts: Sequence[str]) -> list[str]:
-    """Texts with seconds, and with parts of a second after a point, in all of them if any has some."""
+    """Return texts with seconds, and with parts of a second after a point, in all of them if any has some."""
     plain = [_COMMA.sub(r"\1.\2", text) for text in texts]
-    if all(map(_ISO.fullmatch, plain)):
+    if all(map(_FORMS[_ISO_FORM].fullmatch, plain)):
         return plain
     if any(map(_SECONDS.search, plain)):
         plain = [text if _SECONDS.search(text) else _MINUTES.sub(r"\1:00", text) for text in plain]
-    if any(map(_PARTS.search, plain)):
-        plain = [text if _PARTS.search(text) else _SECONDS.sub(r"\1.0", text) for text in plain]
+    if any(map(_FRACTION.search, plain)):
+        plain = [text if _FRACTION.search(text) else _SECONDS.sub(r"\1.0", text) for text in plain]
     return plain
 
 
-def _forms_of(text: str) -> list[str]:
-    """The ways to read a text as a date, a time of day or both."""
-    forms = [_ISO_FORM] if _ISO.fullmatch(text) else _forms_like(re.sub(r"\d", "1", text))
-    return [form for form in forms if _parses(text, form)]
-
-
-@lru_cache(maxsize=2**12)
-def _forms_like(shape: str) -> list[str]:
-    """The forms that a text may have, by where it has digits: strptime is slow."""
-    return [form for form in _FORMS if _parses(shape, form)]
-
-
-def _parses(text: str, form: str) -> bool:
-    with suppress(ValueError):
-        if form == _ISO_FORM:
-            return _ISO.fullmatch(text) is not None and bool(datetime.fromisoformat(text))
-        return bool(datetime.strptime(text, form))
-    return False
-
-
-def _read(texts: Sequence[str], form: str) -> NDArray[np.datetime64] | None:
-    """Return moments (n,), in UTC if all have a zone, or None if a text is no moment."""
+def _read(texts: Sequence[str], form: str) -> NDArray[np.datetime64]:
+    """Return moments (n,), in UTC if all have a zone, not a time where a text is none."""
     import pandas
 
-    zones = sum(_ZONE.search(text[10:]) is not None for text in texts) if form == _ISO_FORM else 0
-    if zones not in (0, len(texts)):
-        return None
+    zoned = [form == _ISO_FORM and _ZONE.search(text[10:]) is not None for text in texts]
     try:
-        found = pandas.to_datetime(pandas.Series(texts, dtype=object), format=form, utc=True)
-        return np.asarray(found.dt.tz_localize(None).to_numpy())
+        found = pandas.to_datetime(pandas.Series(texts, dtype=object), format=form, utc=True, errors="coerce")
+        moments = np.asarray(found.dt.tz_localize(None).to_numpy())
     except (ValueError, TypeError, OverflowError):
-        return None
+        return np.full(len(texts), np.datetime64("NaT"))
+    return np.where(np.array(zoned) == zoned[0], moments, np.datetime64("NaT"))
 
 
 def with_days(sheet: Sheet) -> Sheet:
@@ -136,10 +130,9 @@ def with_days(sheet: Sheet) -> Sheet:
     dates = [i for i, column in enumerate(columns) if _of_dates(column)]
     clocks = [i for i, column in enumerate(columns) if column.of_day]
     if len(dates) == len(clocks) == 1:
-        both = sorted((dates[0], clocks[0]))
-        joined = _joined(columns[dates[0]], columns[clocks[0]], [sheet.name_of(i) for i in both])
-        for i in both:
-            columns[i] = joined
+        (date,), (clock,) = dates, clocks
+        names = " and ".join(sheet.name_of(i) for i in sorted((date, clock)))
+        columns[date] = columns[clock] = _joined(columns[date], columns[clock], names)
     else:
         for i in clocks:
             columns[i] = _past_midnight(columns[i], sheet.name_of(i))
@@ -151,11 +144,11 @@ def _of_dates(column: Column) -> bool:
     return column.dated and not column.of_day and bool(np.all(np.abs(days - np.round(days)) < 1e-6))
 
 
-def _joined(dates: Column, clock: Column, names: Sequence[str]) -> Column:
+def _joined(dates: Column, clock: Column, names: str) -> Column:
     moments = dates.numbers + (clock.numbers + clock.began) % _DAY
     there = moments[~np.isnan(moments)]
     first = float(there[0]) if there.size else 0.0
-    done = (*dates.done, *clock.done, f"{' and '.join(names)} were joined: dates and times of day")
+    done = (*dates.done, *clock.done, f"{names} were joined: dates and times of day")
     return Column(moments - first, dated=True, began=dates.began + first, done=done)
 
 
@@ -172,20 +165,18 @@ def _past_midnight(clock: Column, name: str) -> Column:
 
 def is_moment(text: str) -> bool:
     """Return whether a text is a date or a time of day."""
-    return _BEGIN.match(text) is not None and bool(_forms_of(_COMMA.sub(r"\1.\2", text)))
+    return _ANY.fullmatch(_COMMA.sub(r"\1.\2", text)) is not None
 
 
-def are_digits(x: Array) -> bool:
-    """Return whether numbers are dates like 20240312 or 202403121015, most likely."""
+def form_of_digits(x: Array) -> tuple[str, str]:
+    """Return form and kind of dates or times of day in digits, as 20240312 or 105959; else nothing."""
     near = x[(x >= 1.97e7) & (x < 2.1e16)]
     found = [_DIGITS.fullmatch(f"{value:.0f}") for value in np.floor(near)]
-    return sum(one is not None for one in found) > _MOSTLY * x.size
-
-
-def are_clock_digits(x: Array) -> bool:
-    """Return whether numbers are times of day like 105959 or 1059: their steps are even only then."""
+    if sum(one is not None for one in found) > _MOSTLY * x.size:
+        return "%Y%m%d%H%M%S", "date"
     low, mid, high, steps = x % 100, x // 100 % 100, x // 10_000, np.diff(x)
     if x.size < 3 or x.min() < 0 or x.max() < 100 or np.any((low >= 60) | (mid >= 60) | (high >= 24)):
-        return False
-    sixties = 3600 * high + 60 * mid + low
-    return bool(np.ptp(np.diff(sixties)) < 0.1 * abs(np.median(steps)) <= 0.1 * np.ptp(steps))
+        return "", ""
+    sixties = 3600 * high + 60 * mid + low  # of a clock steps are even only so
+    even = np.ptp(np.diff(sixties)) < 0.1 * abs(np.median(steps)) <= 0.1 * np.ptp(steps)
+    return ("%H%M%S", "time of day") if even else ("", "")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 Detrend = Literal["none", "constant", "linear", "auto"]
+DETRENDS: dict[str, Detrend] = {kind: kind for kind in get_args(Detrend)}
 Run = tuple[str, int, int]
 """Rows of a file, the first and the last; no name: of the only file."""
-DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
 
 
 @dataclass(frozen=True)

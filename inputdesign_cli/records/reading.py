@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -11,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError
-from inputdesign_cli.records.arrays import MOST_UNPACKED, read_mat, read_npz
-from inputdesign_cli.records.cells import written_out
+from inputdesign_cli.records.arrays import MOST_UNPACKED, check_unpacked, read_mat, read_npz
 from inputdesign_cli.records.moments import with_days
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.sheet import Sheet, unreadable
-from inputdesign_cli.records.text import decoded, read_text, sheet_of
+from inputdesign_cli.records.text import decoded, read_text, sheet_of, written_out
 from inputdesign_cli.regular_file import read_regular
 
 _MOST_BYTES = 100 * 2**20
@@ -53,7 +51,7 @@ def _read(path: Path, key: str, given: Preparation) -> Sheet:
     if kind in PARQUET:
         return _read_parquet(path, key, raw, given)
     if kind in EXCEL:
-        _check_unpacked(path, key, raw)
+        check_unpacked(path, key, raw)
         return _read_workbook(path, key, raw, named, given)
     return read_text(path, key, decoded(path, key, raw), given)
 
@@ -74,17 +72,6 @@ def _bytes(path: Path, key: str) -> bytes:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file") from None
-
-
-def _check_unpacked(path: Path, key: str, raw: bytes) -> None:
-    """Raise `DataError` (`data-unreadable`) for a workbook that unpacks to too much."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-    except Exception:  # a broken archive makes its reader raise anything
-        return
-    if size > MOST_UNPACKED:
-        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
 
 
 def _read_parquet(path: Path, key: str, raw: bytes, given: Preparation) -> Sheet:
@@ -121,10 +108,6 @@ def _frame(pandas: Any, path: Path, key: str, raw: bytes) -> Any:
     names = parquet.schema_arrow.names
     if 8 * parquet.metadata.num_rows * len(names) > MOST_UNPACKED:
         raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
-    again = sorted({name for name in names if names.count(name) > 1})
-    if again:
-        what = f"has several columns of one name: {', '.join(again)}"
-        raise unreadable(path, key, what, "give each column a name of its own, or save it as CSV")
     frame = pandas.read_parquet(io.BytesIO(raw))
     if isinstance(frame.index, pandas.RangeIndex) and frame.index.name is None:
         return frame

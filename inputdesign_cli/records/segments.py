@@ -20,7 +20,7 @@ from inputdesign_cli.findings.prepared_records import (
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.records.preparation import Detrend, Preparation
 from inputdesign_cli.records.signals import Signals
-from inputdesign_cli.records.text import BLANK, COMMENT, COMMENTED
+from inputdesign_cli.records.text import BLANK, COMMENTED
 
 # Times may be off by this share of the sample time unsaid, and by the second with a finding.
 EVEN = 1e-3
@@ -193,18 +193,13 @@ def _whole_segments(
 
 
 def _passed_over(signals: Signals) -> tuple[NDArray[np.bool_], list[Finding]]:
-    """Whether the record is cut before each row (n,), and a finding for each kind of line between rows."""
-    sheet, timed = signals.sheet, bool(signals.name)
-    apart = np.zeros(len(sheet.lines), dtype=bool)
-    found = []
-    for kind in (BLANK, COMMENTED, COMMENT):
-        lines = [
-            line for line, own in sheet.passed if own == kind and sheet.lines[0] < line < sheet.lines[-1]
-        ]
-        cuts = kind != COMMENT and not timed
-        if lines:
-            apart[np.searchsorted(sheet.lines, lines)] |= cuts
-            found.append(lines_passed_over(kind, lines, cuts=cuts, timed=timed))
+    """Return whether the record is cut before each row (n,), as by a blank line where it has no times."""
+    lines, found = signals.sheet.lines, list[Finding]()
+    apart = np.zeros(len(lines), dtype=bool)
+    for kind in () if signals.name else (BLANK, COMMENTED):
+        passed = [line for line, own in signals.sheet.passed if own == kind and lines[0] < line < lines[-1]]
+        apart[np.searchsorted(lines, passed)] = True
+        found += [lines_passed_over(kind, passed)] if passed else []
     return apart, found
 
 

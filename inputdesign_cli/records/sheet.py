@@ -13,8 +13,8 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location
 
 _PLAIN = (
-    "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave a "
-    "cell empty where there is no value, and write 1 and 0 for ON and OFF"
+    "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave "
+    "a cell empty where there is no value, and write 1 and 0 for ON and OFF"
 )
 
 
@@ -72,26 +72,27 @@ class Sheet:
 
     @property
     def header(self) -> list[str]:
-        """The names in small letters."""
+        """Return the names in small letters."""
         return [name.strip().lower() for name in self.names]
 
     def name_of(self, at: int) -> str:
-        """The name of a column, or its number."""
-        name = self.names[at].strip() if at < len(self.names) and self.shown else ""
-        return name or f"column {at + 1}"
+        """Return the name of a column, or its number."""
+        return (self.names[at].strip() if at < len(self.names) else "") or f"column {at + 1}"
 
     def error(self, code: str, message: str, hint: str, row: int | None = None) -> DataError:
-        """The error that points at a row, or at the header; what is missing may be in another sheet."""
+        """Return the error that points at a row, or at the header."""
         if self.others and code == "data-missing-column":
             hint += f"; only the first sheet was read: name one as '{self.path.name}#{self.others[0]}'"
         line, text = self.head
         if row is not None:
             line, text = int(self.lines[row]), self.texts[row] if self.texts else ""
-        place = Location(str(self.path), line, 1, text if self.shown else "")
-        return DataError(Diagnostic(code, message, hint, self.key, place))
+        if not self.shown:  # it may be secret
+            text, message = "", f"{self.path.name} is no table of numbers: most of its cells are text"
+            hint = "keep the columns of numbers, or say which they are: --columns u1=2,y1=3"
+        return DataError(Diagnostic(code, message, hint, self.key, Location(str(self.path), line, 1, text)))
 
 
 def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = None) -> DataError:
-    """The error about a file that cannot be read at all, or not from some line on."""
+    """Return the error about a file that cannot be read at all, or not from some line on."""
     location = None if line is None else Location(str(path), line, 1)
     return DataError.because("data-unreadable", f"the file {path} {what}", hint, key, location)

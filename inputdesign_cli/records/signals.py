@@ -20,12 +20,11 @@ from inputdesign_cli.records.columns import (
     channel_columns,
     column_named,
     columns_of,
-    plain_time_unit,
     rising,
     time_column,
-    time_unit_of,
+    time_unit_in,
 )
-from inputdesign_cli.records.moments import SAY, are_clock_digits, are_digits
+from inputdesign_cli.records.moments import SAY, form_of_digits
 from inputdesign_cli.records.preparation import Preparation, Run
 from inputdesign_cli.records.sheet import Sheet
 
@@ -122,9 +121,8 @@ def _times(
     if column.dated or unit:
         return time, unit, column.dated, findings
     there = time[~np.isnan(time)]
-    clock = are_clock_digits(there)
-    if clock or are_digits(there):
-        form, what = ("%H%M%S", "time of day") if clock else ("%Y%m%d%H%M%S", "date")
+    form, what = form_of_digits(there)
+    if form:
         message = f"{there[0]:.17g} in column {name} looks like a {what} in digits"
         hint = f"{SAY}; here perhaps --time-format {form}; if it counts, say in what: --time-unit s"
         raise sheet.error("data-not-a-number", message, hint, int(np.flatnonzero(~np.isnan(time))[0]))
@@ -151,11 +149,6 @@ def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | No
         hint = "leave --time-unit out: it only says what the times are counted in; or correct the file"
         raise sheet.error("data-wrong-unit", message, hint)
     return said or own
-
-
-def time_unit_in(sheet: Sheet, name: str, *, dated: bool) -> str | None:
-    """Return the unit of times that a file states; dates are counted in seconds."""
-    return "s" if dated else time_unit_of(name) or plain_time_unit(sheet.time_unit)
 
 
 def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -> NDArray[np.int64]:

@@ -182,8 +182,7 @@ def _at_rest(path: Path, step: float) -> _Level:
 def _seconds_apart(path: Path) -> float | None:
     """Return the time between the rows of a file; None without a column of times."""
     from inputdesign_cli.records import read_sheet
-    from inputdesign_cli.records.columns import column_named, columns_of, time_columns
-    from inputdesign_cli.records.signals import time_unit_in
+    from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
 
     sheet = read_sheet(path, key="noise")
     for name in time_columns(sheet)[:1]:

@@ -8,7 +8,7 @@ import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.explore import explore_records, explore_structure
-from inputdesign_cli.explore.candidates import ranked
+from inputdesign_cli.explore.search import ranked
 from tests.explore.plants import column, held, lag, with_noise
 from tests.explore.test_sweep import drifting
 

@@ -172,4 +172,4 @@ def test_an_input_that_is_logged_late_is_found(late, gain):
         logged = np.concatenate([np.full(late, u[0]), u[:-late]])
         seen += early_answers([column(logged, y)])
     assert len(seen) >= 5
-    assert max(found.samples for found in seen) <= late - 1
+    assert max(found.lag for found in seen) <= late - 1

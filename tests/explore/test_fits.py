@@ -5,9 +5,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.explore import by_chance, fits
-from inputdesign_cli.explore.fits import simulation_fit
-from inputdesign_cli.explore.orders import Orders
-from inputdesign_cli.explore.processes import Process, process_models
+from inputdesign_cli.explore.structures import Orders, Process, process_models
 from tests.explore.plants import column, lag, siso
 
 STEP = 0.5
@@ -58,7 +56,7 @@ def test_a_dead_time_explains_nothing_of_white_noise(late, in_s):
     else:
         model = Orders("OE", (int(late) + 1,), 2, f=1).model().at(np.array([1e-6, 1e-6, -0.8]))
     rng = np.random.default_rng(3)
-    assert simulation_fit(model, [(rng.standard_normal((200, 1)), rng.standard_normal((200, 1)))])[0] < 5.0
+    assert fits(model, [(rng.standard_normal((200, 1)), rng.standard_normal((200, 1)))]).simulation[0] < 5.0
 
 
 @pytest.mark.parametrize("in_s", [True, False])

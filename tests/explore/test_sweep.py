@@ -6,11 +6,10 @@ import scipy.signal
 
 from inputdesign_cli.explore.drift import levelled, slopes_of
 from inputdesign_cli.explore.sweep import (
+    Regressed,
     arx_models,
     delay_ranges,
     noise_model,
-    output_error,
-    output_errors,
     sweep,
     whitened,
     whitening,
@@ -33,7 +32,7 @@ def test_the_delay_of_a_lag_is_found_at_ten_decibels(delay):
 
 def test_the_best_delay_is_that_of_a_search_over_all():
     one = record(np.random.default_rng(9), 7)
-    losses = [output_error([one], 1, (d,)).loss for d in range(30)]
+    losses = [Regressed([one], 1).output_error((d,)).loss for d in range(30)]
     assert sweep([one], 1).by_order[1].loss <= min(losses) * 1.001
 
 
@@ -52,7 +51,7 @@ def test_poles_of_a_second_order_are_found_in_several_records():
     swept = sweep(parts, 4)
     np.testing.assert_allclose(swept.by_order[2].F, F, atol=0.03)
     assert swept.best(1200).order in (2, 3)
-    left = sum(e @ e for e in output_errors(parts, swept.by_order[2])) / 1200
+    left = sum(e @ e for e in Regressed(parts, 2).errors(swept.by_order[2])) / 1200
     assert left == pytest.approx(swept.by_order[2].loss)
 
 

@@ -5,13 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli.findings import (
-    designed_records as records,
-    designs,
-    simulated_runs as runs,
-    uncertain_plants as plants,
-    unfinished,
-)
+from inputdesign_cli.findings import designed_records as records, designs, simulated_runs as runs, unfinished
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Objective
 from inputdesign_cli.outcome.design import Coverage
@@ -47,10 +41,10 @@ FOUND = {
     "other-spectra-left-out": [unfinished.other_spectra_left_out(), *unfinished.ended_early("optimal", GAP)],
     "no-record-in-time": [unfinished.no_record_in_time(8)],
     "accuracy-on-grid": [unfinished.on_grid(40, 1.01)],
-    "fresh-plants-cut-short": plants.fewer_plants(10, 120),
-    "draws-unstable": plants.unstable_draws(80, 100),
-    "plants-lost": plants.floor_findings(LOST, 20)[:1],
-    "plants-at-floor": plants.floor_findings(LOST, 20)[1:],
+    "fresh-plants-cut-short": unfinished.fewer_plants(10, 120),
+    "draws-unstable": unfinished.unstable_draws(80, 100),
+    "plants-lost": unfinished.floor_findings(LOST, 20)[:1],
+    "plants-at-floor": unfinished.floor_findings(LOST, 20)[1:],
     "record-not-computed": records.too_long(2_000_000, 1_000_000),
     "record-undetermined": records.accuracy_missed(replace(MADE, worst_ratio=np.inf), held=False),
     "record-misses-accuracy": [f for h in (True, False) for f in records.accuracy_missed(MADE, held=h)],
@@ -88,8 +82,8 @@ def test_what_is_in_order_is_not_noted():
     good = replace(MADE, met=True, extra_power=0.1)
     assert list(designs.inputs_without_power([1.0, 0.5])) == []
     assert designs.short_experiment(Experiment(MODEL, 1000)) == []
-    assert plants.fewer_plants(120, 120) == plants.unstable_draws(40, 100) == []
-    assert plants.floor_findings(None, 20) == []
+    assert unfinished.fewer_plants(120, 120) == unfinished.unstable_draws(40, 100) == []
+    assert unfinished.floor_findings(None, 20) == []
     assert records.too_long(500, 500) == records.accuracy_missed(good, held=True) == []
     assert records.length_of_record(good, 40, 1, {}) == records.less_accurate(1.001, 1.0) == []
     assert list(runs.confidence_missed(replace(ASKED, kept_limits=(0.9, 0.96)), None)) == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.explore.processes import Process, process_models
+from inputdesign_cli.explore.structures import Process, process_models
 from inputdesign_cli.identification import identify
 
 

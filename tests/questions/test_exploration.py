@@ -14,7 +14,7 @@ from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.questions import explore, identify, solve
-from inputdesign_cli.records import Preparation, read_log
+from inputdesign_cli.records import Preparation
 from inputdesign_cli.specification import load_spec, parse_spec
 from tests.support.logs import lag_log
 from tests.support.outcomes import typed
@@ -225,20 +225,6 @@ def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
     reason, told = [note for note in found if "stands still" in note]
     assert "rows 201 to 250" in told
     assert reason.startswith("no trust: y stands still at ")
-
-
-def test_many_spikes_are_told(tmp_path):
-    """Of 400 samples 32, more than outliers are."""
-    path = lag_log(tmp_path / "log.csv", samples=400)
-    lines = path.read_text().splitlines()
-    rng = np.random.default_rng(0)
-    for row in rng.choice(np.arange(5, 395, 6), 32, replace=False):
-        time, u, y = lines[row].split(",")
-        lines[row] = f"{time},{u},{float(y) + 15.0}"
-    assert not any("spikes" in step for step in read_log(path, Preparation()).notes)
-    path.write_text("\n".join(lines))
-    (told,) = [step for step in read_log(path, Preparation()).notes if "spikes" in step]
-    assert told.startswith("y has 32 values (8 %) far from their neighbours")
 
 
 @pytest.mark.slow

@@ -8,8 +8,7 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.findings.refuted_structure import OF_MANY
-from inputdesign_cli.findings.remedies import quantities, remedies_of
+from inputdesign_cli.findings.refuted_structure import OF_MANY, quantities, remedies_of
 from inputdesign_cli.questions.assessment.build import build_identification
 from inputdesign_cli.questions.least_cost.build import build_convex
 

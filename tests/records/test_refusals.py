@@ -106,14 +106,11 @@ def test_a_cell_among_dates_that_is_none_is_shown_with_its_line(wrong, tmp_path)
     assert "--time-format" in found.hint
 
 
-def test_a_form_that_no_column_has_is_refused(tmp_path):
+def test_a_form_or_a_mark_that_the_cells_do_not_have_is_refused(tmp_path):
     path = log(tmp_path / "log.csv", [t.isoformat(" ") for t in MOMENTS])
     assert "--time-format" in refused(path, Preparation(time_format="%d.%m.%Y")).hint
-
-
-def test_a_point_is_refused_where_the_user_says_commas(tmp_path):
-    (tmp_path / "log.csv").write_text("u;y\n1.234;1,5\n2;2,5\n")
-    assert refused(tmp_path / "log.csv", Preparation(decimal=",")).code == "data-not-a-number"
+    path.write_text("u;y\n1.234;1,5\n2;2,5\n")
+    assert refused(path, Preparation(decimal=",")).code == "data-not-a-number"
 
 
 def archive(name, content):
@@ -192,8 +189,11 @@ PIECES = st.one_of(
 )
 
 
+READ = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
 @pytest.mark.parametrize("ending", ["csv", "npz", "mat", "xlsx", "parquet"])
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@READ
 @given(pieces=st.lists(PIECES, max_size=40), form=st.sampled_from([None, "%d.%m.%Y", "%Y"]))
 def test_no_bytes_lead_to_another_error(ending, pieces, form, tmp_path):
     (tmp_path / f"log.{ending}").write_bytes(b"".join(pieces))
@@ -201,7 +201,7 @@ def test_no_bytes_lead_to_another_error(ending, pieces, form, tmp_path):
         read_log(tmp_path / f"log.{ending}", Preparation(columns={"u1": "1", "y1": "2"}, time_format=form))
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@READ
 @given(
     cells=st.lists(st.lists(CELLS, min_size=2, max_size=3), min_size=1, max_size=30),
     mark=st.sampled_from(",;\t"),

@@ -27,8 +27,7 @@ from inputdesign_cli.findings.estimates import (
     unasked,
     unsettled,
 )
-from inputdesign_cli.findings.faults import faults, loop_faults
-from inputdesign_cli.findings.level_shifts import shifted_levels
+from inputdesign_cli.findings.faults import faults, loop_faults, shifted_levels
 from inputdesign_cli.findings.other_systems import differences, prior_notes
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.rivals import other_minima, ruled_out

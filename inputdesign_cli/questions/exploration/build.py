@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, Diagnostic, bad_spec
+from inputdesign_cli.errors import DataError, bad_spec
 from inputdesign_cli.explore import Found, output_error_form
+from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.assessment.build import build_identification
@@ -29,43 +30,34 @@ _DOUBTED = '"On a model that deserves no trust: '
 
 
 def spec_text(log: Record, found: Found, sources: Sequence[Path]) -> str:
-    """A spec that `idesign solve` accepts: the model, and the most informative input of that power."""
-    power = [float(x) for x in np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)]
-    most = max(power)
-    power = [x if x > 0.0 else most for x in power]
+    """Return a spec that `idesign solve` accepts: the model, and the most informative input of that power."""
+    power = np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)
     low, high = log.u.min(axis=0), log.u.max(axis=0)
     half = 0.5 * (high - low)
-    half = np.where(half > 0.0, half, half.max())
+    power, half = (np.where(x > 0.0, x, x.max()) for x in (power, half))
     # Six digits of the distance that the input moves: a level far from zero takes more.
     places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in half]
     levels, widths = (
         [round(float(x), n) for x, n in zip(values, places, strict=True)]
         for values in (0.5 * (low + high), half)
     )
-    single = len(power) == 1
     blocks = blocks_of(found.model)
     blocks["noise"], drawn = _inside(blocks["noise"], len(log.y))
     structures = ", ".join(
-        f"{'y' if found.model.outputs == 1 else f'y{i + 1}'}: {c.orders.family}"
-        for i, c in enumerate(found.taken)
+        f"{signal_name('y', i, found.model.outputs)}: {c.orders.family}" for i, c in enumerate(found.taken)
     )
     kind = (
         f"plants in s by their parameters (times in {log.time_unit}), their inputs held between samples"
         if any(c.orders.physical for c in found.taken)
         else "A y = (B/F) u + (C/D) e, polynomials in q^-1"
     )
-    names = ", ".join(
-        f"{channel} is {' '.join(column.split())}"
-        for channel, column in log.names.items()
-        if channel != "time"
-    )
-    samples = min(len(log.y), _MOST_SAMPLES)
+    names = ", ".join(f"{x} is {' '.join(column.split())}" for x, column in log.names.items() if x != "time")
     limit, amplitude = _numbers([float(f"{x:.6g}") for x in power]), _numbers(widths)
     ranges = " and ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True))
-    offset = levels[0] if single else levels
     # Power at frequency zero determines the gain of an integrator without end.
     family = "{type: multisine, lines: 100}" if found.integrates else "{type: fir, order: 20}"
-    kind_of = "multisine" if found.integrates else "filtered_noise"
+    signal = "multisine" if found.integrates else "filtered_noise"
+    samples = min(len(log.y), _MOST_SAMPLES)
     source = " ".join(" and ".join(path.name for path in sources).split())
     text = f"""\
 # Written by `idesign explore` from {source}.
@@ -100,7 +92,7 @@ limits:
 
 # The family of spectra to search, and the signal to apply: about the middle of the range of the log.
 spectrum: {family}
-signal: {{type: {kind_of}, seed: 1, offset: {json.dumps(offset)}}}
+signal: {{type: {signal}, seed: 1, offset: {json.dumps(levels[0] if len(levels) == 1 else levels)}}}
 """
     return text
 
@@ -127,23 +119,20 @@ def warned(text: str, reasons: Sequence[str], *, loop: bool) -> str:
 def _inside(noise: Mapping[str, Any], samples: int) -> tuple[dict[str, Any], list[str]]:
     """Return the block with roots of C and D not too near to the unit circle, and the letters that changed.
 
-    Their modulus is at most 1 - 1 / samples: a record of this length cannot resolve nearer roots.
+    Their modulus is at most 1 - 1 / samples: a record of this length cannot resolve nearer roots. One factor
+    scales all roots of a polynomial.
     """
     drawn = dict(noise)
     for letter in {"C", "D"} & noise.keys():
-        rows = noise[letter]
-        several = isinstance(rows[0], list)
-        polynomials = [_contracted(row, 1.0 - 1.0 / samples) for row in (rows if several else [rows])]
-        drawn[letter] = polynomials if several else polynomials[0]
+        several = isinstance(noise[letter][0], list)
+        rows = noise[letter] if several else [noise[letter]]
+        radii = [float(np.abs(np.roots(row)).max(initial=1e-9)) for row in rows]
+        shares = [min((1.0 - 1.0 / samples) / radius, 1.0) for radius in radii]
+        own = [
+            [float(c * share**k) for k, c in enumerate(row)] for row, share in zip(rows, shares, strict=True)
+        ]
+        drawn[letter] = own if several else own[0]
     return drawn, sorted(letter for letter in noise if drawn[letter] != noise[letter])
-
-
-def _contracted(polynomial: Sequence[float], limit: float) -> list[float]:
-    """In q^-1, all roots scaled by one factor so that they are within a circle; as it is where they are."""
-    radius = float(np.abs(np.roots(polynomial)).max(initial=0.0))
-    if radius <= limit:
-        return list(polynomial)
-    return [float(c * (limit / radius) ** k) for k, c in enumerate(polynomial)]
 
 
 def _numbers(values: Sequence[float]) -> str:
@@ -153,31 +142,28 @@ def _numbers(values: Sequence[float]) -> str:
 
 
 def build_explored(text: str) -> Identification:
-    """What `identify` runs on, of a spec that was written for a log."""
+    """Return what `identify` runs on, of a spec that was written for a log."""
     return build_identification(parse_spec(text, "spec.yaml"))
 
 
 @contextmanager
 def naming_model(model: Spec) -> Iterator[None]:
-    """Errors of time name the file of the model, which is what counts otherwise than the data."""
+    """Let errors of time name the file of the model, which is what counts otherwise than the data."""
     try:
         yield
     except DataError as error:
         place = model.locate("")
-        name = Path(place.file).name if place else "the model"
-        raise DataError([_named(one, name) for one in error.diagnostics]) from error
-
-
-def _named(one: Diagnostic, model: str) -> Diagnostic:
-    if one.code == "data-wrong-unit":
-        return replace(one, message=f"{one.message}: {model} does")
-    if "data_sample_time" not in one.details:
-        return one
-    hint = (
-        f"if {model} is of data sampled like these, write sample_time: {one.details['data_sample_time']:.6g} "
-        "in it; a model of another sample time cannot be judged by them"
-    )
-    return replace(one, message=f"{one.message} in {model}", hint=hint)
+        name, named = Path(place.file).name if place else "the model", []
+        for one in error.diagnostics:
+            step = one.details.get("data_sample_time")
+            if step is not None:
+                hint = f"if {name} is of data sampled like these, write sample_time: {step:.6g} in it; a "
+                hint += "model of another sample time cannot be judged by them"
+                one = replace(one, message=f"{one.message} in {name}", hint=hint)
+            elif one.code == "data-wrong-unit":
+                one = replace(one, message=f"{one.message}: {name} does")
+            named.append(one)
+        raise DataError(named) from error
 
 
 def model_to_judge(spec: Spec) -> Model:

@@ -12,19 +12,17 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.explore import Family, Found, answers_output, explore_records, levelled
-from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.explored_inputs import DRIVE, doubtful_inputs, undriven
 from inputdesign_cli.findings.explored_models import doubtful_model
-from inputdesign_cli.findings.faults import biasing
+from inputdesign_cli.findings.faults import biasing, left_out, shifted_levels
 from inputdesign_cli.findings.frequency_responses import contradicted, response_note
-from inputdesign_cli.findings.level_shifts import left_out, shifted_levels
-from inputdesign_cli.findings.nonlinear_response import silent_lines_answer
+from inputdesign_cli.findings.periods import silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
 from inputdesign_cli.identification import frequency_response, response_delays, silent_in
+from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.outcome import MeasuredLines, Outcome
 from inputdesign_cli.outcome.curves import ResponseCurves
-from inputdesign_cli.outcome.response import SilentLine
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.assessment.identify import (
@@ -88,7 +86,7 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
         *doubtful_inputs(found, measured.parts, loop=bool(loops)),
         *late_inputs(measured.parts),
         *biasing(units, found.estimate, data, found.validation.simulation),
-        *(() if response is None else contradicted(response.lines)),
+        *(() if response is None else contradicted(response[2])),
     ]
     reasons = tuple(one.message for one in doubts)
     remarks = (*log.remarks, *exploration_notes(log, found, loops))
@@ -113,7 +111,7 @@ def explore(paths: Sequence[Path], preparation: Preparation, only: Family | None
         *refutations(found.model, found.estimate),
     )
     against = tuple(one.message for one in speaking)
-    return Exploration(results if response is None else response.beside(results), reasons, against)
+    return Exploration(results if response is None else _beside(results, *response), reasons, against)
 
 
 def explored_beside_shifts(log: Record, *, loop: bool, only: Family | None = None) -> tuple[Record, Found]:
@@ -153,32 +151,10 @@ def _data(log: Record, found: Found) -> Record:
     return replace(own, u=u, y=y, r=None, findings=(), remarks=(), means=None, repeated=(), lined=False)
 
 
-@dataclass(frozen=True)
-class _Response:
-    """The frequency response of the data alone, what is said of it, and of lines without excitation."""
-
-    table: Table
-    curves: ResponseCurves
-    lines: MeasuredLines
-    silent: dict[str, SilentLine]
-    findings: tuple[Finding, ...]
-
-    def beside(self, explored: Results) -> Results:
-        """Return the results with it."""
-        outcome: Outcome = explored.outcome.saying(self.findings)
-        section = outcome.exploration
-        assert section is not None  # results of an exploration
-        section = replace(section, frequency_response=self.lines, nonlinearity=self.silent or None)
-        return replace(
-            explored,
-            outcome=replace(outcome, exploration=section),
-            tables={**explored.tables, "frequency_response": self.table},
-            curves={**explored.curves, "frequency_response": self.curves},
-        )
-
-
-def _without_model(units: Units, log: Record, found: Found, *, loop: bool) -> _Response | None:
-    """Return the frequency response of the data alone, where it can be had.
+def _without_model(
+    units: Units, log: Record, found: Found, *, loop: bool
+) -> tuple[Table, ResponseCurves, MeasuredLines, dict[str, SilentLines]] | None:
+    """Return the frequency response of the data alone, where it can be had, and lines without excitation.
 
     Args:
         loop: whether inputs answer the outputs.
@@ -198,11 +174,31 @@ def _without_model(units: Units, log: Record, found: Found, *, loop: bool) -> _R
     if response is None:
         return None
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
-    table, curves, lines = response_of_data(
+    of_data = response_of_data(
         units, found.model, response, by_reference=outside is not None, inputs=found.moving, loop=loop
     )
-    seen = (*response_note(lines), *silent_lines_answer(silent))
-    return _Response(table, curves, lines, silent_entry(silent), seen)
+    return *of_data, silent
+
+
+def _beside(
+    explored: Results,
+    table: Table,
+    curves: ResponseCurves,
+    lines: MeasuredLines,
+    silent: dict[str, SilentLines],
+) -> Results:
+    """Return the results with the frequency response of the data alone, and what is said of it."""
+    outcome: Outcome = explored.outcome.saying((*response_note(lines), *silent_lines_answer(silent)))
+    assert outcome.exploration is not None  # results of an exploration
+    section = replace(
+        outcome.exploration, frequency_response=lines, nonlinearity=silent_entry(silent) or None
+    )
+    return replace(
+        explored,
+        outcome=replace(outcome, exploration=section),
+        tables={**explored.tables, "frequency_response": table},
+        curves={**explored.curves, "frequency_response": curves},
+    )
 
 
 def _asked(task: Identification, identified: Identified) -> Identified:

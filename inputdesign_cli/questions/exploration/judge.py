@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from inputdesign_cli.records import Preparation, Record, read_data, read_sheet, 
 
 # Probability that past inputs explain the residuals of a model by chance alone.
 _SURELY = 1e-6
+_SEE = "see whether the model is of this plant, and gain, delay, units and columns agree"
 
 
 def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
@@ -45,10 +46,9 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     data = read_data(paths, header.units, preparation)
     with blaming_columns(paths[0], data):
         check_varying((), data.u[:, :0], data.y)
-    at = np.cumsum(data.lengths)[:-1]
-    found = fits(model, list(zip(np.split(data.u, at), np.split(data.y, at), strict=True)))
+    found = fits(model, data.parts)
     table, curves = validation_curves(header.units, data, found)
-    reasons = _too_little(found) or _explained_by_inputs(found, data)
+    reasons = tuple(_reasons(found, data))
     outcome = Outcome(
         title=header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
         status="validated",
@@ -64,37 +64,26 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     )
 
 
-def _too_little(found: Fits) -> tuple[str, ...]:
-    """Return why a model is not of these data: its simulation explains nothing of an output."""
-    reasons = []
-    for i, fit in enumerate(found.simulation):
-        if fit < LEAST_FIT:
-            output = signal_name("y", i, len(found.simulation))
-            what = (
-                f"the simulation explains {fit:.1f} % of {output}, and less than {LEAST_FIT:g} % is "
-                "nothing: a level alone explains as much"
-                if np.isfinite(fit)
-                else f"the model has no simulation of {output}: its plant is unstable"
-            )
-            reasons.append(
-                f"{what}; see whether the model is of this plant, and gain, delay, units and columns agree"
-            )
-    return tuple(reasons)
+def _reasons(found: Fits, data: Record) -> Iterator[str]:
+    """Yield why a model is not of these data: its simulation explains nothing, or too little of an output.
 
-
-def _explained_by_inputs(found: Fits, data: Record) -> tuple[str, ...]:
-    """Return outputs of which a model explains less than half, where past inputs explain the rest.
-
-    A poor fit alone is no fault of the model: the noise may be strong.
+    A poor fit alone is no fault of the model, since the noise may be strong, unless past inputs explain the
+    rest.
     """
-    reasons = []
-    for i in [i for i, fit in enumerate(found.simulation) if fit < HALF]:
-        test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
-        if not test.probability >= _SURELY:
-            output = signal_name("y", i, len(found.simulation))
-            reasons.append(
-                f"the simulation explains {found.simulation[i]:.1f} % of {output} only, and past inputs "
-                f"explain what it leaves (probability {chance(test.probability)}): the model is not of the "
-                "plant of these data, or this acts otherwise here"
+    for i, fit in enumerate(found.simulation):
+        output = signal_name("y", i, len(found.simulation))
+        if not np.isfinite(fit):
+            yield f"the model has no simulation of {output}: its plant is unstable; {_SEE}"
+        elif fit < LEAST_FIT:
+            what = (
+                f"the simulation explains {fit:.1f} % of {output}, and less than {LEAST_FIT:g} % is nothing"
             )
-    return tuple(reasons)
+            yield f"{what}: a level alone explains as much; {_SEE}"
+        elif fit < HALF:
+            test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
+            if not test.probability >= _SURELY:
+                yield (
+                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain what it "
+                    f"leaves (probability {chance(test.probability)}): the model is not of the plant of "
+                    "these data, or this acts otherwise here"
+                )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from inputdesign_cli.explore import Candidate, Chosen, Fits, Found
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.explore import Candidate, Fits, Found
 from inputdesign_cli.findings.explored_inputs import open_parameters
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driving_nothing
@@ -79,65 +80,61 @@ def _structure(candidate: Candidate) -> Structure:
         candidate.orders.delays,
         candidate.orders.size,
         candidate.criterion,
+        candidate.failed,
         candidate.converged,
         candidate.certain,
         *(fit if np.isfinite(fit) else None for fit in fits),
     )
 
 
-def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> list[str]:
-    """Return what a user should know of the record and of how the model was chosen."""
+def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> Iterator[str]:
+    """Yield what a user should know of the record and of how the model was chosen."""
     outputs, inputs = found.model.outputs, found.model.inputs
-    notes = [_chosen(log, found, i) for i in range(outputs)]
-    notes += [
-        f"{signal_name('y', i, outputs)} drifts along one line through all records, {slope / log.step:.4g} "
-        f"per {log.time_unit} whatever the inputs do: it was taken away, which --detrend linear does for "
-        "identify and assess"
-        for i, slope in enumerate(found.slopes)
-        if slope
-    ]
-    notes += [
-        f"{signal_name('y', i, outputs)} wanders as a random walk does, whatever the inputs do: the "
-        "gain is that of the steps, not of levels that lie far apart"
-        for i, wanders in enumerate(found.wanders)
-        if wanders
-    ]
-    notes += [
-        f"u{j + 1} never moves in this record: the model has no part of it, and an experiment must move it"
-        for j in found.still
-    ]
-    notes += [
-        f"the noise of the outputs helps to predict {signal_name('u', j, inputs)} (probability {chance(p)} "
-        "by chance): the data may come from a loop, or the input was logged late, or the columns are "
-        "swapped. They are taken for data of a loop. The direct method is used; the noise model must then be "
-        "right, and without a reference that moves the plant may not be identifiable: add a reference or "
-        "dither, and write experiment.controller"
-        for j, p in loops
-    ]
-    if inputs > 1:
-        notes += [
+    yield from (_chosen(log, found, i) for i in range(outputs))
+    for i, (slope, wanders) in enumerate(zip(found.slopes, found.wanders, strict=True)):
+        name = signal_name("y", i, outputs)
+        if slope:
+            yield (
+                f"{name} drifts along one line through all records, {slope / log.step:.4g} per "
+                f"{log.time_unit} whatever the inputs do: it was taken away, which --detrend linear does "
+                "for identify and assess"
+            )
+        if wanders:
+            yield (
+                f"{name} wanders as a random walk does, whatever the inputs do: the gain is that of the "
+                "steps, not of levels that lie far apart"
+            )
+    for j in found.still:
+        yield f"u{j + 1} never moves in this record: the model has no part of it. An experiment must move it"
+    for j, p in loops:
+        yield (
+            f"the noise of the outputs helps to predict {signal_name('u', j, inputs)} (probability "
+            f"{chance(p)} by chance): the data may come from a loop, or the input was logged late, or the "
+            "columns are swapped. They are taken for data of a loop. The direct method is used; the noise "
+            "model must then be right, and without a reference that moves the plant may not be "
+            "identifiable: add a reference or dither, and write experiment.controller"
+        )
+    for j in driving_nothing(found.model, found.estimate) if inputs > 1 else ():
+        yield (
             f"u{j + 1} has no effect on the outputs that differs from none: its delays and parameters say "
             "nothing"
-            for j in driving_nothing(found.model, found.estimate)
-        ]
-    uncertain = open_parameters(found)
+        )
+    uncertain = ", ".join(open_parameters(found))
     if uncertain:
-        notes.append(
-            f"{', '.join(uncertain)}: not known to one digit; G may be right at the frequencies that the "
-            "inputs excite, but these numbers say nothing of the plant"
+        yield (
+            f"{uncertain}: not known to one digit; G may be right at the frequencies that the inputs "
+            "excite, but these numbers say nothing of the plant"
         )
     used = sum(len(y) for _, y in found.used)
     if used < len(log.y):
-        notes.append(f"the model is estimated from the {used} samples in which the inputs move most")
+        yield f"the model is estimated from the {used} samples in which the inputs move most"
     if found.split == "blocks in turn":
-        notes.append("an input rests in one part of the record: blocks in turn estimate and judge")
-    return notes
+        yield "an input rests in one part of the record: blocks in turn estimate and judge"
 
 
 def _chosen(log: Record, found: Found, i: int) -> str:
     """Return which structure was taken for an output, and how it compares."""
     chosen, taken, ranges = found.outputs[i], found.taken[i], found.ranges[i]
-    name = signal_name("y", i, found.model.outputs)
     orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
     orders += f"; times in {log.time_unit}" if taken.orders.physical else ""
     delays = " and ".join(
@@ -147,11 +144,10 @@ def _chosen(log: Record, found: Found, i: int) -> str:
     judge = "the record" if found.split == "none" else "the part that judges"
     better = max(c.validation for c in chosen.candidates) - taken.validation
     beside = f"the best simulates {judge} by {better:.2g} points better"
-    if better <= 0.0:
-        beside = f"it simulates {judge} best"
     return (
-        f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; chosen of "
-        f"{len(chosen.candidates)} structures, of which {beside}"
+        f"{signal_name('y', i, found.model.outputs)}: {taken.orders.family} ({orders}), delay in samples "
+        f"{delays}; chosen of {len(chosen.candidates)} structures, of which "
+        f"{beside if better > 0.0 else f'it simulates {judge} best'}"
     )
 
 
@@ -163,27 +159,17 @@ def _between(low: int, high: int | None) -> str:
 
 def structure_curves(found: Found) -> dict[str, Curves]:
     """Return structures.png, one an output."""
-    single = len(found.outputs) == 1
-    return {
-        "structures" if single else f"structures_{i + 1}": _order_curves(
-            chosen, taken, None if single else i, found.split != "none"
-        )
-        for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True))
-    }
-
-
-def _order_curves(chosen: Chosen, taken: Candidate, output: int | None, unseen: bool) -> OrderCurves:
-    families = sorted({c.orders.family for c in chosen.candidates})
-    fits = {
-        family: (
-            np.array([float(c.orders.size) for c in chosen.candidates if c.orders.family == family]),
-            np.array([c.validation for c in chosen.candidates if c.orders.family == family]),
-        )
-        for family in families
-    }
-    return OrderCurves(
-        fits, (float(taken.orders.size), taken.validation), taken.orders.family, output, unseen
-    )
+    curves: dict[str, Curves] = {}
+    for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
+        single, fits = len(found.outputs) == 1, dict[str, tuple[Array, Array]]()
+        for family in sorted({c.orders.family for c in chosen.candidates}):
+            own = [(c.orders.size, c.validation) for c in chosen.candidates if c.orders.family == family]
+            sizes, shares = np.array(own, dtype=float).T
+            fits[family] = sizes, shares
+        at, output = (float(taken.orders.size), taken.validation), None if single else i
+        drawn = OrderCurves(fits, at, taken.orders.family, output, found.split != "none")
+        curves["structures" if single else f"structures_{i + 1}"] = drawn
+    return curves
 
 
 def validation_curves(units: Units, data: Record, found: Fits) -> tuple[Table, FitCurves]:

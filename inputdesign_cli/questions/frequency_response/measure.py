@@ -23,9 +23,8 @@ from inputdesign_cli.findings.frequency_responses import (
     samples_before_periods,
     unexcited_lines,
 )
-from inputdesign_cli.findings.nonlinear_response import Distorted, distorted
+from inputdesign_cli.findings.periods import Distorted, distorted, drifting_periods, spiked_periods
 from inputdesign_cli.findings.places import places
-from inputdesign_cli.findings.scattered_periods import drifting_periods, spiked_periods
 from inputdesign_cli.identification import frequency_response, response_delays
 from inputdesign_cli.identification.faults import period_spikes
 from inputdesign_cli.identification.frequency_response import of_periods

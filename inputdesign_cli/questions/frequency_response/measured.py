@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings.frequency_responses import REMEDY, UNLIKE
-from inputdesign_cli.findings.nonlinear_response import Distorted, nonlinear_response, silent_lines_answer
-from inputdesign_cli.findings.scattered_periods import within_chance
+from inputdesign_cli.findings.periods import Distorted, nonlinear_response, silent_lines_answer, within_chance
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.identification.periodic_response import Periods

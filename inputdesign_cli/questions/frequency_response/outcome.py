@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.response_lines import Goal
 from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts
-from inputdesign_cli.findings.limits_not_kept import StatedLimits, limits_not_kept
 from inputdesign_cli.monte_carlo.response import ResponseStudy
 from inputdesign_cli.outcome import (
     Baseline,

@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec, refuse
-from inputdesign_cli.findings.limits_not_kept import StatedLimits
+from inputdesign_cli.findings.designs import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header, build_units

@@ -16,8 +16,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.findings.designs import met_within_table
-from inputdesign_cli.findings.limits_not_kept import StatedLimits, limits_not_kept
+from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept, met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.outcome import Baseline, Objective, Outcome, Powers, Spectrum, White

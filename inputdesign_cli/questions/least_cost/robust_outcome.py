@@ -17,7 +17,7 @@ from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.uncertain_plants import fewer_plants, floor_findings, unstable_draws
+from inputdesign_cli.findings.unfinished import fewer_plants, floor_findings, unstable_draws
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.outcome import Robust

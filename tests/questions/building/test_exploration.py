@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from inputdesign_cli.explore.processes import Process, process_models
+from inputdesign_cli.explore.structures import Process, process_models
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification import parse_spec
