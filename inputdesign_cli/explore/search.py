@@ -263,7 +263,7 @@ class _Records:
         records = Records(kind, tuple(centred(parts))).begun_freely(kind.lateness(start))
         found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
         point, white = found.point, White.of(records, found.point)
-        tests = score_tests(records, point.theta, white, feedback=self.feedback)
+        tests = score_tests(records, point.theta, white, feedback=self.feedback, robust=None)
         noise = noise_of(point, kind.own())
         factor = factor_at(records, point, noise)
         half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)

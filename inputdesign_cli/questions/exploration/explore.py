@@ -20,7 +20,7 @@ from inputdesign_cli.findings.periods import silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
 from inputdesign_cli.identification import frequency_response, response_delays, silent_in
-from inputdesign_cli.identification.silent_lines import SilentLines
+from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.outcome import MeasuredLines, Outcome
 from inputdesign_cli.outcome.curves import ResponseCurves
 from inputdesign_cli.outcome.results import Results, Table
