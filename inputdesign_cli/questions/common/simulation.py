@@ -42,7 +42,7 @@ from inputdesign_cli.outcome.curves import (
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import OnDesignModel, RatioAt, TriedInput, Violations
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.plant import Loop, Model
+from inputdesign_cli.plant import Loop, Model, close_loop
 from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.delivery import Delivered, with_study
 from inputdesign_cli.signal.kinds import kind_of
@@ -219,7 +219,7 @@ class TrueSystem:
         if self.relative_noise is not None:
             variance = self.relative_noise**2 * min(output_power)
             model = model.at(model.theta, variance * np.eye(model.outputs))
-        loop = None if self.loop is None else replace(self.loop, model=model)
+        loop = None if self.loop is None else close_loop(model, self.loop.controller)
         return replace(nominal, model=model, loop=loop, factor=None)
 
 
