@@ -189,9 +189,9 @@ class PolynomialModel(Parametrised):
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
         """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         tables = {"a": self.A, "b": self.B, "c": self.C, "d": self.D, "f": self.F}
-        moved = {letter.upper(): table for letter, table in tables_at(self.parameters, theta, tables).items()}
+        a, b, c, d, f = tables_at(self.parameters, theta, tables).values()
         noise = self.covariance if covariance is None else covariance
-        return replace(self, **moved, covariance=noise, delays=self.first)
+        return replace(self, A=a, B=b, C=c, D=d, F=f, covariance=noise, delays=self.first)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
