@@ -33,7 +33,7 @@ from inputdesign_cli.outcome.curves import BoundCurves, Curves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import TriedInput
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.plant import Loop, Model
+from inputdesign_cli.plant import Loop, Model, close_loop
 from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.delivery import Delivered
 from inputdesign_cli.questions.common.simulation_curves import cloud, disturbance, error_bands
@@ -65,7 +65,7 @@ class TrueSystem:
         if self.relative_noise is not None:
             variance = self.relative_noise**2 * min(output_power)
             model = model.at(model.theta, variance * np.eye(model.outputs))
-        loop = None if self.loop is None else replace(self.loop, model=model)
+        loop = None if self.loop is None else close_loop(model, self.loop.controller)
         return replace(nominal, model=model, loop=loop, factor=None)
 
 
