@@ -89,7 +89,7 @@ def join_roots(parts: Iterable[ComplexArray]) -> ComplexArray:
 _ROUNDING = 1e-13
 
 
-def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
+def stack(entries: Sequence[Sequence[Sequence[float] | Array]]) -> Array:
     """Rows of columns of coefficient lists as one array (rows, columns, longest)."""
     longest = max(len(p) for row in entries for p in row)
     full = np.zeros((len(entries), len(entries[0]), longest))

@@ -93,10 +93,12 @@ class PolynomialModel(Parametrised):
     def parameters(self) -> tuple[Parameter, ...]:
         """Return all free coefficients, of A, B, C, D and F in turn."""
         found: list[Parameter] = []
-        for letter, rows in (("a", self.A), ("b", self.B), ("c", self.C), ("d", self.D), ("f", self.F)):
-            if letter not in "bf":
-                found += row_parameters(letter, rows, self.outputs, self.inputs)
+        common, entries = {"a": self.A, "c": self.C, "d": self.D}, {"b": self.B, "f": self.F}
+        for letter in "abcdf":
+            if letter in common:
+                found += row_parameters(letter, common[letter], self.outputs, self.inputs)
                 continue
+            rows = entries[letter]
             for i, j in self.active:
                 label = entry_label(i, j, single=self.outputs == self.inputs == 1)
                 lags = range(self.first[i][j] if letter == "b" else 1, len(rows[i][j]))
@@ -188,10 +190,16 @@ class PolynomialModel(Parametrised):
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
         """Return the structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
-        tables = {"a": self.A, "b": self.B, "c": self.C, "d": self.D, "f": self.F}
-        moved = {letter.upper(): table for letter, table in tables_at(self.parameters, theta, tables).items()}
+        tables: dict[str, Sequence[Array | Sequence[Array]]] = {
+            "a": self.A,
+            "b": self.B,
+            "c": self.C,
+            "d": self.D,
+            "f": self.F,
+        }
+        a, b, c, d, f = tables_at(self.parameters, theta, tables).values()
         noise = self.covariance if covariance is None else covariance
-        return replace(self, **moved, covariance=noise, delays=self.first)
+        return replace(self, A=a, B=b, C=c, D=d, F=f, covariance=noise, delays=self.first)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""

@@ -8,7 +8,7 @@ multipliers and slacks of order one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -120,39 +120,13 @@ def solve_master(
     several = not problem.scaled and len(problem.costs) > 1
     largest = np.zeros((best.z.size, int(several)))  # an unknown that excites nothing
     columns = np.concatenate([face.columns, ray, largest], axis=1)
-    inside, number = face.columns.shape[1], columns.shape[1]
+    inside = face.columns.shape[1]
     objective, worth = best.objective, problem.price.at(best.z)
-    definite = problem.demands.definite
     # The nominal plant where there are no cuts: a program without M is solved by no spectrum at all.
     involved = sorted({placed.scenario for placed in cuts}) or [0]
+    definite = problem.demands.definite
     turns = {plant: _congruence(best.informations[plant], definite=definite) for plant in involved}
-    matrices = []
-    for plant, turn in turns.items():
-        mine = [placed for placed in cuts if placed.scenario == plant]
-        gains, offset = _turned(problem, plant, turn, columns, worth, best.s)
-        transformed = [placed.cut.transformed(turn) for placed in mine]
-        matrices.append(MatrixPart(gains, offset, transformed, [placed.side for placed in mine]))
-    signs = np.eye(number)[inside:]
-    cost = problem.price.vector @ columns
-    if problem.scaled:
-        signs = np.eye(number + 1)[inside:]
-        cost = np.eye(number + 1)[number]
-    limits, limit_offset = _limits(problem, columns, rows, best.s, worth)
-    if several:
-        cost = np.eye(number)[-1]
-        below = cost - worth / objective * np.array([one.vector for one in problem.costs]) @ columns
-        limits = np.concatenate([limits, below])
-        limit_offset = np.concatenate([limit_offset, np.zeros(len(below))])
-    program = FiniteProgram(
-        cost=cost,
-        face=face,
-        matrices=matrices,
-        signs=signs,
-        limits=limits,
-        limit_offset=limit_offset,
-        unit=best.s if problem.scaled else None,
-        size=problem.experiment.size,
-    )
+    program = _program(problem, face, columns, cuts, rows, best, turns)
     exact = max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR)
     solution = solve_program(program, tolerance=exact, rough=max(_SOLVER_MARGIN * rough, exact), dense=dense)
     if solution is None:
@@ -172,6 +146,44 @@ def solve_master(
         s=best.s * float(solution.v[-1]) if problem.scaled else 1.0,
         proof=Proof(tuple(proofs), weights, _shares(solution.limit_weights[len(rows) :])),
         converged=solution.converged,
+    )
+
+
+def _program(
+    problem: Problem,
+    face: Face,
+    columns: Array,
+    cuts: Sequence[PlacedCut],
+    rows: Sequence[Row],
+    best: Candidate,
+    turns: Mapping[int, Array],
+) -> FiniteProgram:
+    """The finite program in scaled numbers; the last column stands for the largest of several costs."""
+    inside, number = face.columns.shape[1], columns.shape[1]
+    worth = problem.price.at(best.z)
+    matrices = []
+    for plant, turn in turns.items():
+        mine = [placed for placed in cuts if placed.scenario == plant]
+        gains, offset = _turned(problem, plant, turn, columns, worth, best.s)
+        transformed = [placed.cut.transformed(turn) for placed in mine]
+        matrices.append(MatrixPart(gains, offset, transformed, [placed.side for placed in mine]))
+    unknowns = np.eye(number + int(problem.scaled))
+    cost = unknowns[number] if problem.scaled else problem.price.vector @ columns
+    limits, limit_offset = _limits(problem, columns, rows, best.s, worth)
+    if not problem.scaled and len(problem.costs) > 1:
+        cost = unknowns[-1]
+        below = cost - worth / best.objective * np.array([one.vector for one in problem.costs]) @ columns
+        limits = np.concatenate([limits, below])
+        limit_offset = np.concatenate([limit_offset, np.zeros(len(below))])
+    return FiniteProgram(
+        cost=cost,
+        face=face,
+        matrices=matrices,
+        signs=unknowns[inside:],
+        limits=limits,
+        limit_offset=limit_offset,
+        unit=best.s if problem.scaled else None,
+        size=problem.experiment.size,
     )
 
 

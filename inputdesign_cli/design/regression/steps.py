@@ -126,7 +126,7 @@ def _solve(
     def matrices(order: int) -> NDArray[np.float64]:
         return np.zeros((size + 3, order, order))
 
-    blocks = []
+    blocks: list[Block] = []
     if region.lines:
         positive, total = rows(size), rows(1)
         positive[1 : size + 1] = np.eye(size)
