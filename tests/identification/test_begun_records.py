@@ -44,8 +44,16 @@ def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
     return u[before:, None], y[before:, None]
 
 
-@pytest.mark.parametrize("words", [IN_S, IN_STATES], ids=["s", "states"])
-@pytest.mark.parametrize("delay", [0.4, pytest.param(12.3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("words", "delay"),
+    [
+        (IN_S, 0.4),
+        *(
+            pytest.param(*one, marks=pytest.mark.slow)
+            for one in ((IN_S, 12.3), (IN_STATES, 0.4), (IN_STATES, 12.3))
+        ),
+    ],
+)
 def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
     """The first dead time of the record holds what nobody recorded."""
     model, failed, deviations, variances = model_of(words, delay), 0, [], []
@@ -79,6 +87,7 @@ def test_many_short_records_at_rest_are_believed_to_be():
     assert refuted <= 1
 
 
+@pytest.mark.slow
 def test_many_short_records_of_a_running_experiment_are_not_taken_for_rest():
     """Where unknown starts explain half of the samples, rest was kept without a word."""
     model, deviations = model_of(IN_S, 4.3), []
@@ -250,7 +259,7 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     ("words", "colour"),
     [
         (IN_S, ""),
-        (IN_FUNCTIONS, COLOUR),
+        pytest.param(IN_FUNCTIONS, COLOUR, marks=pytest.mark.slow),
         *(pytest.param(*one, marks=pytest.mark.slow) for one in ((IN_S, COLOUR), (IN_STATES, COLOUR))),
         *(pytest.param(one, "", marks=pytest.mark.slow) for one in (IN_STATES, IN_FUNCTIONS)),
     ],

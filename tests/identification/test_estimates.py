@@ -134,13 +134,14 @@ def test_residuals_of_a_right_model_pass_as_often_as_they_should():
         assert np.mean(np.array(probabilities) < 0.05) < 0.2
 
 
+@pytest.mark.slow
 def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
     """y = 0.5 u(t-1) + 0.8 y(t-1) - .. + e under u = r - 0.6 y, r slow: u(t) itself tells e(t)."""
     model, rng = one_channel([0, 1], F=[1, 0]), np.random.default_rng(3)
-    slow = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((16, 400)))
-    e, y, u, x = 0.3 * rng.standard_normal((16, 400)), np.zeros((16, 400)), np.zeros((16, 400)), 0.0
+    slow = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((40, 400)))
+    e, y, u, x = 0.3 * rng.standard_normal((40, 400)), np.zeros((40, 400)), np.zeros((40, 400)), 0.0
     for t in range(400):
-        x = 0.8 * x + 0.5 * u[:, t - 1] if t else np.zeros(16)
+        x = 0.8 * x + 0.5 * u[:, t - 1] if t else np.zeros(40)
         y[:, t] = x + e[:, t]
         u[:, t] = slow[:, t] - 0.6 * y[:, t]
     told, untold = (
@@ -149,7 +150,7 @@ def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
                 identify(
                     model, u[i, :, None], y[i, :, None], feedback=feedback
                 ).tests.independence.probability
-                for i in range(16)
+                for i in range(40)
             ]
         )
         for feedback in (True, False)

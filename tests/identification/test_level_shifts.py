@@ -68,7 +68,9 @@ def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_
     assert found.sample == best[1]
 
 
-@pytest.mark.parametrize("noise", NOISES)
+@pytest.mark.parametrize(
+    "noise", [n if n == "white" else pytest.param(n, marks=pytest.mark.slow) for n in NOISES]
+)
 def test_right_models_have_none(noise):
     told = [
         shift_of(LAG + NOISES[noise], *lag_of(int(120 + 37 * seed), seed, noise)).test.probability < 1e-3
@@ -77,7 +79,13 @@ def test_right_models_have_none(noise):
     assert not any(told)
 
 
-@pytest.mark.parametrize(("at", "lag", "sign"), [(90, 0.0, -1.0), (150, 10.0, 1.0), (200, 25.0, -1.0)])
+@pytest.mark.parametrize(
+    ("at", "lag", "sign"),
+    [
+        (150, 10.0, 1.0),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((90, 0.0, -1.0), (200, 25.0, -1.0))),
+    ],
+)
 def test_where_it_happens_is_found(at, lag, sign):
     u, y = lag_of(300, 3)
     after = np.maximum(np.arange(300.0) - at, 0.0)
