@@ -96,6 +96,7 @@ def test_text_has_one_size_is_no_formula_and_no_legend_hides_a_curve(name, page)
             assert legend.get_window_extent().x1 <= figure.bbox.x1
 
 
+@pytest.mark.first(53)
 @pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("name", CURVES)
 def test_no_text_leaves_the_page_or_lies_on_another(name, narrow):

@@ -44,6 +44,7 @@ def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
     return u[before:, None], y[before:, None]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("words", [IN_S, IN_STATES], ids=["s", "states"])
 @pytest.mark.parametrize("delay", [0.4, pytest.param(12.3, marks=pytest.mark.slow)])
 def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
@@ -69,6 +70,7 @@ def _short_records(seed, *, at_rest):
     return u, y, [length] * len(cut)
 
 
+@pytest.mark.slow
 def test_many_short_records_at_rest_are_believed_to_be():
     """Unknown starts shrink what is left of the noise, so that chi-squared refuted 23 of 30."""
     model = model_of(IN_S, 4.3)
@@ -79,6 +81,7 @@ def test_many_short_records_at_rest_are_believed_to_be():
     assert refuted <= 1
 
 
+@pytest.mark.slow
 def test_many_short_records_of_a_running_experiment_are_not_taken_for_rest():
     """Where unknown starts explain half of the samples, rest was kept without a word."""
     model, deviations = model_of(IN_S, 4.3), []
@@ -149,6 +152,7 @@ def segmented(length, seed, *, colour=0.0):
     return u[kept, None], y[kept, None], [length] * (kept.size // length)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("colour", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("length", [20, 150])
 def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
@@ -223,6 +227,7 @@ def test_an_integrating_plant_may_be_measured_about_any_level(plant):
     assert np.sqrt(found.covariance[0, 0]) == pytest.approx(spread, rel=0.1)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
     rng = np.random.default_rng(seed)
@@ -238,6 +243,7 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
         assert 0.0 <= one.theta[2] < 5.0 * np.sqrt(one.covariance[2, 2])
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.
@@ -256,6 +262,7 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("colour", ["", COLOUR], ids=["white", "coloured"])
 @pytest.mark.parametrize("words", [IN_S, IN_STATES, IN_FUNCTIONS], ids=["s", "states", "functions"])
 def test_a_line_through_the_outputs_changes_no_estimate_that_knows_of_it(words, colour):

@@ -34,6 +34,7 @@ def test_arx_is_least_squares():
     np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(phi.T @ phi), rtol=1e-7)
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_known_parameters_are_recovered_without_a_start(name):
     model = SYSTEMS[name]
@@ -90,6 +91,7 @@ def test_residuals_of_a_right_model_pass_as_often_as_they_should():
         assert np.mean(np.array(probabilities) < 0.05) < 0.2
 
 
+@pytest.mark.slow
 def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
     """y = 0.5 u(t-1) + 0.8 y(t-1) - .. + e under u = r - 0.6 y, r slow: u(t) itself tells e(t)."""
     model, rng = one_channel([0, 1], F=[1, 0]), np.random.default_rng(3)

@@ -68,6 +68,7 @@ def test_the_statistic_is_the_likelihood_ratio_of_least_squares_with_one_column_
     assert found.sample == best[1]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("noise", NOISES)
 def test_right_models_have_none(noise):
     told = [
@@ -77,6 +78,7 @@ def test_right_models_have_none(noise):
     assert not any(told)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(("at", "lag"), [(90, 0.0), (150, 10.0), (200, 25.0)])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_where_it_happens_is_found(at, lag, sign):
@@ -92,6 +94,7 @@ def test_where_it_happens_is_found(at, lag, sign):
     assert found.rises == (sign > 0.0)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [5, 8])
 def test_a_load_that_comes_and_goes_is_two(seed):
     u, y = lag_of(300, seed)
@@ -102,6 +105,7 @@ def test_a_load_that_comes_and_goes_is_two(seed):
     assert not [test for test in found.beside_shifts if test.probability < 1e-4]
 
 
+@pytest.mark.slow
 def test_it_belongs_to_a_record_and_to_an_output():
     first, second = lag_of(150, 5), lag_of(200, 6)
     matrix = model_of(
@@ -135,6 +139,7 @@ def test_lines_and_single_samples_are_no_shifts():
     assert found.shifted == ()
 
 
+@pytest.mark.slow
 def test_what_the_unit_of_an_output_is_does_not_matter():
     u, y = lag_of(250, 8)
     y[120:] += 0.4

@@ -132,6 +132,7 @@ def test_an_unknown_covariance_is_that_of_the_residuals():
     np.testing.assert_allclose(found.noise, covariance * 300 / (300 - 5), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone():
     model = replace(box_jenkins(), A=(np.ones(1),), D=(np.ones(1),), covariance=np.diag([1.0, 4.0]))
     u, y = (x[0] for x in simulated(model, 600, np.random.default_rng(7)))
@@ -145,6 +146,7 @@ def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone(
         np.testing.assert_allclose(both.theta[mine], alone.theta, atol=1e-5)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
 def test_known_parameters_are_recovered_without_a_start(model):
     u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))

@@ -155,6 +155,7 @@ def test_data_without_noise_return_the_parameters(name, hold):
     np.testing.assert_allclose(found.theta[0], model.theta, atol=1e-8)
 
 
+@pytest.mark.first(4)
 @HOLDS
 @pytest.mark.parametrize("name", PLANTS)
 def test_parameters_are_found_without_a_start(name, hold):
@@ -317,6 +318,7 @@ def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
     return by_parameter, overall, whitened_eigenvalues(found.theta, information)
 
 
+@pytest.mark.first(1)
 @HOLDS
 def test_few_runs_from_the_nominal_start_reach_the_bound(hold):
     u = excitation(400, 2, np.random.default_rng(17))

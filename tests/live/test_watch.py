@@ -102,6 +102,7 @@ def test_the_answer_is_shown_before_the_pictures_are_drawn(spec, tmp_path):
         assert min(waited) < 0.5
 
 
+@pytest.mark.slow
 def test_the_terminal_keeps_a_line_of_every_round(spec, tmp_path):
     with (
         open(tmp_path / "told.txt", "w") as told,

@@ -79,6 +79,7 @@ def test_the_record_keeps_them_and_is_near_to_a_design_that_knows_the_rate(asked
     assert value > 1.5 * free
 
 
+@pytest.mark.slow
 def test_a_record_keeps_its_weaker_lines():
     """Clipped until it had the power of this design, the record alternated between two values: 7 times."""
     spec = parse_spec(

@@ -38,6 +38,7 @@ WILD = {
 }
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize(
     ("block", "cost"),
     [(5, "{input_power: 1}"), (60, "{output_power: 1}"), (5, "{input_power: 1, output_power: 1}")],

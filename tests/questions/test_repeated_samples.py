@@ -35,6 +35,7 @@ def saved(tmp_path):
     return save
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("parts", "told"),
     [

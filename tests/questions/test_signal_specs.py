@@ -106,6 +106,7 @@ def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not
     assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
 
 
+@pytest.mark.slow
 def test_a_converter_of_too_small_a_range_is_named():
     text = "signal: {candidates: 1, quantisation: {bits: 8, range: 0.45}}\n"
     with pytest.raises(InfeasibleError) as error:
@@ -122,6 +123,7 @@ def test_limits_that_no_length_makes_up_for():
     assert "samples a spectrum can" in error.value.diagnostics[0].hint
 
 
+@pytest.mark.slow
 def test_the_shortest_experiment_delivers_the_longer_record():
     text = BASE.replace("experiment: {samples: 500}\n", "objective: shortest_experiment\n")
     outcome = solve(

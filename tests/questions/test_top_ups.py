@@ -43,6 +43,7 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("overrides", "verdict", "why"),
     [
@@ -80,6 +81,7 @@ def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path
         solve(load_spec(spec))
 
 
+@pytest.mark.slow
 def test_the_operating_point_of_the_command_line(heater_record, tmp_path):
     spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
     spec.write_text(STRUCTURE)
@@ -123,6 +125,7 @@ def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_
     assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page
 
 
+@pytest.mark.slow
 def test_the_level_of_the_data_is_told_where_the_spec_does_not_know_it(heater_record):
     asked = (
         "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"

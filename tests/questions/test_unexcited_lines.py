@@ -93,6 +93,7 @@ def told_periods(write, u, admitted=0.05):
     return spec, found, found.results.result["assessment"].get("periods")
 
 
+@pytest.mark.slow
 def test_as_many_periods_as_are_told_do(write):
     u = solve(parse_spec(TEXT)).signal[:, 0]
     spec, first, needed = told_periods(write, u, 0.04)

@@ -72,6 +72,7 @@ def test_a_gain_that_is_small_in_the_spec_as_well_may_be_zero(tmp_path):
     assert found == "met", why
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("u", ["held", "sines", "drifting"])
 def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, tmp_path):
     """Of three short records of right models none is blamed, whatever moves the plant, after a dead time."""

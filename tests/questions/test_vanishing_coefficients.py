@@ -59,6 +59,7 @@ def test_the_gradient_is_that_of_plants_nearby(name):
     np.testing.assert_allclose(gradient, slope, atol=1e-6 * np.abs(slope).max())
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("name", ["first of B", "of A", "first of a numerator", "gain", "common delay"])
 def test_the_information_is_the_limit_of_that_nearby(name):
     at, near = (analyse(spec_at(name, value)).result["information"] for value in (2.0, 2.0 + 1e-7))

@@ -25,6 +25,7 @@ def test_a_right_model_is_met(heater_record):
     assert found.results.result["identification"]["failed"] == []
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("drift", [0.0, 1.0])
 def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
     found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True, drift=drift))
@@ -44,6 +45,7 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
     )
 
 
+@pytest.mark.slow
 def test_records_of_two_plants_are_named(heater_record, tmp_path):
     spec = parse_spec(HEATER)
     first, second = heater_record("a.csv", 400, 1), heater_record("b.csv", 400, 2)
@@ -98,6 +100,7 @@ def test_undecided_has_its_own_exit_code(heater_record, tmp_path):
     assert {"fit.csv", "residuals.csv", "bound.csv", "model.yaml"} < set(result["files"])
 
 
+@pytest.mark.slow
 def test_records_are_judged_together_by_the_number_that_is_printed(heater_record):
     """Information of two records adds up, and the top-up counts the first as the joint verdict does."""
     spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"])
@@ -116,6 +119,7 @@ def test_records_are_judged_together_by_the_number_that_is_printed(heater_record
     assert np.array_equal(np.unique(both.results.tables["fit"].columns["record"]), [1, 2])
 
 
+@pytest.mark.slow
 def test_beside_an_undecided_model_stands_what_the_data_say_without_one(heater_record):
     found = assess(parse_spec(HEATER), heater_record("a.csv", 720, 1, lag=True))
     table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
@@ -131,6 +135,7 @@ def test_beside_an_undecided_model_stands_what_the_data_say_without_one(heater_r
     )
 
 
+@pytest.mark.slow
 def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp_path):
     loop = [
         "experiment.controller={numerator: [0.01], denominator: [1]}",

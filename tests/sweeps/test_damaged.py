@@ -48,6 +48,7 @@ DAMAGES = {
 }
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
     out, run = swept

@@ -165,6 +165,7 @@ def test_a_record_that_is_not_its_plan_is_refused(run, begun, tmp_path):
     assert unlike["figures"]["correlation"] == result["campaign"]["records"][0]["likeness"]
 
 
+@pytest.mark.slow
 def test_whatever_a_record_says_the_next_part_keeps_the_cap(run, begun, tmp_path):
     """Records that speak of a plant without gain: without a cap the plan had 10000 times the power."""
     for number in (1, 2):
