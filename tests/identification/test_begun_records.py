@@ -44,7 +44,7 @@ def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
     return u[before:, None], y[before:, None]
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [IN_S, IN_STATES], ids=["s", "states"])
 @pytest.mark.parametrize("delay", [0.4, pytest.param(12.3, marks=pytest.mark.slow)])
 def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
@@ -94,6 +94,7 @@ def test_many_short_records_of_a_running_experiment_are_not_taken_for_rest():
     assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
 
 
+@pytest.mark.slow
 def test_residuals_that_unknown_inputs_make_zero_are_not_tested():
     """The statistic of [ljung-box-1978] over the rest; with them it was a third too large, and more."""
     model = model_of(IN_S, 60.3)
@@ -152,7 +153,7 @@ def segmented(length, seed, *, colour=0.0):
     return u[kept, None], y[kept, None], [length] * (kept.size // length)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("length", [20, 150])
 def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
@@ -170,6 +171,7 @@ def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
     assert failed <= 1
 
 
+@pytest.mark.slow
 def test_what_many_starts_hide_is_still_found():
     """White noise is what the model knows, and what it meets is not white."""
     one = np.ones(1)
@@ -243,7 +245,7 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
         assert 0.0 <= one.theta[2] < 5.0 * np.sqrt(one.covariance[2, 2])
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.
@@ -262,7 +264,7 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("colour", ["", COLOUR], ids=["white", "coloured"])
 @pytest.mark.parametrize("words", [IN_S, IN_STATES, IN_FUNCTIONS], ids=["s", "states", "functions"])
 def test_a_line_through_the_outputs_changes_no_estimate_that_knows_of_it(words, colour):

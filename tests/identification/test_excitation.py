@@ -53,6 +53,7 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
@@ -71,6 +72,7 @@ def test_units_of_signals_change_no_answer(rest, of_u, of_y):
     assert [test.name for test in other.failed] == [test.name for test in one.failed]
 
 
+@pytest.mark.first(1)
 @settings(max_examples=4, deadline=None)
 @given(of_time=st.integers(-4, 4), of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, False])

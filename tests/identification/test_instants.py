@@ -38,6 +38,7 @@ def moved(seed):
     return u, y, lags, lates, log
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("seed", [7, 14, 20, 37])
 def test_deviations_are_those_of_the_likelihood_beyond_instants(seed):
     """The curvature at the best minimum alone has dead times by a third to a half too sure here."""

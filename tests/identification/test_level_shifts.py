@@ -78,7 +78,7 @@ def test_right_models_have_none(noise):
     assert not any(told)
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("at", "lag"), [(90, 0.0), (150, 10.0), (200, 25.0)])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_where_it_happens_is_found(at, lag, sign):
@@ -125,6 +125,7 @@ def test_it_belongs_to_a_record_and_to_an_output():
     assert shift_of(LAG + NOISES["white"], u, apart, lengths=[150, 200], rest=False).test.probability > 0.01
 
 
+@pytest.mark.slow
 def test_lines_and_single_samples_are_no_shifts():
     u, y = lag_of(300, 7)
     line = y + np.linspace(0.0, 1.0, 300)[:, None]

@@ -65,6 +65,7 @@ def test_a_model_takes_other_parameters():
     np.testing.assert_array_equal(moved.covariance, np.eye(2))
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("runs", [3, 30])
 @pytest.mark.parametrize("known", [True, False])
 def test_cost_and_gradient_are_those_of_finite_differences(runs, known):
@@ -146,7 +147,7 @@ def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone(
         np.testing.assert_allclose(both.theta[mine], alone.theta, atol=1e-5)
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
 def test_known_parameters_are_recovered_without_a_start(model):
     u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))

@@ -93,6 +93,7 @@ def loop(proportional, integral, derivative, seed, on_u=0.0, grid=0.0, samples=8
 LOOPS = [(1.0, 0.0, 0.0), (1.0, 0.08, 0.0), (1.0, 0.08, 0.5)]
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize("feedback", [True, False])
 @pytest.mark.parametrize("law", LOOPS)
 @pytest.mark.parametrize("disturbed", [{}, {"on_u": 0.01}, {"grid": 0.02}])

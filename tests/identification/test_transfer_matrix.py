@@ -155,7 +155,7 @@ def test_data_without_noise_return_the_parameters(name, hold):
     np.testing.assert_allclose(found.theta[0], model.theta, atol=1e-8)
 
 
-@pytest.mark.first(4)
+@pytest.mark.first(2)
 @HOLDS
 @pytest.mark.parametrize("name", PLANTS)
 def test_parameters_are_found_without_a_start(name, hold):
@@ -225,6 +225,7 @@ def test_instruments_alone_come_within_a_fraction_of_a_standard_deviation():
     assert off @ likeliest.information @ off < 1e-8
 
 
+@pytest.mark.slow
 def test_a_change_of_the_unit_of_time_changes_the_units_of_the_estimate():
     model = PLANTS["two by two"]
     rng = np.random.default_rng(10)
@@ -262,6 +263,7 @@ def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
     assert not found.converged[0]
 
 
+@pytest.mark.slow
 def test_a_batch_is_one_estimate_after_the_other():
     rng = np.random.default_rng(13)
     u = excitation(300, 2, rng)
@@ -274,6 +276,7 @@ def test_a_batch_is_one_estimate_after_the_other():
         np.testing.assert_allclose(found.noise[run], single.noise, rtol=1e-4)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("change", "code", "word"),
     [

@@ -19,7 +19,7 @@ def kills(folder, how, users):
     return [json.loads(line) for line in ended.stdout.splitlines()]
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("how", "users"), [("exchange", "plain"), ("exchange", "folder"), ("moves", "plain")]
 )

@@ -172,6 +172,7 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch
         assert names(place) == set(), step
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
 @pytest.mark.parametrize("exchange", [True, False])
 def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(

@@ -41,6 +41,7 @@ def test_explore_tells_the_line_that_it_took_away(tmp_path):
     assert rises == pytest.approx(0.01, abs=3e-4)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("gain", "words"), [(0.3, "is seen, but noise and drift"), (0.0, "explain nothing")])
 def test_noise_that_wanders_farther_than_the_plant_does_not_hide_it(tmp_path, gain, words):
     """The likelihood ratio of least squares on differences with the noise known: beyond chance, or not."""

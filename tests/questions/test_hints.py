@@ -44,6 +44,7 @@ ADVICE = {
 }
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("plant", "limit", "relative", "level"), TRIED)
 def test_who_follows_a_hint_succeeds(plant, limit, relative, level):
     text = PLANTS[plant] + LIMITS[limit] % level + COMMON % relative

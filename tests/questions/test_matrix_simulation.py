@@ -159,6 +159,7 @@ IN_S += "0.69314718]}, sample: zoh"
 COLOURED = "noise: {C: [1, 0.8], variance: 0.5}"
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("nominal", [IN_Q, IN_S])
 @pytest.mark.parametrize("loop", ["", ", controller: {numerator: [[[0.1], [0]], [[0], [0.1]]]}"])
 def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
@@ -233,6 +234,7 @@ class Elsewhere:
             yield Finished(task, pickle.loads(pickle.dumps(there(task))))
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("spec", "overrides"),
     [

@@ -35,7 +35,7 @@ def saved(tmp_path):
     return save
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("parts", "told"),
     [

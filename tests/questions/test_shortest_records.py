@@ -190,6 +190,7 @@ def test_a_long_shortest_record_takes_few_records_of_its_length():
     assert sum(made) <= 15 * found["samples"]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
 def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):
     """No phases make up for a third less accuracy than asked."""

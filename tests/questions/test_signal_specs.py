@@ -41,6 +41,7 @@ CASES = [
 ]
 
 
+@pytest.mark.first(5)
 @pytest.mark.parametrize(("text", "most"), CASES, ids=[text for text, _ in CASES])
 def test_the_record_meets_the_accuracy(text, most):
     outcome = solve(parse_spec(BASE + text + "\n"))
@@ -180,6 +181,7 @@ def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(off
     assert np.abs(u - offset).max() <= 0.75 + 1e-12
 
 
+@pytest.mark.slow
 def test_the_share_of_each_limit_that_single_samples_take():
     """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
     limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"

@@ -66,6 +66,7 @@ def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, he
     assert ("no experiment is designed" in said(found.results)) == (verdict == "missed")
 
 
+@pytest.mark.slow
 def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path):
     spec, path = tmp_path / "structure.yaml", heater_record("a.csv", 300, 1)
     spec.write_text(STRUCTURE)

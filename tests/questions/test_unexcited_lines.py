@@ -61,6 +61,7 @@ def test_only_lines_with_power_are_measured(write, u, lines):
     assert one.figures == {"lines": 20 - len(there), "asked": 20, "first": pytest.approx(first)}
 
 
+@pytest.mark.slow
 def test_the_noise_of_a_line_is_not_that_of_its_unexcited_neighbours(write):
     # Of |U|^2 = N p / 2 with p = 1/2 and 2000 samples, Phi_v = 0.01 / |1 - 0.9 exp(-jw)|^2.
     w = 2.0 * np.pi * LINE / PERIOD

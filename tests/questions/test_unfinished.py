@@ -35,7 +35,7 @@ SPECS = {
 }
 
 
-@pytest.mark.first(5)
+@pytest.mark.first(2)
 @pytest.mark.parametrize("text", SPECS.values(), ids=SPECS)
 def test_what_is_delivered_meets_everything_and_its_bounds_hold(slow_solver, text):
     best = solve(parse_spec(PLANT + text)).result["objective"]

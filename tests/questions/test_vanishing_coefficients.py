@@ -85,6 +85,7 @@ def test_parameters_elsewhere_do_not_change_what_a_plant_consists_of(name):
 DESIGN = "noise: {variance: 0.04}\nexperiment: {samples: 300}\nspectrum: {type: fir, order: 4}\n"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", ["entry of B", "gain", "B of states"])
 def test_an_entry_that_vanishes_must_be_as_accurate_as_the_others(name):
     rest = DESIGN + "accuracy: {model_error: {absolute: 0.1}}\n"

@@ -79,6 +79,7 @@ def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(he
     assert ["u2"] in [one.figures["columns"] for one in findings if one.code == "columns-unused"]
 
 
+@pytest.mark.slow
 def test_a_drift_is_told_from_noise(heater_record):
     spec = parse_spec(HEATER, overrides=["noise={C: [1], D: [1, -0.5], variance: 0.001}"])
     found = assess(spec, heater_record("a.csv", 720, 1, drift=2.0)).results.result
@@ -154,6 +155,7 @@ def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp
         assert ("response-biased-by-loop" in codes) == (by == "u")
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("factor", "contradicts"), [(1.0, False), (1.1, False), (1.6, False), (-1.0, True), (3.0, True)]
 )

@@ -179,7 +179,7 @@ def experiment(request, first_order):
     return Experiment(arx(), 240).whitened(1.0)
 
 
-@pytest.mark.first(60)
+@pytest.mark.first(20)
 @pytest.mark.parametrize("meets", [True, False])
 @pytest.mark.parametrize("limited", [*LIMITS, "none"])
 @pytest.mark.parametrize("kind", SETTINGS)
@@ -213,7 +213,7 @@ def test_levels_of_a_signal_of_zeros(monkeypatch, kind):
     assert np.all(np.isfinite(found))
 
 
-@pytest.mark.first(36)
+@pytest.mark.first(12)
 @pytest.mark.parametrize("limited", LIMITS)
 @pytest.mark.parametrize("kind", SETTINGS)
 def test_limits_hold_exactly(experiment, kind, limited):
@@ -233,7 +233,7 @@ def test_converters_hold_the_limits_too(experiment, kind, limited):
     )
 
 
-@pytest.mark.first(4)
+@pytest.mark.first(2)
 @pytest.mark.parametrize("limits", [{"amplitude": 2.0}, {"rate": 2.5}, {"output": 2.5}])
 @pytest.mark.parametrize("kind", ["noise", "optimised", "binary"])
 def test_limits_in_closed_loop_are_those_of_what_r_causes(flexible, kind, limits):

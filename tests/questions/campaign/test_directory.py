@@ -93,6 +93,7 @@ def test_a_record_at_another_scale_is_refused(run, begun, tmp_path, scale):
     assert (code, scaled["figures"]["scale"]) == (0, pytest.approx(scale, rel=1e-6))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("missing", [0, 4])
 def test_a_record_of_an_earlier_plan_is_refused(run, once, tmp_path, missing):
     """The input of the pilot, applied again with other noise, where the second plan is due."""
