@@ -172,6 +172,7 @@ def test_right_models_are_seldom_undecided_and_wrong_ones_seldom_met():
     assert sum(counts["beyond"] for counts in wrong) >= 20
 
 
+@pytest.mark.slow
 def test_a_dead_time_at_zero_hides_nothing():
     """The samples would have it negative, and the tests are those of the plant without a dead time.
 

@@ -229,7 +229,7 @@ def test_an_integrating_plant_may_be_measured_about_any_level(plant):
     assert np.sqrt(found.covariance[0, 0]) == pytest.approx(spread, rel=0.1)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
     rng = np.random.default_rng(seed)
@@ -264,7 +264,7 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", ["", COLOUR], ids=["white", "coloured"])
 @pytest.mark.parametrize("words", [IN_S, IN_STATES, IN_FUNCTIONS], ids=["s", "states", "functions"])
 def test_a_line_through_the_outputs_changes_no_estimate_that_knows_of_it(words, colour):

@@ -38,7 +38,7 @@ def seen(u, y, model):
     )
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "step",
     [step if step in (None, 0.5, 5.0) else pytest.param(step, marks=pytest.mark.slow) for step in STEPS],

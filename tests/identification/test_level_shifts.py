@@ -94,7 +94,7 @@ def test_where_it_happens_is_found(at, lag, sign):
     assert found.rises == (sign > 0.0)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 8])
 def test_a_load_that_comes_and_goes_is_two(seed):
     u, y = lag_of(300, seed)
@@ -160,6 +160,7 @@ def test_a_record_too_short_for_any_has_none():
     assert shift_of(text, u, y, rest=True) is None
 
 
+@pytest.mark.slow
 def test_a_shift_that_alone_refutes_a_model_is_told_whatever_hardly_counts():
     """Its score may say less than a test that does not fail; another one that fails outweighs it."""
     u, y = lag_of(300, 5)

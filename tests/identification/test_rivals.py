@@ -42,7 +42,7 @@ def of_s(theta):
     return b / a, 1.0 / a, dead_time
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
     found, y = estimated(TWO_SINES, seed)
@@ -60,12 +60,13 @@ def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
     assert found.rivals[0].excess == pytest.approx(SAMPLES * np.log(left[1].cost / left[0].cost), abs=0.02)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rich_record_leaves_no_rival(seed):
     assert estimated(BINARY, seed)[0].rivals == ()
 
 
+@pytest.mark.slow
 def test_the_search_tells_how_far_it_is():
     told = []
     with watching(told.append):

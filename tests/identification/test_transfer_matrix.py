@@ -321,7 +321,7 @@ def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
     return by_parameter, overall, whitened_eigenvalues(found.theta, information)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @HOLDS
 def test_few_runs_from_the_nominal_start_reach_the_bound(hold):
     u = excitation(400, 2, np.random.default_rng(17))

@@ -181,6 +181,7 @@ def test_how_such_a_plant_moves_g_is_told_of_both_ways():
     assert np.std((rises + falls) / lag[0]) < 1e-4 * max(np.abs(np.mean((rises + falls) / lag[0])), 1e-12)
 
 
+@pytest.mark.slow
 def test_the_unit_of_the_input_does_not_matter():
     u = np.random.default_rng(3).standard_normal(800)
     y = through(np.clip(u, -2.0, 2.0))

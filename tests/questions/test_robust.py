@@ -224,7 +224,7 @@ def test_limits_on_powers_bind_the_record_at_every_plant():
     assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", [False, True])
 def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
     """Of the output, and in a loop of the input: plain filters of plant and controller simulate both."""

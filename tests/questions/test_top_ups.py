@@ -14,6 +14,7 @@ from inputdesign_cli.findings.top_up_levels import level_notes
 from tests.support.heater import HEATER, STRUCTURE, said
 
 
+@pytest.mark.slow
 def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     path = heater_record("a.csv", 300, 1, power=0.02)
     limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]

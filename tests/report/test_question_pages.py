@@ -155,6 +155,7 @@ def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
     assert row in rows(parse(report_text(tmp_path / "run")))
 
 
+@pytest.mark.slow
 def test_the_chart_of_the_error_says_what_gave_it(data, tmp_path):
     """A top-up has a design of its own; what the data gave stands beside it."""
     spec = parse_spec(SPEC % "", overrides=["accuracy.model_error.relative=0.1"])

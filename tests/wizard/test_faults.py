@@ -248,7 +248,7 @@ def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
         compose({**ENGINEER, "wish": f"PI loop with {below:.3g} dB"}, "x", tmp_path).validate()
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "named"),
     [("50 degrees", r"example ([\d.]+ degrees)"), ("gain margin 20", r"example (gain margin [\d.]+)")],

@@ -67,6 +67,7 @@ def _log(folder, samples=1200, *, beside=0.0):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("drift", "drifts"),
     [
