@@ -212,21 +212,6 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
             read(path)
 
 
-@pytest.mark.slow
-def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
-    path = lag_log(tmp_path / "log.csv", samples=400)
-    good = explore(path).results.result["notes"]
-    lines = path.read_text().splitlines()
-    for row in range(200, 250):
-        lines[row] = ",".join([*lines[row].split(",")[:2], lines[200].split(",")[2]])
-    path.write_text("\n".join(lines))
-    found = explore(path).results.result["notes"]
-    assert not any("stands still" in note for note in good)
-    reason, told = [note for note in found if "stands still" in note]
-    assert "rows 201 to 250" in told
-    assert reason.startswith("no trust: y stands still at ")
-
-
 def test_many_spikes_are_told(tmp_path):
     """Of 400 samples 32, more than outliers are."""
     path = lag_log(tmp_path / "log.csv", samples=400)

@@ -122,19 +122,6 @@ def test_the_command_exits_with_one_when_the_target_is_missed(data, tmp_path):
     assert "estimate" in run.stdout
 
 
-@pytest.mark.slow
-def test_offsets_and_outliers_are_told(write):
-    columns = record(np.random.default_rng(3).standard_normal(500))
-    columns["y1"] = columns["y1"] + 100.0
-    columns["u1"][40] = 60.0
-    outcome = identify(load_spec(SPEC), write(columns))
-    assert "row 42" in " ".join(outcome.result["notes"])
-    (start,) = [one for one in outcome.outcome.findings if one.code == "start-estimated"]
-    assert start.figures["first_residual"] == pytest.approx(columns["y1"][0], rel=1e-2)
-    known = identify(load_spec(SPEC), write(columns), operating_point={"y1": 100.0})
-    assert not known.result["identification"]["free_start"]
-
-
 @pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_short_pilot_from_rest_is_not_said_to_begin_otherwise(write, seed):
     """Nor does its estimate of C run to the unit circle, which would remember for ever what was before it."""

@@ -187,18 +187,6 @@ def test_prior_information_narrows_the_estimates():
     assert all(0.8 < ratio < 1.2 for ratio in design["rms_over_theory"].values())
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        "{type: white, power: 100}",
-        "{type: multisine, frequencies: [0.1, 0.4, 1, 2], amplitudes: [[9, 3, 4, 5], [2, -3, 6, -8]]}",
-    ],
-)
-def test_given_excitations_are_tried(given):
-    overrides = [f"spectrum={{given: {given}}}", "simulation={runs: 100}"]
-    within_wishart(simulate(load_spec(SPEC, overrides)).result["simulation"])
-
-
 def test_a_given_table_is_tried(tmp_path):
     table = tmp_path / "phi.csv"
     table.write_text(

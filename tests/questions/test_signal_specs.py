@@ -124,18 +124,6 @@ def test_limits_that_no_length_makes_up_for():
     assert "samples a spectrum can" in error.value.diagnostics[0].hint
 
 
-@pytest.mark.slow
-def test_the_shortest_experiment_delivers_the_longer_record():
-    text = BASE.replace("experiment: {samples: 500}\n", "objective: shortest_experiment\n")
-    outcome = solve(
-        parse_spec(text + "limits: {input_power: 0.3, amplitude: 0.55}\nsignal: {candidates: 2}\n")
-    )
-    signal = outcome.result["signal"]
-    assert signal["samples"] > outcome.result["samples"]
-    assert signal["worst_ratio"] <= 1 + 1e-9
-    assert any("single samples" in note for note in outcome.result["notes"])
-
-
 def test_files_and_plots(tmp_path):
     """CSV, MAT and WAV hold the same values; the limits and the record are drawn."""
     text = BASE + "sample_time: 0.5\nlimits: {amplitude: 1.2}\n"

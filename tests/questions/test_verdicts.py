@@ -79,16 +79,6 @@ def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(he
     assert ["u2"] in [one.figures["columns"] for one in findings if one.code == "columns-unused"]
 
 
-@pytest.mark.slow
-def test_a_drift_is_told_from_noise(heater_record):
-    spec = parse_spec(HEATER, overrides=["noise={C: [1], D: [1, -0.5], variance: 0.001}"])
-    found = assess(spec, heater_record("a.csv", 720, 1, drift=2.0)).results.result
-    assert "trend" in found["identification"]["failed"]
-    first = found["assessment"]["undecided"][0]
-    (drift,) = [one for one in found["findings"] if one["code"] == "drift"]
-    assert (drift["where"], drift["severity"], drift["message"]) == ("trend", "refuted", first)
-
-
 def test_undecided_has_its_own_exit_code(heater_record, tmp_path):
     spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 720, 1, lag=True)
     spec.write_text(HEATER)
