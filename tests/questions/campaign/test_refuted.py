@@ -68,7 +68,7 @@ def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
 
 @pytest.mark.slow
 def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
-    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 90, stop: never}"))
+    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 60, stop: never}"))
     assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
     code, result = until_it_ends(run, tmp_path / "c", tmp_path)
     assert result["samples"] == 200
