@@ -31,8 +31,8 @@ browser: $(READY)  ## the tests of pages in a real browser (Debian: apt-get inst
 	@command -v chromium chromium-browser google-chrome >/dev/null || { echo "no Chromium was found" >&2; exit 1; }
 	$(PY) -m pytest -m browser
 
-slow: $(READY)  ## the slow tests: random plants, Monte Carlo
-	$(PY) -m pytest -m slow
+slow: $(READY)  ## the slow tests: seconds that lighter ones cover, random plants, Monte Carlo
+	$(PY) -m pytest -m slow -n auto --maxprocesses 4
 
 fuzz: $(READY)  ## extreme and broken specs for FUZZ_SECONDS (60): no crash, no hang, no nonsense
 	$(PY) -m tests.fuzzing

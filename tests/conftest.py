@@ -4,6 +4,7 @@ import gc
 import os
 import shutil
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,17 @@ _NEW_OBJECTS = 50_000
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, handler)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Beyond the sets of parameters that its mark `first` counts a test is slow."""
+    seen = Counter()
+    for item in items:
+        name, mark = item.nodeid.partition("[")[0], item.get_closest_marker("first")
+        seen[name] += 1
+        if mark is not None and seen[name] > mark.args[0]:
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish():

@@ -123,6 +123,7 @@ def test_what_is_made_of_expressions_is_worth_what_they_are(text):
         assert pickle.loads(pickle.dumps(made)).at(NAMES, VALUES)[0] == found[0]
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("count", [0, 1, 6, 60])
 def test_products_of_many_factors_are_those_of_numpy(count):
     """And their slopes those of complex steps; each factor is worked through once."""

@@ -41,6 +41,7 @@ FAILS = [
 ]
 
 
+@pytest.mark.first(5)
 @pytest.mark.parametrize(
     ("command", "stream", "code", "said"),
     [
@@ -77,6 +78,7 @@ def test_a_home_that_cannot_be_written(tmp_path):
 START = "from inputdesign_cli.__main__ import main; print(flush=True); main()"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 )

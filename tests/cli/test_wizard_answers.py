@@ -95,6 +95,7 @@ def test_what_is_no_file_is_told_as_what_it_is(run, tmp_path, key, name, words):
     assert words in err
 
 
+@pytest.mark.slow
 def test_an_integrator_in_open_loop_asks_for_a_controller(run, tmp_path):
     (tmp_path / "p.json").write_text('{"num": [2], "den": [180, 1, 0], "delay": 25}')
     said = GOOD | {"plant": "p.json", "wish": "PI loop with 6 dB"}

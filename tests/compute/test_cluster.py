@@ -84,6 +84,7 @@ def test_errors_come_back(loopback):
     assert done[4].answer == 4
 
 
+@pytest.mark.slow
 def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_path):
     spec = tmp_path / "small.yaml"
     spec.write_text(SPEC)
@@ -174,6 +175,7 @@ def test_no_cluster_is_a_complaint():
 SPECS = Path(__file__).parents[2] / "specs"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [

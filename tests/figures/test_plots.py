@@ -34,6 +34,7 @@ def drawn(name, narrow=False):
     return rendered(painter(CURVES[name]), narrow=narrow, seen=seen), *found[0]
 
 
+@pytest.mark.first(18)
 @pytest.mark.parametrize("name", CURVES)
 def test_a_png_of_the_promised_size(name):
     data, _, _ = drawn(name)
@@ -59,6 +60,7 @@ def test_the_unit_of_time_is_on_the_axis(page):
     assert "(min)" in page(CURVES["signal"], "min").axes[0].get_xlabel()
 
 
+@pytest.mark.first(18)
 @pytest.mark.parametrize("name", CURVES)
 def test_every_row_of_panels_has_a_label(name, page):
     """Of panels side by side the left one has it, for all."""
@@ -83,6 +85,7 @@ def test_names_and_units_are_drawn_as_they_are():
     assert draw(bound(BoundPanel(W, 0.008 * G, G, names=" → ".join(long))))
 
 
+@pytest.mark.first(18)
 @pytest.mark.parametrize("name", CURVES)
 def test_text_has_one_size_is_no_formula_and_no_legend_hides_a_curve(name, page):
     figure = page(CURVES[name])
@@ -96,6 +99,7 @@ def test_text_has_one_size_is_no_formula_and_no_legend_hides_a_curve(name, page)
             assert legend.get_window_extent().x1 <= figure.bbox.x1
 
 
+@pytest.mark.first(18)
 @pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("name", CURVES)
 def test_no_text_leaves_the_page_or_lies_on_another(name, narrow):

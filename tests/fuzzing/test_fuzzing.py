@@ -19,6 +19,7 @@ from tests.fuzzing.textbook import findings, worst_ratio
 SEEDS = (1, 2, 3, 5, 8, 13, 21)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_mutated_specs_end_well(seed):
     text = yaml.safe_dump(mutated(random.Random(seed)), default_flow_style=None, sort_keys=False)
@@ -26,6 +27,7 @@ def test_mutated_specs_end_well(seed):
     assert wrong == ""
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("number", [3, 7, 11])
 def test_specs_made_from_nothing_end_well(number):
     text = yaml.safe_dump(generated(number), default_flow_style=None, sort_keys=False)

@@ -105,6 +105,7 @@ def test_slow_noise_that_is_hardly_known_is_no_drift():
     assert np.sum(np.array(found) < 0.05) <= 4
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("model", "fault", "name"),
     [
@@ -171,6 +172,7 @@ def test_right_models_are_seldom_undecided_and_wrong_ones_seldom_met():
     assert sum(counts["beyond"] for counts in wrong) >= 20
 
 
+@pytest.mark.slow
 def test_a_dead_time_at_zero_hides_nothing():
     """The samples would have it negative, and the tests are those of the plant without a dead time.
 

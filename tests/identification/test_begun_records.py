@@ -77,6 +77,7 @@ def _short_records(seed, *, at_rest):
     return u, y, [length] * len(cut)
 
 
+@pytest.mark.slow
 def test_many_short_records_at_rest_are_believed_to_be():
     """Unknown starts shrink what is left of the noise, so that chi-squared refuted 23 of 30."""
     model = model_of(IN_S, 4.3)
@@ -101,6 +102,7 @@ def test_many_short_records_of_a_running_experiment_are_not_taken_for_rest():
     assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
 
 
+@pytest.mark.slow
 def test_residuals_that_unknown_inputs_make_zero_are_not_tested():
     """The statistic of [ljung-box-1978] over the rest; with them it was a third too large, and more."""
     model = model_of(IN_S, 60.3)
@@ -149,6 +151,7 @@ def segmented(length, seed, *, colour=0.0):
     return u[kept, None], y[kept, None], [length] * (kept.size // length)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("length", [20, 150])
 def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
@@ -166,6 +169,7 @@ def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
     assert failed <= 1
 
 
+@pytest.mark.slow
 def test_what_many_starts_hide_is_still_found():
     """White noise is what the model knows, and what it meets is not white."""
     one = np.ones(1)

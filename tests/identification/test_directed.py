@@ -121,6 +121,7 @@ def test_probabilities_of_right_models_are_uniform():
     assert scipy.stats.binomtest(sum(below), len(below), 0.05).pvalue > 1e-3
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("B", "F", "first"),
     [

@@ -85,6 +85,7 @@ def test_what_is_known_of_some_parameters_makes_up_for_excitation():
     np.testing.assert_allclose(found.theta, [1.0, 0.5, 0.2], atol=0.06)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("model", [ARX, JENKINS], ids=["arx", "bj"])
 def test_only_the_data_themselves_are_those_of_their_estimate(model):
     """Not those of the same input, of the same length, or a part of them."""

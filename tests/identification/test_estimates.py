@@ -75,6 +75,7 @@ def test_arx_is_least_squares():
     np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(phi.T @ phi), rtol=1e-7)
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_known_parameters_are_recovered_without_a_start(name):
     model = SYSTEMS[name]

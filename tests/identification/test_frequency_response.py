@@ -145,6 +145,7 @@ def _held(found):
     return np.mean(np.abs(found.G - plant(found.frequency)[:, None, None] * late) < found.radius)
 
 
+@pytest.mark.slow
 def test_behind_their_dead_times_the_discs_of_each_entry_hold_the_plant():
     told, untold = [], []
     for seed in range(12):

@@ -99,6 +99,7 @@ def test_where_it_happens_is_found(at, lag, sign):
     assert found.rises == (sign > 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 8])
 def test_a_load_that_comes_and_goes_is_two(seed):
     u, y = lag_of(300, seed)
@@ -109,6 +110,7 @@ def test_a_load_that_comes_and_goes_is_two(seed):
     assert not [test for test in found.tests.beside_shifts if test.probability < 1e-4]
 
 
+@pytest.mark.slow
 def test_it_belongs_to_a_record_and_to_an_output():
     first, second = lag_of(150, 5), lag_of(200, 6)
     matrix = model_of(
@@ -128,6 +130,7 @@ def test_it_belongs_to_a_record_and_to_an_output():
     assert shift_of(LAG + NOISES["white"], u, apart, lengths=[150, 200], rest=False).test.probability > 0.01
 
 
+@pytest.mark.slow
 def test_lines_and_single_samples_are_no_shifts():
     u, y = lag_of(300, 7)
     line = y + np.linspace(0.0, 1.0, 300)[:, None]
@@ -142,6 +145,7 @@ def test_lines_and_single_samples_are_no_shifts():
     assert found.tests.shifted == ()
 
 
+@pytest.mark.slow
 def test_what_the_unit_of_an_output_is_does_not_matter():
     u, y = lag_of(250, 8)
     y[120:] += 0.4
@@ -161,6 +165,7 @@ def test_a_record_too_short_for_any_has_none():
     assert shift_of(text, u, y, rest=True) is None
 
 
+@pytest.mark.slow
 def test_a_shift_that_alone_refutes_a_model_is_told_whatever_hardly_counts():
     """Its score may say less than a test that does not fail; another one that fails outweighs it."""
     u, y = lag_of(300, 5)

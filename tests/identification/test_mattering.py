@@ -48,6 +48,7 @@ def test_what_is_not_a_number_is_no_promise(of_structure, place):
     assert that_matter(tried, [Moves(*parts)]) == ([0] if of_structure or place == 0 else [])
 
 
+@pytest.mark.slow
 def test_a_lag_that_moves_g_almost_out_of_what_is_admitted_is_not_promised_away():
     """Designed records of plants with a pole more: the estimate's own error does the rest."""
     benchmark = runpy.run_path(str(BENCHMARK))

@@ -26,6 +26,7 @@ def blamed(found):
     return {test.fault for test in (*found.tests.failed, *found.tests.answering)} - {"noise"}
 
 
+@pytest.mark.slow
 def test_no_plant_is_blamed_for_slow_noise():
     """White residuals are a wrong model in all records; a right plant fails no more often than the rate."""
     found = [identify(FIR, *record(seed), rest=True) for seed in range(25)]
@@ -33,6 +34,7 @@ def test_no_plant_is_blamed_for_slow_noise():
     assert sum(bool(blamed(one)) for one in found) <= scipy.stats.binom.ppf(0.999, len(found), RATE)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("fault", "distorted"),
     [

@@ -49,6 +49,7 @@ def test_the_one_that_differs_is_the_least_likely():
     assert alike[2] < 1e-6
 
 
+@pytest.mark.slow
 def test_of_one_system_the_probability_is_uniform():
     model = one_channel([0, 1.0, 0.5], F=[1, -1.5, 0.7])
     found = []
@@ -60,6 +61,7 @@ def test_of_one_system_the_probability_is_uniform():
     assert scipy.stats.kstest(found, "uniform").pvalue > 1e-3
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("samples", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):

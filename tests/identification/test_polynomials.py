@@ -63,6 +63,7 @@ def problem_of(model, u, y):
     return FromRest(PolynomialKind(model).rows, inputs, outputs)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("runs", [3, 30])
 def test_cost_and_gradient_are_those_of_finite_differences(runs):
     model, rng = box_jenkins(), np.random.default_rng(1)
@@ -120,6 +121,7 @@ def test_an_unknown_covariance_is_that_of_the_residuals():
     np.testing.assert_allclose(found.noise, covariance * 300 / (300 - 5), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone():
     model = replace(box_jenkins(), A=(np.ones(1),), D=(np.ones(1),), covariance=np.diag([1.0, 4.0]))
     u, y = (x[0] for x in simulated(model, 600, np.random.default_rng(7)))
@@ -137,6 +139,7 @@ def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone(
         np.testing.assert_allclose(both[mine], with_known_noise(own, u, y[:, i : i + 1])[0], atol=1e-5)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
 def test_known_parameters_are_recovered_without_a_start(model):
     u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))

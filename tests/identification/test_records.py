@@ -38,6 +38,7 @@ def record_of(name):
     return Records(estimator(model, 1.0), parts, free=True), theta
 
 
+@pytest.mark.first(5)
 @pytest.mark.parametrize("ramp", [False, True])
 @pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
 def test_the_slope_with_unknown_starts_is_a_difference_quotient(name, ramp):
@@ -76,6 +77,7 @@ def test_lines_in_the_outputs_leave_nothing_where_they_may_drift(name):
     assert np.abs(replace(records, parts=lined, ramp=False).at(theta).errors - plain.errors).max() > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["arx", pytest.param("bj", marks=pytest.mark.slow)])
 def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(name):
     """The mean square of the error in units of its covariance is k, over 15 pairs of records."""

@@ -14,6 +14,7 @@ from tests.support.plants import descending
 OUT_OF_REACH = [("exp(p)", "exp(q)"), ("p*p", "1/(q*q)"), ("exp(p)/q", "1/q"), ("exp(p + q)", "exp(q)")]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("terms", OUT_OF_REACH)
 def test_a_start_that_no_parameters_reach_is_brought_back_all_the_same(terms):
     inner = ContinuousModel.monic(descending([[[1.0]]]), descending([[[1.0, 1.0]]]), np.eye(1))

@@ -72,6 +72,7 @@ def test_a_rich_record_leaves_no_rival(seed):
     assert estimated("binary", seed)[0].search.rivals == ()
 
 
+@pytest.mark.slow
 def test_the_search_tells_how_far_it_is():
     told = []
     with watching(told.append):

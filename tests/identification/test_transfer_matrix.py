@@ -140,6 +140,7 @@ def test_data_without_noise_return_the_parameters(name, hold):
     np.testing.assert_allclose(found.theta[0], model.theta, atol=1e-8)
 
 
+@pytest.mark.first(2)
 @HOLDS
 @pytest.mark.parametrize(
     "name", [name if name == "one channel" else pytest.param(name, marks=pytest.mark.slow) for name in PLANTS]
@@ -234,6 +235,7 @@ def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
     assert not found.converged[0]
 
 
+@pytest.mark.slow
 def test_a_batch_is_one_estimate_after_the_other():
     rng = np.random.default_rng(13)
     u = excitation(300, 2, rng)
@@ -261,6 +263,7 @@ def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
     return by_parameter, overall, whitened_eigenvalues(found.theta, information)
 
 
+@pytest.mark.slow
 @HOLDS
 def test_few_runs_from_the_nominal_start_reach_the_bound(hold):
     u = excitation(400, 2, np.random.default_rng(17))

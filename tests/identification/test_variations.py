@@ -85,6 +85,7 @@ def backlash(u, width):
     return out
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("names", "distort"),
     [
@@ -139,6 +140,7 @@ def test_of_a_plant_slower_one_way_it_is_the_finite_difference():
     assert np.linalg.norm(left) < 0.02 * np.linalg.norm(column)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("delay", [1, 12])
 @pytest.mark.parametrize("levels", [[-1.0, 1.0], [-1.0, -0.4, 0.2, 1.0]], ids=["two", "four"])
 def test_a_plant_that_is_slower_one_way_is_found(levels, delay):

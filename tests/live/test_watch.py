@@ -85,6 +85,7 @@ def test_a_saved_file_is_solved_and_stands_beside_what_was_good(spec, tmp_path):
         assert "What is wrong" not in text  # what has been mended is wrong no longer
 
 
+@pytest.mark.slow
 def test_the_answer_is_shown_before_the_pictures_are_drawn(spec, tmp_path):
     """Within half a second beside solving, of which the page tells, where nothing else is under way."""
     with watching(spec, "-o", tmp_path / "run", "--no-figures") as address:
@@ -102,6 +103,7 @@ def test_the_answer_is_shown_before_the_pictures_are_drawn(spec, tmp_path):
         assert min(waited) < 0.5
 
 
+@pytest.mark.slow
 def test_the_terminal_keeps_a_line_of_every_round(spec, tmp_path):
     with (
         open(tmp_path / "told.txt", "w") as told,

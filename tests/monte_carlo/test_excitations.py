@@ -36,6 +36,7 @@ def check_information(tried, excitation):
     np.testing.assert_allclose(one.information(tried), exact.information(records[0]))
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("channels", [1, 2])
 @pytest.mark.parametrize("method", ["white", "prbs", "multisine", "binary"])
 def test_the_information_of_a_flat_excitation_is_that_of_its_records(method, channels):

@@ -80,6 +80,7 @@ def test_what_has_another_form_is_an_error_that_names_the_place(key, value):
         read_plain(Whole, {**PLAIN, key: value})
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(
     st.dictionaries(st.sampled_from(list(PLAIN)), st.recursive(st.none() | st.floats() | st.text(), st.lists))

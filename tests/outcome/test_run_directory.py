@@ -168,6 +168,7 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch
         assert names(place) == set(), step
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
 def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(tmp_path, monkeypatch, error, raised):
     write_with_figures(a_run("first", optimality=True), tmp_path / "probe")

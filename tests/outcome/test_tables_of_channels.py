@@ -36,6 +36,7 @@ def tables(directory):
     return found
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("verb", ["solve", "simulate", "campaign"])
 def test_rows_have_as_many_fields_as_the_header(monkeypatch, capsys, tmp_path, verb):
     monkeypatch.chdir(tmp_path)

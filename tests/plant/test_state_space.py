@@ -279,6 +279,7 @@ def test_estimates_of_physical_parameters():
     assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
 
 
+@pytest.mark.slow
 def test_an_estimate_with_a_gain_is_as_good_as_its_covariance():
     """Innovations form: the gain estimated along, from another start and about another level."""
     places = [("A", 0, 0), ("A", 1, 1), ("B", 1, 0), ("K", 0, 0), ("K", 1, 1)]

@@ -60,6 +60,7 @@ def test_an_experiment_without_a_length_takes_all_that_it_may():
     assert shortest.experiment.samples == 1
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     "asked",
     [
@@ -79,6 +80,7 @@ def test_the_record_keeps_them_and_is_near_to_a_design_that_knows_the_rate(asked
     assert value > 1.5 * free
 
 
+@pytest.mark.slow
 def test_a_record_keeps_its_weaker_lines():
     """Clipped until it had the power of this design, the record alternated between two values: 7 times."""
     spec = parse_spec(
@@ -93,6 +95,7 @@ def test_a_record_keeps_its_weaker_lines():
     assert found["signal"]["worst_ratio"] <= 2.0 * found["objective"]["value"]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("objective", ["best_accuracy", "shortest_experiment"])
 def test_lines_of_a_frequency_response_keep_them(objective):
     found = solve(parse_spec(LINES % objective))

@@ -145,6 +145,7 @@ campaign: {stages: [100, 200], max_samples: 500}
 """
 
 
+@pytest.mark.slow
 def test_where_no_power_is_enough_the_campaign_goes_on():
     """var c1 = (1 - c1^2) / N by the noise alone: with c1 = 0 it takes 1111 samples, whatever is applied."""
     at, rules = planner(COLOURED), build_rules(parse_spec(COLOURED))
@@ -232,11 +233,12 @@ def test_whole_campaigns_are_simulated():
     assert {"true_ratio.png", "cost_coverage.png"} <= figures.keys()
 
 
+@pytest.mark.slow
 def test_simulated_campaigns_end_where_the_structure_is_refuted():
-    text = SPEC + "simulation: {runs: 1, seed: 2, plant: {B: [0, 1.4], F: [1, -1.3, 0.42]}}\n"
+    text = SPEC + "simulation: {runs: 3, seed: 2, plant: {B: [0, 1.4], F: [1, -1.3, 0.42]}}\n"
     overrides = ["signal.candidates=1", "campaign={block: 20, max_samples: 600, last: nominal}"]
     told = simulate(parse_spec(text, overrides=overrides)).result["simulation"]["inputs"]["campaign"]
-    assert told["undecided"] == 1
+    assert told["undecided"] == 3
     assert told["samples"]["mean"] < 300
 
 

@@ -38,6 +38,7 @@ WILD = {
 }
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("block", "cost"),
     [(5, "{input_power: 1}"), (60, "{output_power: 1}"), (5, "{input_power: 1, output_power: 1}")],
@@ -61,6 +62,7 @@ def test_no_estimate_makes_a_part_dearer_than_the_cap(name, block, cost):
         assert spent <= 0.7 * wide * first.cost * (1 + 1e-6)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("cost", ["{input_power: 1}", "{input_power: 1, output_power: 0.1}"])
 @pytest.mark.parametrize("cap", [0.05, 0.7, 1.0])
 def test_the_first_part_keeps_the_cap_as_well(cap, cost):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import analyse, parse_spec, simulate, solve
+from inputdesign_cli import analyse, parse_spec, solve
 from inputdesign_cli.outcome.model_words import blocks_of
 from inputdesign_cli.questions.building.system import build_model
 
@@ -73,11 +73,3 @@ def test_outputs_have_noise_of_their_own():
     np.testing.assert_allclose(gradient, 0.0, atol=1e-12)  # both outputs are differenced
     white = spec_of(plant, noise, overrides=["spectrum={given: {type: white, power: 1}}"])
     assert "c1[1]" in analyse(white).result["information"]["standard_deviation"]
-
-
-@pytest.mark.slow
-def test_a_study_on_a_system_that_drifts():
-    """The relative frequency of errors within r_u is what 95 % of 60 runs leaves open."""
-    rest = REST.replace("samples: 100", "samples: 300") + "simulation: {runs: 60, seed: 2}\n"
-    found = simulate(spec_of(IN_S, NOISES[1], rest)).result["simulation"]["inputs"]["design"]
-    assert found["within_r_u"] > 0.85

@@ -77,6 +77,7 @@ def test_one_input_and_a_polynomial_keep_to_their_bounds():
     assert 1.15 * (1 - 1e-3) < phi.max() <= 1.15 * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_cheapest_experiment_within_a_bound_costs_more_and_is_proved():
     asked = ARX + "accuracy: {standard_deviation: {'a1[1]': 0.001, 'b2[2,1]': 0.003}}\n"
     asked += "spectrum: {type: fir, order: 2}\n"

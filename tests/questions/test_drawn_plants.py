@@ -10,6 +10,7 @@ from inputdesign_cli.questions.task import build_task
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, PHYSICAL, PROCESS
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     "prior",
     [

@@ -30,17 +30,7 @@ def test_a_line_that_is_taken_away_does_not_move_the_estimate(tmp_path, detrend)
     np.testing.assert_allclose(told[0], told[1], rtol=1e-5)
 
 
-@pytest.mark.slow
-def test_explore_tells_the_line_that_it_took_away(tmp_path):
-    explored = questions.explore(
-        [log(tmp_path / "log.csv", 0.02)], Preparation(sample_time=2.0, time_unit="min")
-    )
-    told = [note for note in explored.results.result["notes"] if note.startswith("y drifts")]
-    assert len(told) == 1
-    rises = float(told[0].split("rises by ")[1].split(" per min")[0])
-    assert rises == pytest.approx(0.01, abs=3e-4)
-
-
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("gain", "words"), [(0.3, "is seen, but noise and drift"), (0.0, "explain nothing")])
 def test_noise_that_wanders_farther_than_the_plant_does_not_hide_it(tmp_path, gain, words):
     """The likelihood ratio of least squares on differences with the noise known: beyond chance, or not."""

@@ -95,6 +95,7 @@ def test_a_free_spectrum_without_an_end_is_refused(seed, criterion):
     assert "at 0 rad/s" in found.message
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("criterion", "DAET")
 @pytest.mark.parametrize(
     "limits",

@@ -53,6 +53,7 @@ uncertainty: {{scenarios: [{listed}]}}
     return text, [peak(b, f, K, p) for b, f in stable], wished
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_every_plant_whose_sensitivity_exceeds_what_is_asked_is_told_and_no_other(seed):
     text, peaks, wished = asked(seed)

@@ -5,7 +5,7 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
+from inputdesign_cli import assess, load_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.questions.common import foresight, simulation
 from inputdesign_cli.questions.least_cost.build import build_convex
@@ -149,39 +149,3 @@ OTHERS = {
 )
 def test_all_kinds_of_experiments_are_foreseen(kind):
     assert "rivals" in solved(OTHERS[kind])[0]["foreseen"]
-
-
-CHANNELS = """
-sample_time: 1
-plant:
-  continuous: {gain: [[1.0, 0.5]], time_constant: [[8, 12]], dead_time: [[2, 4]]}
-  sample: zoh
-noise: {variance: 0.01}
-experiment: {samples: 150}
-accuracy: {model_error: {relative: 0.2, band: [0.001, 0.3]}}
-spectrum: {type: multisine, lines: 40}
-signal: {type: multisine, samples: 150, seed: 1}
-"""
-
-
-@pytest.mark.slow
-def test_names_of_several_channels_can_be_pasted():
-    result = solve(parse_spec(CHANNELS)).result
-    for note in result.get("notes", []):
-        if "nearly as well" in note:
-            assert 'plant.known: ["dead_time[1,1]", "dead_time[1,2]"]' in note
-    assert "rivals" in result["foreseen"]
-
-
-@pytest.mark.slow
-def test_a_given_signal_is_looked_at_too(tmp_path):
-    _, u = solved()
-    np.savetxt(
-        tmp_path / "u.csv", np.column_stack([np.arange(u.size), u]), delimiter=",", header="t,u", comments=""
-    )
-    spec = load_spec(
-        "specs/heater.yaml", [f"spectrum={{given: {{signal: {tmp_path / 'u.csv'}}}}}", "signal={}"]
-    )
-    result = analyse(spec).result
-    assert result["foreseen"]["rivals"]
-    assert any("excite more frequencies" in note for note in result["notes"])

@@ -30,6 +30,7 @@ def given_back(spec, table):
     return analyse(parse_spec(to_yaml(stated), str(spec), folder=spec.parent)).result
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", DENSITIES)
 def test_what_solve_wrote_is_met_and_a_thousandth_less_is_missed(name, tmp_path):
     spec, path = SPECS / f"{name}.yaml", tmp_path / "spectrum.csv"

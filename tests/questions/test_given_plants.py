@@ -33,6 +33,7 @@ def alone(text, values, *overrides):
     return analysed(text, plants[text](**values), *overrides).result["model_error"]["worst_ratio"]
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("text", "given"),
     [

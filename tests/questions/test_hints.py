@@ -43,6 +43,7 @@ ADVICE = {
 }
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("plant", "limit", "relative", "level"), TRIED)
 def test_who_follows_a_hint_succeeds(plant, limit, relative, level):
     text = PLANTS[plant] + LIMITS[limit] % level + COMMON % relative
@@ -90,23 +91,6 @@ def test_an_error_as_large_as_the_plant_is_remarked_upon(relative, told):
     )
     notes = solve(spec).result.get("notes", [])
     assert any("wrong sign" in note for note in notes) == told
-
-
-@pytest.mark.slow
-def test_a_record_that_is_too_short_for_its_spectrum_is_told():
-    text = """
-sample_time: 1
-plant: {continuous: {gain: 2, time_constant: 10, dead_time: %s}, sample: zoh}
-noise: {variance: 0.04}
-experiment: {samples: 300}
-accuracy: {model_error: {relative: 0.1}}
-spectrum: {type: fir, order: 4}
-signal: {candidates: 1}
-"""
-    for dead_time, told in ((2.5, False), (290.5, True)):
-        found = solve(parse_spec(text % dead_time)).result
-        assert any("times what the designed spectrum does" in note for note in found.get("notes", [])) == told
-        assert (found["signal"]["extra_power"] > 1.0) == told
 
 
 DELAYED = """

@@ -87,21 +87,6 @@ def test_identify_tells_it_and_the_option_mends_the_verdict(tmp_path):
     assert assess(spec, saved(tmp_path / "good.csv", rows_of(400, None, 3))).verdict == "met"
 
 
-@pytest.mark.slow
-def test_of_several_files_the_note_says_in_which_it_is(tmp_path):
-    files = [
-        saved(tmp_path / "a.csv", rows_of(200, None, 4)),
-        saved(tmp_path / "b.csv", rows_of(300, 150, 5)),
-    ]
-    (told,) = shifts_in(identify(parse_spec(SPEC), files).result["notes"])
-    name, first, last = option_in(told)
-    assert "of b.csv (1" in told
-    assert name == "b.csv"
-    assert first <= 153 <= last
-    again = identify(parse_spec(SPEC), files, preparation=Preparation(without=((name, first, last),)))
-    assert not shifts_in(again.result["notes"])
-
-
 def found_with(samples, places, split="halves"):
     """What an exploration of so many samples would return that finds steps at these places."""
     shifts = tuple(

@@ -89,20 +89,6 @@ def test_few_columns_have_a_lower_value_under_the_same_bound():
     assert few["spectrum"]["factor_columns"] == 1
 
 
-@pytest.mark.slow
-def test_relative_scale_does_not_depend_on_units():
-    """Input in other units: relative criteria of the same experiment are the same."""
-    scaled = CONTINUOUS.replace(
-        "[[3.125], [3.188]], [[5.313], [1.563]]", "[[.3125], [.3188]], [[.5313], [.1563]]"
-    )
-    scaled = scaled.replace("input_power: 1000", "input_power: 100000")
-    values = [
-        solve(changed(text, "accuracy.scale=relative")).result["objective"]["value"]
-        for text in (CONTINUOUS, scaled)
-    ]
-    assert values[0] == pytest.approx(values[1], rel=1e-6)
-
-
 def test_limits_of_each_channel_bind():
     result = solve(changed(CONTINUOUS, "limits={input_power: [100, 20]}", "accuracy.criterion=D")).result
     np.testing.assert_allclose(result["power"]["input"], [100.0, 20.0], rtol=1e-6)

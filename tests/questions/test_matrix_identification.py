@@ -1,19 +1,14 @@
-import json
-
 import numpy as np
 import pytest
 import scipy.signal
 import yaml
-from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, validate
-from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.questions.building.system import build_experiment, build_model
 from tests.support.records import simulated
 
 SPEC = "specs/two_by_two_arx.yaml"
-SHORT = ["spectrum.order=4", "accuracy.model_error.relative=0.3"]
 # Every polynomial, one of them common, and an entry that is zero.
 JENKINS = """
 plant:
@@ -169,20 +164,6 @@ def test_the_files_hold_what_they_say(data):
         outcome.tables["residuals"].columns
     )
     assert {"r_u_12", "r_adm_12", "G_abs_21"} < set(outcome.tables["bound"].columns)
-
-
-def test_a_top_up_makes_up_for_what_is_missing(data, tmp_path):
-    call = ["assess", SPEC, str(data), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
-    run = CliRunner().invoke(app, [*call, *(part for o in SHORT for part in ("--set", o))])
-    assert run.exit_code == 1
-    result = json.loads(run.stdout)
-    assert {"signal.csv", "model.yaml", "data_fit.csv"} < set(result["files"])
-    assert max(r["worst_ratio"] for r in result["assessment"]["requirements"]) > 1
-    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
-    # What is designed adds to the data, whose standard deviations stand beside the estimate.
-    after = result["information"]["standard_deviation"]
-    before = result["identification"]["standard_deviation"]
-    assert all(after[name] < before[name] for name in before)
 
 
 @pytest.mark.parametrize(

@@ -159,6 +159,7 @@ IN_S += "0.69314718]}, sample: zoh"
 COLOURED = "noise: {C: [1, 0.8], variance: 0.5}"
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("nominal", [IN_Q, IN_S])
 @pytest.mark.parametrize("loop", ["", ", controller: {numerator: [[[0.1], [0]], [[0], [0.1]]]}"])
 def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
@@ -184,18 +185,6 @@ def test_prior_information_narrows_the_estimates():
     given = ["spectrum={given: {type: white, power: 5}}", "simulation={runs: 150}", prior]
     design = simulate(load_spec(SPEC, given)).result["simulation"]["inputs"]["design"]
     assert all(0.8 < ratio < 1.2 for ratio in design["rms_over_theory"].values())
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        "{type: white, power: 100}",
-        "{type: multisine, frequencies: [0.1, 0.4, 1, 2], amplitudes: [[9, 3, 4, 5], [2, -3, 6, -8]]}",
-    ],
-)
-def test_given_excitations_are_tried(given):
-    overrides = [f"spectrum={{given: {given}}}", "simulation={runs: 100}"]
-    within_wishart(simulate(load_spec(SPEC, overrides)).result["simulation"])
 
 
 def test_a_given_table_is_tried(tmp_path):
@@ -233,6 +222,7 @@ class Elsewhere:
             yield Finished(task, pickle.loads(pickle.dumps(there(task))))
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("spec", "overrides"),
     [

@@ -1,6 +1,5 @@
 """From the spec to the result: designs, signals, simulations, figures, and what is said of bad input."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -222,35 +221,3 @@ def test_an_infeasible_target_says_what_would_be_feasible(capsys, monkeypatch, t
         solve(load_spec(FIR, [f"{E}.neglected=[2]", f"{E}.neglected_norm=1"]))
     feasible = result(FIR, f"{E}.neglected=[2]", f"{E}.neglected_norm=2", f"{E}.target=4.04")
     assert feasible["status"] == "optimal"
-
-
-def test_the_summary_says_what_was_found(capsys, monkeypatch, tmp_path):
-    arguments = [
-        "simulate",
-        str(FIR),
-        "-o",
-        str(tmp_path / "run"),
-        "--no-figures",
-        "--set",
-        "simulation.runs=10",
-    ]
-    monkeypatch.setattr("sys.argv", ["idesign", *arguments, "--set", "experiment.samples=20"])
-    with pytest.raises(SystemExit):
-        main()
-    text = capsys.readouterr().out
-    for part in (
-        "energy      2\n",
-        "no toeplitz moments get below",
-        "squared bias 0 + variance 1",
-        "design: mean squared error",
-    ):
-        assert part in text
-
-
-def test_json_of_a_study(capsys, monkeypatch, tmp_path):
-    arguments = ["simulate", str(FREE), "--json", "-o", str(tmp_path), "--set", "simulation.runs=10"]
-    monkeypatch.setattr("sys.argv", ["idesign", *arguments, "--set", "experiment.samples=20", "--no-figures"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert (ended.value.code or 0) == 0
-    assert json.loads(capsys.readouterr().out)["simulation"]["runs"] == 10

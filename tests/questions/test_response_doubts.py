@@ -152,6 +152,7 @@ def test_a_spike_that_does_not_count_is_none(write, question):
     assert judged(write, spec, u, y).verdict == "met"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("past", [0.9, 0.99, 0.998])
 def test_slow_noise_that_the_spec_knows_is_neither_drift_nor_spikes(write, past):
     """Down to a memory of a period, far below the lowest line."""

@@ -19,6 +19,7 @@ from inputdesign_cli.report.facts import facts
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize(
     ("text", "asked"),
     [
@@ -197,6 +198,7 @@ def test_the_record_serves_every_plant_by_its_own_samples(asked):
         assert max(ratios) <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_the_fan_shows_every_plant_and_names_those_that_bind():
     found = solve(
         parse_spec(TWO, overrides=["uncertainty={scenarios: [{'b1[1,1]': 0.8}, {'b1[1,1]': 1.1}]}"])
@@ -222,6 +224,7 @@ def test_limits_on_powers_bind_the_record_at_every_plant():
     assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", [False, True])
 def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
     """Of the output, and in a loop of the input: plain filters of plant and controller simulate both."""

@@ -24,6 +24,7 @@ accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
 """
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("spectrum", ["{type: free}", "{type: multisine, lines: 40}"])
 @pytest.mark.parametrize("text", [INTEGRAL_ACTION, OPEN_LOOP], ids=["integral action", "open loop"])
 def test_the_listed_sinusoids_meet_what_the_design_promises(text, spectrum):

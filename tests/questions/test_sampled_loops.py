@@ -158,6 +158,7 @@ def recorded(spec, samples, rng, path):
     return path
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("text", [None, HELD])
 def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
     spec = load_spec(MOTOR) if text is None else parse_spec(text)

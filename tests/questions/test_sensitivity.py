@@ -125,6 +125,7 @@ def gradients(values, w):
     return np.stack(columns, axis=1)
 
 
+@pytest.mark.slow
 def test_the_norm_of_the_error_against_a_plain_program():
     """Least power with T P T^T <= (r_adm / alpha)^2 at 60 frequencies, all in raw parameters."""
     design = designed(OPEN)

@@ -52,6 +52,7 @@ def test_the_heater_is_designed_as_by_a_plain_program():
     assert found["cost"] == pytest.approx(plain.value, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_white_noise_tells_of_the_column_what_sums_over_frequencies_tell():
     """M over a fine grid of the circle; each entry has its own parameters, each output its own noise."""
     w = 2.0 * np.pi * (np.arange(2**14) + 0.5) / 2**14

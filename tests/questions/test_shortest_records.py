@@ -62,6 +62,7 @@ def meets(text: str, samples: int, objective: str) -> bool:
     return signal["worst_ratio"] <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("texts", "objectives"),
     [
@@ -190,6 +191,7 @@ def test_a_long_shortest_record_takes_few_records_of_its_length():
     assert sum(made) <= 15 * found["samples"]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["filtered_noise", "binary", "multisine"])
 def test_candidates_of_a_record_that_is_far_from_the_accuracy_are_not_all_made(method):
     """No phases make up for a third less accuracy than asked."""
@@ -258,6 +260,7 @@ def shortest_of_two_levels(b: float, pole: float, variance: float, relative: flo
     raise AssertionError
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("relative", [0.15, 0.2, 0.25])
 def test_two_levels_are_as_short_as_any_that_there_are(relative):
     """Within a sample of the shortest of all sequences."""
@@ -277,6 +280,7 @@ objective: shortest_experiment
     assert least <= found["samples"] <= least + 1
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
 def test_what_is_known_already_needs_a_short_record_only(share):
     """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""
@@ -289,6 +293,7 @@ def test_what_is_known_already_needs_a_short_record_only(share):
     assert found["samples"] <= found["signal"]["samples"] < whole
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("more", [1e-6, 0.05, 3.0])
 @pytest.mark.parametrize("text", [LAG, TWO], ids=["lag", "two inputs"])
 def test_what_is_known_may_do_without_an_experiment(text, more):
@@ -299,6 +304,7 @@ def test_what_is_known_may_do_without_an_experiment(text, more):
     assert "signal" not in found
 
 
+@pytest.mark.slow
 def test_records_shorter_than_a_dead_time_do_not_end_the_search():
     """The spectrum alone would take fewer than the dead time of twelve; wider limits never take longer."""
     late = LAG.replace("B: [0, 1.0]", "B: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1.0]").replace(

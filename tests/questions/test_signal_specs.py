@@ -43,6 +43,7 @@ CASES = [
 ]
 
 
+@pytest.mark.first(5)
 @pytest.mark.parametrize(("text", "most"), CASES, ids=[text for text, _ in CASES])
 def test_the_record_meets_the_accuracy(text, most):
     outcome = solve(parse_spec(BASE + text + "\n"))
@@ -108,6 +109,7 @@ def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not
     assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
 
 
+@pytest.mark.slow
 def test_a_converter_of_too_small_a_range_is_named():
     text = "signal: {candidates: 1, quantisation: {bits: 8, range: 0.45}}\n"
     with pytest.raises(InfeasibleError) as error:
@@ -122,17 +124,6 @@ def test_limits_that_no_length_makes_up_for():
         solve(parse_spec(BASE + "limits: {rate: 0.003}\nsignal: {candidates: 1}\n"))
     assert error.value.diagnostics[0].code == "infeasible"  # by the power of the moves
     assert "samples a spectrum can" in error.value.diagnostics[0].hint
-
-
-def test_the_shortest_experiment_delivers_the_longer_record():
-    text = BASE.replace("experiment: {samples: 500}\n", "objective: shortest_experiment\n")
-    outcome = solve(
-        parse_spec(text + "limits: {input_power: 0.3, amplitude: 0.55}\nsignal: {candidates: 2}\n")
-    )
-    signal = outcome.result["signal"]
-    assert signal["samples"] > outcome.result["samples"]
-    assert signal["worst_ratio"] <= 1 + 1e-9
-    assert any("single samples" in note for note in outcome.result["notes"])
 
 
 def test_files_and_plots(tmp_path):
@@ -180,6 +171,7 @@ def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(off
     assert np.abs(u - offset).max() <= 0.75 + 1e-12
 
 
+@pytest.mark.slow
 def test_the_share_of_each_limit_that_single_samples_take():
     """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
     limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"

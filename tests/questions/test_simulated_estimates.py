@@ -24,6 +24,7 @@ signal: {{candidates: 1}}
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("samples", "each"), [(12, 1), (200, 20)])
 def test_short_records_differ_so_much_that_each_has_one_run(monkeypatch, samples, each):
     """Twenty runs of each of five records of 8 samples told of these five: it cost 1.7 times too much."""

@@ -31,6 +31,7 @@ def spec_of(text, **changes):
 QUICK = ("first_order", "flexible_transmission", "given_excitations", "peer_examples")
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", QUICK)
 def test_golden_files(name):
     """Each quantity beside the paper's figure and the independent solution."""

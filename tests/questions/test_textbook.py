@@ -34,6 +34,7 @@ signal: {samples: 64}
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", SPECS.values(), ids=SPECS)
 def test_what_is_claimed_is_so(text):
     spec = parse_spec(text)

@@ -14,6 +14,7 @@ from inputdesign_cli.findings.top_up_levels import level_notes
 from tests.support.heater import HEATER, STRUCTURE, said
 
 
+@pytest.mark.slow
 def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     path = heater_record("a.csv", 300, 1, power=0.02)
     limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
@@ -43,6 +44,7 @@ def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
     assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("overrides", "verdict", "why"),
     [
@@ -65,6 +67,7 @@ def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, he
     assert ("no experiment is designed" in said(found.results)) == (verdict == "missed")
 
 
+@pytest.mark.slow
 def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path):
     spec, path = tmp_path / "structure.yaml", heater_record("a.csv", 300, 1)
     spec.write_text(STRUCTURE)
@@ -78,17 +81,6 @@ def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path
     assert identify(load_spec(spec, design=False), path).result["status"] == "identified"
     with pytest.raises(Exception, match="nothing is asked"):
         solve(load_spec(spec))
-
-
-def test_the_operating_point_of_the_command_line(heater_record, tmp_path):
-    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
-    spec.write_text(STRUCTURE)
-    call = ["identify", str(path), "--spec", str(spec), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
-    known = CliRunner().invoke(app, [*call, "--operating-point", "u1=40,y=52.3"])
-    assert not json.loads(known.stdout)["identification"]["free_start"]
-    unknown = CliRunner().invoke(app, call)
-    assert json.loads(unknown.stdout)["identification"]["free_start"]
-    assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
 
 
 def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(
@@ -121,25 +113,6 @@ def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_
     assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
     page = html.unescape((out / "report.html").read_text())
     assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page
-
-
-def test_the_level_of_the_data_is_told_where_the_spec_does_not_know_it(heater_record):
-    asked = (
-        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
-    )
-    path, spec = heater_record("a.csv", 300, 2, level=(40.0, 52.3)), parse_spec(STRUCTURE + asked)
-    recorded = np.loadtxt(path, delimiter=",", skiprows=1, usecols=range(2))
-    header = path.read_text().splitlines()[0].split(",")
-    mean = f"{recorded[:, [name.startswith('u') for name in header[:2]].index(True)].mean():.4g}"
-    for options in ({}, {"remove_means": True}):
-        found = assess(spec, path, **options).results
-        assert abs(np.mean(found.tables["signal"].columns["u1"])) < 1.0
-        assert f"the data lie about u1 = {mean} (their mean)" in said(found)
-        assert f"write signal.offset: {mean} and assess again" in said(found)
-    told = assess(parse_spec(STRUCTURE + asked, overrides=[f"signal.offset={mean}"]), path).results
-    assert told.result["signal"]["operating_point"] == [float(mean)]
-    assert "the data lie about" not in said(told)
-    assert "the data lie about" not in said(assess(spec, heater_record("b.csv", 300, 2)).results)
 
 
 @pytest.mark.parametrize(

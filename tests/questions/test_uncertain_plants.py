@@ -42,6 +42,7 @@ def record(tmp_path_factory):
     return path
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("stated", STATED)
 def test_the_statistic_is_by_the_covariance_of_the_difference(record, stated):
     found = assess(parse_spec(SPEC.format(b1=3.0) + stated), record)

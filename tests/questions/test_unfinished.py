@@ -35,6 +35,7 @@ SPECS = {
 }
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("text", SPECS.values(), ids=SPECS)
 def test_what_is_delivered_meets_everything_and_its_bounds_hold(slow_solver, text):
     best = solve(parse_spec(PLANT + text)).result["objective"]
@@ -112,6 +113,7 @@ def test_moments_are_delivered_with_the_bound_so_far(slow_solver):
     assert gaps[0] > 1e-3
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("prices", [[1, 1], [1, 30], [0.03, 1]])
 @pytest.mark.parametrize("gains", [(1, 0.5), (0.02, 3)])
 def test_a_design_of_two_inputs_never_costs_more_than_white_input(prices, gains):

@@ -72,6 +72,7 @@ def test_a_gain_that_is_small_in_the_spec_as_well_may_be_zero(tmp_path):
     assert found == "met", why
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("u", ["held", "sines", "drifting"])
 def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, tmp_path):
     """Of three short records of right models none is blamed, whatever moves the plant, after a dead time."""
@@ -89,6 +90,7 @@ def test_inputs_that_are_foretold_by_their_own_past_answer_nothing(u, tmp_path):
         assert "logged late" not in verdict(tmp_path, moved, y, spec)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain", "share"), [(0.0, 1.0), (1.0, 0.0)])
 def test_an_output_that_no_input_moves_is_told_from_one_that_some_moves(gain, share):
     """By the statistic of Wald, at one in a thousand; the first of two inputs has the gain."""

@@ -59,6 +59,7 @@ def test_the_gradient_is_that_of_plants_nearby(name):
     np.testing.assert_allclose(gradient, slope, atol=1e-6 * np.abs(slope).max())
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("name", ["first of B", "of A", "first of a numerator", "gain", "common delay"])
 def test_the_information_is_the_limit_of_that_nearby(name):
     at, near = (analyse(spec_at(name, value)).result["information"] for value in (2.0, 2.0 + 1e-7))
@@ -84,6 +85,7 @@ def test_parameters_elsewhere_do_not_change_what_a_plant_consists_of(name):
 DESIGN = "noise: {variance: 0.04}\nexperiment: {samples: 300}\nspectrum: {type: fir, order: 4}\n"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", ["entry of B", "gain", "B of states"])
 def test_an_entry_that_vanishes_must_be_as_accurate_as_the_others(name):
     rest = DESIGN + "accuracy: {model_error: {absolute: 0.1}}\n"

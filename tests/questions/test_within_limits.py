@@ -65,6 +65,7 @@ accuracy: {standard_deviation: {b1: 0.01}}
     )
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("head", "accuracy", "fraction"),
     [
@@ -104,6 +105,7 @@ def test_several_channels_name_the_entry_and_the_input():
     )
 
 
+@pytest.mark.slow
 def test_the_power_that_one_channel_needs_is_enough():
     diagnostic = refused(TWO + ERROR.format(0.3))
     needed = float(diagnostic.message.split("needs input 2 power >= ")[1].split(",")[0])

@@ -147,6 +147,7 @@ def test_what_is_no_table_is_unreadable(name, raw, tmp_path):
     assert refused(tmp_path / name).code == "data-unreadable"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["log.npz", "log.xlsx"])
 def test_an_archive_that_unpacks_to_more_than_the_limit_is_refused_at_once(name, tmp_path):
     with zipfile.ZipFile(tmp_path / name, "w", zipfile.ZIP_DEFLATED) as file:

@@ -52,6 +52,7 @@ def check(path, prepared=None, *, shown=0.0):
     assert (record.step, record.time_unit, record.lengths) == (2.5, "s", (N,))
 
 
+@pytest.mark.first(27)
 @pytest.mark.parametrize("mark", [",", ";", "\t", "|"])
 @pytest.mark.parametrize("decimal", [".", ","])
 @pytest.mark.parametrize("moment", DATES.values(), ids=DATES)

@@ -29,6 +29,7 @@ def estimated(tmp_path):
     return made
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("name", ["time", "time_min", "t", "t_min", "timestamp", "Time (min)", "t [min]"])
 def test_times_go_by_several_names(name, estimated):
     assert estimated(name, 2 * np.arange(200))["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)

@@ -24,6 +24,7 @@ from tests.support.outcomes import typed
 from tests.support.pages import XHTML, parse, words
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("name", ["open", "closed"])
 def test_the_page_of_a_run(runs, name):
     page = parse(report_text(runs / name))

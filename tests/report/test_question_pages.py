@@ -19,6 +19,7 @@ from tests.support.pages import LOOP, SPEC, XHTML, parse, rows, words
 SPECS = Path(__file__).parents[2] / "specs"
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("name", "overrides", "verb", "said"),
     [
@@ -72,6 +73,7 @@ def data(tmp_path):
     return path
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("relative", "met"), [(0.5, True), (0.1, False)])
 def test_the_page_of_an_assessment(relative, met, data, tmp_path):
     spec = parse_spec(SPEC % "", overrides=[f"accuracy.model_error.relative={relative}"])
@@ -107,6 +109,7 @@ def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):
     assert "Further figures" not in words(page)
 
 
+@pytest.mark.slow
 def test_the_page_of_a_study(tmp_path):
     overrides = ["simulation={runs: 20, compare: [white], plant: {B: [0, 1.1], F: [1, -0.4]}}"]
     outcome = simulate(parse_spec(SPEC % LOOP, overrides=overrides))
@@ -125,6 +128,7 @@ def test_the_page_of_a_study(tmp_path):
     assert "Further figures" not in words(page)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("inputs", "row"),
     [
@@ -151,6 +155,7 @@ def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
     assert row in rows(parse(report_text(tmp_path / "run")))
 
 
+@pytest.mark.slow
 def test_the_chart_of_the_error_says_what_gave_it(data, tmp_path):
     """A top-up has a design of its own; what the data gave stands beside it."""
     spec = parse_spec(SPEC % "", overrides=["accuracy.model_error.relative=0.1"])

@@ -174,6 +174,7 @@ def experiment(request, first_order):
     return Experiment(arx(), 240).whitened(1.0)
 
 
+@pytest.mark.first(20)
 @pytest.mark.parametrize("meets", [True, False])
 @pytest.mark.parametrize("limited", [*LIMITS, "none"])
 @pytest.mark.parametrize("kind", SETTINGS)
@@ -207,12 +208,14 @@ def test_levels_of_a_signal_of_zeros(monkeypatch, kind):
     assert np.all(np.isfinite(found))
 
 
+@pytest.mark.first(12)
 @pytest.mark.parametrize("limited", LIMITS)
 @pytest.mark.parametrize("kind", SETTINGS)
 def test_limits_hold_exactly(experiment, kind, limited):
     check(experiment, SETTINGS[kind], bounds_of(experiment.inputs, **LIMITS[limited]))
 
 
+@pytest.mark.first(8)
 @pytest.mark.parametrize("limited", ["amplitude", "both", "output"])
 @pytest.mark.parametrize("kind", CONVERTERS)
 def test_converters_hold_the_limits_too(experiment, kind, limited):
@@ -225,6 +228,7 @@ def test_converters_hold_the_limits_too(experiment, kind, limited):
     )
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("limits", [{"amplitude": 2.0}, {"rate": 2.5}, {"output": 2.5}])
 @pytest.mark.parametrize("kind", ["noise", "optimised", "binary"])
 def test_limits_in_closed_loop_are_those_of_what_r_causes(flexible, kind, limits):

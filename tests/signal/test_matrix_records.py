@@ -111,6 +111,7 @@ def test_a_rational_filter_recovers_one_of_its_order():
     np.testing.assert_allclose(filter_.power(), (taps**2).sum(axis=(0, 2)), rtol=1e-9)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("order", [2, 4])
 def test_low_order_filters_of_the_column_are_stable_and_nearly_as_good(order):
     problem = column()

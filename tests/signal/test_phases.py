@@ -134,6 +134,7 @@ def test_weights_of_the_inputs():
     assert peaks[1][0] < peaks[0][0]
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("method", ["multisine", "binary", "ternary", "filtered_noise"])
 @pytest.mark.parametrize("samples", [1, 2, 3, 5])
 def test_records_of_fewer_samples_than_lines_are_numbers(method, samples):

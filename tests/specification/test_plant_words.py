@@ -18,6 +18,7 @@ PLANTS = [
 ]
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("plant", PLANTS)
 def test_the_schema_and_the_models_take_the_same_words(plant):
     text = f"plant: {plant}\n{REST}limits: {{input_power: 1, band: [0, 1]}}".replace(

@@ -42,6 +42,7 @@ DAMAGES = {
 }
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_point_is_computed_again_and_told(name, swept, spec):
     out, run = swept
@@ -91,6 +92,7 @@ def test_a_damaged_point_that_is_not_reached_has_no_row(spec, stub, tmp_path):
     assert [row["status"] for row in rows(out)] == ["infeasible", "pending"]
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("change", ["spec", "keys", "more keys", "verb"])
 def test_another_sweep_does_not_take_the_place_of_one(change, spec, stub, tmp_path):
     out = tmp_path / "out"

@@ -62,6 +62,7 @@ def test_an_interrupt_from_the_terminal_ends_everything_in_order(spec, tmp_path)
     assert {"pending", "optimal"} <= statuses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("points", "kills"), [(5, 3), pytest.param(120, 20, marks=pytest.mark.slow)], ids=["few", "twenty"]
 )

@@ -80,6 +80,7 @@ def test_a_plant_is_understood_once(tmp_path, monkeypatch):
     assert seen == [GOOD["plant"]]
 
 
+@pytest.mark.slow
 def test_a_step_response_stands_beside_the_spec(tmp_path):
     t = 5.0 * np.arange(400)
     y = 20 + 20 * np.where(t > 1025, 1 - np.exp(-(t - 1025) / 180), 0)

@@ -187,6 +187,7 @@ def folder(tmp_path_factory):
     return made
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("key", KEYS)
 def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder):
     for text in (*HOSTILE[key].splitlines(), *ANYWHERE):
@@ -232,6 +233,7 @@ def test_every_question_is_tried():
     assert set(HOSTILE) == {one.key for one in QUESTIONS}
 
 
+@pytest.mark.slow
 def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
     """The peak of |S| of this loop is 4.04 dB."""
     with pytest.raises(SpecError) as caught:
@@ -246,6 +248,7 @@ def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
         compose({**ENGINEER, "wish": f"PI loop with {below:.3g} dB"}, "x", tmp_path).validate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "named"),
     [("50 degrees", r"example ([\d.]+ degrees)"), ("gain margin 20", r"example (gain margin [\d.]+)")],

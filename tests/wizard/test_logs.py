@@ -68,6 +68,7 @@ def _log(folder, samples=1200, *, beside=0.0):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("drift", "drifts"),
     [
@@ -86,6 +87,7 @@ def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     assert "the log has a variance of 0.08" in draft.text
 
 
+@pytest.mark.slow
 def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
     _log(tmp_path)
     answers = {**ENGINEER, "plant": "log log.csv", "noise": "resolution 0.1"}

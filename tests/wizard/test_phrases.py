@@ -111,6 +111,7 @@ def test_a_decimal_comma_is_no_separator(text):
         written("plant", text)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("every", "head"), [(1, "time_s"), (20, "time_s"), (20, "time_min")])
 def test_noise_at_rest_has_its_own_sample_time(tmp_path, every, head):
     """Noise with one pole, 0.9 over the five seconds of a sample, logged at another pace."""

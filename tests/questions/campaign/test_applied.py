@@ -39,6 +39,7 @@ RECORDED = {
 }
 
 
+@pytest.mark.first(24)
 @pytest.mark.parametrize("name", RECORDED)
 @pytest.mark.parametrize("samples", LENGTHS)
 @pytest.mark.parametrize("kind", PLANS)

@@ -56,6 +56,7 @@ def tenfold(text):
     return "\n".join(",".join(row) for row in [head, *([*r[:2], f"{10 * float(r[2])}"] for r in rows)]) + "\n"
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("damage", [halved, lambda text: text[:40], tenfold, lambda text: text + "\n"])
 def test_a_record_that_was_changed_decides_nothing(damage, run, once, tmp_path):
     kept, before = (once / "record_01.csv").read_text(), (once / "result.json").read_bytes()

@@ -55,6 +55,7 @@ def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
     assert code == 5, "a verdict cannot rest on a structure that is refuted"
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
     until_it_ends(run, begun, tmp_path)
     assert run("next", "c", "--withdraw", 1, "--no-figures")[0] in (0, 5)
@@ -65,8 +66,9 @@ def test_what_is_left_out_is_not_explored(run, begun, tmp_path):
     assert not any("record_01.csv" in note or "record_??" in note for note in named)
 
 
+@pytest.mark.slow
 def test_a_campaign_that_never_stops_goes_on(run, tmp_path):
-    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 90, stop: never}"))
+    (tmp_path / "s.yaml").write_text(SPEC.replace("{block: 60}", "{block: 60, stop: never}"))
     assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
     code, result = until_it_ends(run, tmp_path / "c", tmp_path)
     assert result["samples"] == 200

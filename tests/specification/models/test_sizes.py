@@ -100,6 +100,7 @@ def test_every_list_of_the_schema_has_a_limit_or_a_reason():
 MANY = 8_000
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize(
     "extra",
     [
