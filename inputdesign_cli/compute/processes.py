@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, suppress
 from itertools import islice
 from multiprocessing.connection import Connection
 
@@ -37,7 +37,10 @@ class Processes:
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer, in the order in which they are finished."""
-        with nullcontext(self._standing) if self._standing else closing(_Pool(self.count)) as pool:
+        if self._standing:
+            yield from self._standing.run(function, jobs)
+            return
+        with closing(_Pool(self.count)) as pool:
             yield from pool.run(function, jobs)
 
     def start(self) -> None:
