@@ -9,7 +9,6 @@ from typing import Literal
 Detrend = Literal["none", "constant", "linear", "auto"]
 Run = tuple[str, int, int]
 """Rows of a file, the first and the last; no name: of the only file."""
-DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
 
 
 @dataclass(frozen=True)

@@ -68,14 +68,8 @@ def _log(folder, samples=1200, *, beside=0.0):
     )
 
 
-@pytest.mark.parametrize(
-    ("drift", "drifts"),
-    [
-        ("yes", True),
-        pytest.param("no", False, marks=pytest.mark.slow),
-        pytest.param("not known", False, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("drift", "drifts"), [("yes", True), ("no", False), ("not known", False)])
 def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     _log(tmp_path)
     answers = {**ENGINEER, "plant": "log log.csv", "noise": "standard deviation 0.2", "drift": drift}
@@ -86,6 +80,7 @@ def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     assert "the log has a variance of 0.08" in draft.text
 
 
+@pytest.mark.slow
 def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
     _log(tmp_path)
     answers = {**ENGINEER, "plant": "log log.csv", "noise": "resolution 0.1"}
