@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import re
 from collections import Counter
-from enum import Enum
 from pathlib import Path
 
 import typer
@@ -59,7 +58,7 @@ def rows_of(command) -> list[tuple[str, str]]:
     """Return the name and the help of every argument and option of a command."""
     shown = [parameter for parameter in command.params if parameter.name != "help"]
     arguments = [(f"`{p.metavar}`", p.help) for p in shown if p.param_type_name == "argument"]
-    return arguments + [(option_names(p), p.help) for p in shown if p.param_type_name == "option"]
+    return arguments + [(option_names(p, command), p.help) for p in shown if p.param_type_name == "option"]
 
 
 def section(name, command, groups) -> str:
@@ -82,13 +81,14 @@ def listed(rows) -> str:
     return "".join(f"- {left}: {right}\n" for left, right in rows)
 
 
-def option_names(option) -> str:
+def option_names(option, command) -> str:
     """The names of an option, and the metavar or the choices of its value."""
     names = ", ".join(f"`{name}`" for name in sorted([*option.opts, *option.secondary_opts], key=len))
     if option.is_flag:
         return names
-    if isinstance(option.default, Enum):
-        return f"{names} {'|'.join(type(option.default))} (default {option.default})".replace("|", "\\|")
+    choices = option.display_type(typer.Context(command)).strip("<>")
+    if "|" in choices and not option.metavar:
+        return f"{names} {choices}{f' (default {option.default})' if option.default else ''}"
     return f"{names} {option.metavar}" if option.metavar else names
 
 

@@ -5,10 +5,9 @@ Nothing heavy is imported here or at the top of a command's file: `idesign --hel
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand, TyperOption
 
 from inputdesign_cli.cli.campaign import campaign, proceed, status
 from inputdesign_cli.cli.check import check
@@ -24,28 +23,6 @@ from inputdesign_cli.cli.watch import report, watch
 from inputdesign_cli.cli.wizard import wizard
 from inputdesign_cli.compute.executor import use_one_thread
 from inputdesign_cli.version import __version__
-
-if TYPE_CHECKING:
-    from typer._click import Context
-
-
-class OnceCommand(TyperCommand):
-    """Refuses options that stand there twice, unless they are repeatable."""
-
-    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
-        """What typer makes of the arguments.
-
-        Raises:
-            typer.BadParameter: An option that takes one value has several.
-        """
-        _, _, stated = self.make_parser(ctx).parse_args(args=list(args))
-        for option in stated:
-            single = isinstance(option, TyperOption) and not (option.multiple or option.is_flag)
-            if single and stated.count(option) > 1 and not ctx.resilient_parsing:  # as of completions
-                message = "it stands there twice, and takes one value: leave one of them out"
-                raise typer.BadParameter(message, param_hint=option.opts[0])
-        return super().parse_args(ctx, args)
-
 
 app = typer.Typer(
     name="idesign",
@@ -102,8 +79,7 @@ COMMANDS = (
 # A word of Python is no name of a function.
 _NAMES = {"proceed": "next"}
 for command in COMMANDS:
-    once = OnceCommand if command is signal else None
-    app.command(_NAMES.get(command.__name__), cls=once)(guarded(unfolded(command)))
+    app.command(_NAMES.get(command.__name__))(guarded(unfolded(command)))
 
 
 def main() -> None:

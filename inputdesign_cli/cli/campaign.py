@@ -9,7 +9,17 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Figures, Json, Output, Overwrite, Quiet, Shown, SpecFile
+from inputdesign_cli.cli.options import (
+    Changes,
+    Figures,
+    Into,
+    Json,
+    Output,
+    Overwrite,
+    Quiet,
+    Shown,
+    SpecFile,
+)
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.rows import OperatingPoint, Written, levels
 from inputdesign_cli.cli.run import Place, keep, renew
@@ -60,7 +70,7 @@ def campaign(
     estimates the model, plans the next part with all data so far, and stops as soon as they meet the target.
     The directory remembers every plan, record and decision.
     """
-    place = Place(output, name_of(spec), [spec], overwrite)
+    place = Place(Into(output, overwrite), name_of(spec), [spec])
     with computing(spec, quiet=quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.questions.campaign.directory import begun

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import Annotated, Literal
 
 import typer
 
-from inputdesign_cli.cli.options import (
-    Changes,
-    EstimateOutput,
-    ExplorationOutput,
-    NoOutput,
-    Overwrite,
-    Shown,
-    SpecFile,
-    VerdictOutput,
-    one_of,
-)
+from inputdesign_cli.cli.options import Changes, Into, Shown, SpecFile
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.rows import DataFiles, Levels, Rows
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import computing
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
-
-if TYPE_CHECKING:
-    from inputdesign_cli.explore import Family
 
 _EXIT = {"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
 
@@ -39,15 +26,10 @@ def explore(
         typer.Option("--validate", metavar="MODEL", help="Judge this model by the data; look for no other."),
     ] = None,
     structure: Annotated[
-        str,
-        one_of(
-            ("any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"),
-            "The structure of the model (fopdt: a lag with dead time)",
-        ),
+        Literal["any", "fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"],
+        typer.Option(help="The structure of the model (fopdt: a lag with dead time)."),
     ] = "any",
-    output: ExplorationOutput = None,
-    overwrite: Overwrite = False,
-    no_output: NoOutput = False,
+    into: Into,
     shown: Shown,
 ) -> None:
     """Find a model in a log, and write a spec for the next experiment.
@@ -59,13 +41,13 @@ def explore(
     """
     ending = "explored" if validate is None else "validated"
     sources = [*([validate] if validate is not None else []), *data]
-    place = Place(output, f"{data[0].stem}_{ending}", sources, overwrite, no_output)
+    place = Place(into, f"{data[0].stem}_{ending}", sources)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
 
         model = None if validate is None else read_spec(validate, Changes(), design=False)
         place = place.checked(model)
-        only = None if structure == "any" else cast("Family", structure)
+        only = None if structure == "any" else structure
         found = questions.explore(data, rows.of(data), model=model, structure=only)
     keep(found.results, place, shown, page=validate is None)
     if found.reasons:
@@ -80,9 +62,7 @@ def identify(
         typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure."),
     ] = None,
     changes: Changes,
-    output: EstimateOutput = None,
-    overwrite: Overwrite = False,
-    no_output: NoOutput = False,
+    into: Into,
     levels: Levels,
     rows: Rows,
     frequency_response: Annotated[
@@ -105,7 +85,7 @@ def identify(
             "it says which structure is estimated; `idesign explore DATA` finds one without a spec",
             param_hint="--spec",
         )
-    place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
+    place = Place(into, f"{data[0].stem}_identified", [spec, *data])
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.origin import check_counted_once
@@ -125,16 +105,7 @@ def identify(
 
 
 def assess(
-    spec: SpecFile,
-    data: DataFiles,
-    *,
-    changes: Changes,
-    output: VerdictOutput = None,
-    overwrite: Overwrite = False,
-    no_output: NoOutput = False,
-    levels: Levels,
-    rows: Rows,
-    shown: Shown,
+    spec: SpecFile, data: DataFiles, *, changes: Changes, into: Into, levels: Levels, rows: Rows, shown: Shown
 ) -> None:
     """Show whether the data of a real experiment meet the target.
 
@@ -143,7 +114,7 @@ def assess(
     that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where tests of
     the residuals refute the model structure; the note says what to change.
     """
-    place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output, judges=True)
+    place = Place(into, f"{data[0].stem}_assessed", [spec, *data], judges=True)
     with computing(data[0], quiet=shown.quiet):
         from inputdesign_cli import questions
         from inputdesign_cli.outcome.origin import check_counted_once

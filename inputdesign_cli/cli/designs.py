@@ -13,11 +13,9 @@ import typer
 from inputdesign_cli.cli.options import (
     Changes,
     Fast,
+    Into,
     Json,
     KeepPartial,
-    NoOutput,
-    Output,
-    Overwrite,
     Quiet,
     Shown,
     SpecFile,
@@ -41,9 +39,7 @@ def solve(
     spec: SpecFile,
     *,
     changes: Changes,
-    output: Output = None,
-    overwrite: Overwrite = False,
-    no_output: NoOutput = False,
+    into: Into,
     keep_partial: KeepPartial = False,
     fast: Fast = False,
     trade: TradeWords = None,
@@ -54,8 +50,8 @@ def solve(
     Writes a run directory with the spectrum, the signal to apply, the model error that it buys, and the
     proof of optimality; prints a summary.
     """
-    place = Place(output, name_of(spec), [spec], overwrite, no_output)
-    if trade and (no_output or keep_partial or str(spec) == STANDARD_STREAM):
+    place = Place(into, name_of(spec), [spec])
+    if trade and (into.no_output or keep_partial or str(spec) == STANDARD_STREAM):
         message = "--trade needs a spec on disc and a directory to write, and does not go with --keep-partial"
         raise typer.BadParameter(message)
     if fast:
@@ -72,42 +68,25 @@ def solve(
         raise typer.Exit(128 + came[0])
 
 
-def analyse(
-    spec: SpecFile,
-    *,
-    changes: Changes,
-    output: Output = None,
-    overwrite: Overwrite = False,
-    no_output: NoOutput = False,
-    shown: Shown,
-) -> None:
+def analyse(spec: SpecFile, *, changes: Changes, into: Into, shown: Shown) -> None:
     """Show what accuracy a given excitation buys.
 
     Nothing is optimised: the excitation stands in the spec under `spectrum.given`. Writes a run
     directory and prints a summary.
     """
-    place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    place = Place(into, name_of(spec), [spec])
     results, place = _results("analyse", place, changes, shown.quiet)
     keep(results, place, shown)
 
 
-def simulate(
-    spec: SpecFile,
-    *,
-    changes: Changes,
-    output: Output = None,
-    overwrite: Overwrite = False,
-    no_output: NoOutput = False,
-    workers: Workers,
-    shown: Shown,
-) -> None:
+def simulate(spec: SpecFile, *, changes: Changes, into: Into, workers: Workers, shown: Shown) -> None:
     """Try the designed experiment on the true system, many times.
 
     Designs as `solve` does, runs the experiment as often as `simulation.runs` says, each time with new
     noise, and adds to the run directory of `solve` what the models did; prints a summary.
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
-    place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    place = Place(into, name_of(spec), [spec])
     computes = workers.executor(quiet=shown.quiet)
     results, place = _results("simulate", place, changes, shown.quiet, computes)
     keep(results, place, shown)

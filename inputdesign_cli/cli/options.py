@@ -6,16 +6,17 @@ A parameter of a command whose type is a dataclass of this file stands for an op
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Literal, get_type_hints
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
+from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -24,54 +25,29 @@ if TYPE_CHECKING:
 def unfolded(command: Callable[..., None]) -> Callable[..., None]:
     """Return the command with an option for each field of its parameters that are dataclasses."""
     hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    groups = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
     parameters: list[Parameter] = []
-    for parameter in signature(command).parameters.values():
-        if parameter.name not in groups:
-            parameters.append(parameter.replace(annotation=hints[parameter.name]))
+    for one in signature(command).parameters.values():
+        if one.name not in groups:
+            parameters.append(one.replace(annotation=hints[one.name], kind=Parameter.KEYWORD_ONLY))
             continue
-        kind = hints[parameter.name]
-        types = get_type_hints(kind, include_extras=True)
-        for one in fields(kind):
-            default = Parameter.empty if one.default is MISSING else one.default
-            parameters.append(
-                Parameter(one.name, Parameter.KEYWORD_ONLY, default=default, annotation=types[one.name])
-            )
+        types = get_type_hints(hints[one.name], include_extras=True)
+        parameters += [
+            one.replace(name=field.name, default=field.default, annotation=types[field.name])
+            for field in fields(groups[one.name])
+        ]
 
     @wraps(command)
-    def run(**given: Any) -> None:
+    def run(**given: object) -> None:
         made = {
-            name: kind(**{one.name: given.pop(one.name) for one in fields(kind)})
+            name: hints[name](**{field.name: given.pop(field.name) for field in fields(kind)})
             for name, kind in groups.items()
         }
         command(**given, **made)
 
     run.__annotations__ = {one.name: one.annotation for one in parameters}
-    run.__dict__["__signature__"] = Signature(
-        [one.replace(kind=Parameter.KEYWORD_ONLY) for one in parameters]
-    )
+    run.__dict__["__signature__"] = Signature(parameters)
     return run
-
-
-def one_of(words: Sequence[str], help_text: str) -> Any:
-    """Return the option that takes one of these words, the first if it is absent."""
-
-    def check(value: str) -> str:
-        if value not in words:
-            from inputdesign_cli.specification.models.wording import unknown_word
-
-            message, hint = unknown_word(value, words)
-            raise typer.BadParameter("; ".join(filter(None, (message.replace("{key}", "it"), hint))))
-        return value
-
-    listed = ", ".join([f"{words[0]} (default)", *words[1:]])
-    return typer.Option(
-        metavar="WORD",
-        callback=check,
-        autocompletion=lambda: list(words),
-        show_default=False,
-        help=f"{help_text}: {listed}.",
-    )
 
 
 SpecFile = Annotated[
@@ -103,18 +79,28 @@ def run_path(text: str) -> Path:
     return path
 
 
-def _into(default: str) -> Any:
-    text = f"Directory to write. The default is {default}."
-    return typer.Option("--output", "-o", metavar="DIR", help=text, parser=run_path)
+def refuse_existing(file: Path, overwrite: bool, option: str = "--overwrite") -> None:
+    """Refuse a file that exists, unless it may be overwritten.
+
+    Raises:
+        OutputError: `output-exists`.
+    """
+    if file.exists() and not overwrite:
+        hint = f"choose another name, or overwrite it with {option}"
+        raise OutputError.because("output-exists", f"{file} exists already", hint)
 
 
-Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]
-EstimateOutput = Annotated[Path | None, _into("runs/DATA_identified, without the ending of the file")]
-ExplorationOutput = Annotated[
-    Path | None, _into("runs/DATA_explored, or runs/DATA_validated, without the ending of the file")
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="DIR",
+        help="Directory to write. The default is runs/SPEC, runs/SPEC-sweep, or runs/DATA_explored, "
+        "_validated, _identified or _assessed.",
+        parser=run_path,
+    ),
 ]
-VerdictOutput = Annotated[Path | None, _into("runs/DATA_assessed, without the ending of the file")]
-SweepOutput = Annotated[Path | None, _into("runs/SPEC-sweep, without the ending of the file")]
 NoOutput = Annotated[
     bool, typer.Option("--no-output", help="Write no files; print the summary, or the result with --json.")
 ]
@@ -146,7 +132,7 @@ Figures = Annotated[
     bool, typer.Option("--figures/--no-figures", help="Draw the figures of the run, or leave them out.")
 ]
 FigureFormat = Annotated[
-    str, one_of(("png", "svg", "pdf"), "The format of the figures; svg and pdf can be scaled")
+    Literal["png", "svg", "pdf"], typer.Option(help="The format of the figures; svg and pdf can be scaled.")
 ]
 
 
@@ -164,6 +150,15 @@ class Changes:
         ),
     ] = None
     confine: Confine = None
+
+
+@dataclass(frozen=True)
+class Into:
+    """Where a run goes."""
+
+    output: Output = None
+    overwrite: Overwrite = False
+    no_output: NoOutput = False
 
 
 @dataclass(frozen=True)

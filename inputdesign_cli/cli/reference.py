@@ -6,18 +6,18 @@ import difflib
 import json
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from inputdesign_cli.cli.completion import error_codes
-from inputdesign_cli.cli.options import one_of, path_option
+from inputdesign_cli.cli.options import path_option, refuse_existing
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.errors import DataError, OutputError
 
 _PACKAGE = Path(__file__).parents[1]
 SCHEMA = "idesign.schema.json"
-KINDS = ("open-loop", "closed-loop", "sweep", "criterion", "control", "regression")
+Kind = Literal["open-loop", "closed-loop", "sweep", "criterion", "control", "regression"]
 """The starter specs, named as their files in `starters/`."""
 
 
@@ -74,7 +74,7 @@ def init(
     file: Annotated[
         Path | None, typer.Argument(metavar="[FILE]", help="Where to write it, if not to standard output.")
     ] = None,
-    kind: Annotated[str, one_of(KINDS, "The experiment to start from")] = "open-loop",
+    kind: Annotated[Kind, typer.Option(help="The experiment to start from.")] = "open-loop",
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
 ) -> None:
     """Write a commented starter spec.
@@ -88,9 +88,7 @@ def init(
     if file is None:
         typer.echo(text, nl=False)
         return
-    if file.exists() and not force:
-        hint = "choose another name, or overwrite it with --force"
-        raise OutputError.because("output-exists", f"{file} exists already", hint)
+    refuse_existing(file, force, "--force")
     from inputdesign_cli.outcome.run_directory import write_text
 
     write_text(file, text)

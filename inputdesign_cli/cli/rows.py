@@ -8,17 +8,16 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
-
-from inputdesign_cli.cli.options import one_of
 
 if TYPE_CHECKING:
     from inputdesign_cli.records import Preparation, Run
 
 _ROWS = re.compile(r"(?:(.+):)?\s*((\d+)(?:\s*-\s*(\d+))?)\s*", re.DOTALL)
 _CHANNEL = re.compile(r"[uyr]([1-9]\d*)?|time", re.ASCII)
+TimeUnit = Literal["s", "ms", "us", "min", "h", "d"]
 DataFiles = Annotated[
     list[Path],
     typer.Argument(
@@ -34,35 +33,6 @@ OperatingPoint = Annotated[
         metavar="u1=..,y1=..",
         help="What channels vary about, as in u1=40,y1=52.3; it is subtracted. For inputs the default is "
         "signal.offset.",
-    ),
-]
-Columns = Annotated[
-    str,
-    typer.Option(
-        "--columns",
-        metavar="u1=..,y1=..",
-        help="Which column holds which channel, by name or number: u1=Heater 1,y1=4,time=1.",
-    ),
-]
-
-
-Separator = Annotated[
-    str | None,
-    typer.Option(
-        "--sep",
-        metavar="MARK",
-        help="What separates the columns of a text file: , ; tab blank or another mark.",
-    ),
-]
-Decimal = Annotated[
-    str | None, typer.Option("--decimal", metavar="MARK", help="The decimal mark of the file: . or ,")
-]
-TimeFormat = Annotated[
-    str | None,
-    typer.Option(
-        "--time-format",
-        metavar="FORM",
-        help="How dates and times are written, as %d.%m.%Y %H:%M:%S or %Y%m%d%H%M%S.",
     ),
 ]
 
@@ -86,10 +56,34 @@ class Levels:
 class Written:
     """How a text file is written, where it does not show it, and which column is which."""
 
-    columns: Columns = ""
-    separator: Separator = None
-    decimal: Decimal = None
-    time_format: TimeFormat = None
+    columns: Annotated[
+        str,
+        typer.Option(
+            "--columns",
+            metavar="u1=..,y1=..",
+            help="Which column holds which channel, by name or number: u1=Heater 1,y1=4,time=1.",
+        ),
+    ] = ""
+    separator: Annotated[
+        str | None,
+        typer.Option(
+            "--sep",
+            metavar="MARK",
+            help="What separates the columns of a text file: , ; tab blank or another mark.",
+        ),
+    ] = None
+    decimal: Annotated[
+        Literal[".", ","] | None,
+        typer.Option("--decimal", metavar="MARK", help="The decimal mark of the file: . or ,"),
+    ] = None
+    time_format: Annotated[
+        str | None,
+        typer.Option(
+            "--time-format",
+            metavar="FORM",
+            help="How dates and times are written, as %d.%m.%Y %H:%M:%S or %Y%m%d%H%M%S.",
+        ),
+    ] = None
 
     def preparation(self) -> Preparation:
         """Return what these options say about data files.
@@ -99,21 +93,17 @@ class Written:
         """
         from inputdesign_cli.records import Preparation
 
-        separator, decimal = self.separator, self.decimal
-        if separator is not None and separator not in ("tab", "\\t", "blank"):
-            if len(separator) != 1:
-                raise typer.BadParameter("it is one character, or tab, or blank", param_hint="--sep")
-            if separator.isalnum() or separator in "\"'+-\r\n":
-                raise typer.BadParameter("it is a mark that numbers do not have", param_hint="--sep")
-        if decimal is not None and decimal not in (".", ","):
-            raise typer.BadParameter("it is . or ,", param_hint="--decimal")
-        if decimal is not None and decimal == separator:
-            raise typer.BadParameter("it is the mark that separates columns, too", param_hint="--decimal")
+        mark = self.separator
+        if mark is not None and mark not in ("tab", "\\t", "blank"):
+            if len(mark) != 1 or mark.isalnum() or mark in "\"'+-\r\n":
+                refuse("it is tab, blank, or one mark that numbers do not have", "--sep")
+            if self.decimal == mark:
+                refuse("it is the mark that separates columns, too", "--decimal")
         if self.time_format is not None and "%" not in self.time_format:
-            raise typer.BadParameter("write it as in %d.%m.%Y %H:%M:%S", param_hint="--time-format")
-        columns = named(self.columns, "--columns", "u1=Heater 1,y1=4")
+            refuse("write it as in %d.%m.%Y %H:%M:%S", "--time-format")
+        columns = _named(self.columns, "--columns", "u1=Heater 1,y1=4")
         return Preparation(
-            columns=columns, separator=separator, decimal=decimal, time_format=self.time_format
+            columns=columns, separator=mark, decimal=self.decimal, time_format=self.time_format
         )
 
 
@@ -127,10 +117,7 @@ class Rows(Written):
             "--sample-time", metavar="T", help="Time between rows, where the file does not have it."
         ),
     ] = None
-    time_unit: Annotated[
-        str | None,
-        typer.Option("--time-unit", metavar="UNIT", help="Of the times in the file: s, ms, us, min, h or d."),
-    ] = None
+    time_unit: Annotated[TimeUnit | None, typer.Option(help="Of the times in the file.")] = None
     resample: Annotated[
         bool,
         typer.Option(
@@ -140,10 +127,8 @@ class Rows(Written):
         ),
     ] = False
     detrend: Annotated[
-        str,
-        one_of(
-            ("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"
-        ),
+        Literal["none", "constant", "linear", "auto"],
+        typer.Option(help="What to take away from every signal, segment by segment."),
     ] = "none"
     skip: Annotated[
         int,
@@ -168,23 +153,45 @@ class Rows(Written):
         Raises:
             typer.BadParameter: One of them cannot be read.
         """
-        from inputdesign_cli.records import DETRENDS
-        from inputdesign_cli.records.columns import TIME_UNITS
-
         if self.sample_time is not None and not 0.0 < self.sample_time < math.inf:
-            raise typer.BadParameter("it is a positive number", param_hint="--sample-time")
-        if self.time_unit is not None and self.time_unit not in TIME_UNITS:
-            raise typer.BadParameter(f"it is one of {', '.join(TIME_UNITS)}", param_hint="--time-unit")
+            refuse("it is a positive number", "--sample-time")
         return replace(
             self.preparation(),
             sample_time=self.sample_time,
             time_unit=self.time_unit,
             resample=self.resample,
-            detrend=DETRENDS[self.detrend],
+            detrend=self.detrend,
             skip=self.skip,
-            span=_limits(self.span) if self.span else None,
+            span=span(self.span, "--range", "FROM:TO") if self.span else None,
             without=tuple(run for text in self.without or () for run in _runs(text, data)),
         )
+
+
+def refuse(why: str, option: str) -> NoReturn:
+    """Refuse the value of an option.
+
+    Raises:
+        typer.BadParameter: always.
+    """
+    raise typer.BadParameter(why, param_hint=option)
+
+
+def span(text: str, option: str, form: str) -> tuple[float, float]:
+    """Return the two numbers of `10:250`; an end that is left out, as in `10:`, is infinite.
+
+    Raises:
+        typer.BadParameter: The text is something else.
+    """
+    first, colon, last = text.partition(":")
+    try:
+        low, high = float(first.strip() or "-inf"), float(last.strip() or "inf")
+    except ValueError:
+        low = high = math.nan
+    if not colon or math.isnan(low) or math.isnan(high):
+        refuse(f"{text!r} is not of the form {form}, as in 0.1:2", option)
+    if high < low:
+        refuse(f"{text!r} ends before it begins: write {last.strip()}:{first.strip()}?", option)
+    return low, high
 
 
 def levels(text: str) -> dict[str, float]:
@@ -195,36 +202,32 @@ def levels(text: str) -> dict[str, float]:
     """
     from inputdesign_cli.specification.yaml.scalars import plain_number
 
-    found = {}
-    for name, value in named(text, "--operating-point", "u1=40,y1=52.3").items():
+    found, option, example = {}, "--operating-point", "u1=40,y1=52.3"
+    for name, value in _named(text, option, example).items():
         try:
             found[name] = plain_number(value)
         except ValueError:
-            message = f"{value!r} is not a number, as in u1=40,y1=52.3"
-            raise typer.BadParameter(message, param_hint="--operating-point") from None
+            refuse(f"{value!r} is not a number, as in {example}", option)
     return found
 
 
-def named(text: str, option: str, example: str) -> dict[str, str]:
+def _named(text: str, option: str, example: str) -> dict[str, str]:
     """`u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
 
     Raises:
         typer.BadParameter: A part has no `=`, or names nothing.
     """
-    found = {}
+    found: dict[str, str] = {}
     for part in filter(None, map(str.strip, text.split(","))):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not (name and equals and value):
-            raise typer.BadParameter(f"{part!r} is not of the form {example}", param_hint=option)
+            refuse(f"{part!r} is not of the form {example}", option)
         if not _CHANNEL.fullmatch(name):
-            message = (
-                f"{name!r} is no channel: inputs are u1, u2, .., outputs y1, y2, .., references of a loop "
-                f"r1, r2, .. (as in {example})"
-            )
-            raise typer.BadParameter(message, param_hint=option)
+            kinds = "inputs are u1, u2, .., outputs y1, y2, .., references of a loop r1, r2, .."
+            refuse(f"{name!r} is no channel: {kinds} (as in {example})", option)
         channel = f"{name}1" if name in ("u", "y", "r") else name
         if channel in found:
-            raise typer.BadParameter(f"{channel} stands there twice", param_hint=option)
+            refuse(f"{channel} stands there twice", option)
         found[channel] = value
     return found
 
@@ -245,30 +248,10 @@ def _runs(text: str, data: Sequence[Path]) -> Iterator[Run]:
             continue
         name, rows, first, last = (found[1] or "").strip(), found[2], int(found[3]), int(found[4] or found[3])
         if last < first:
-            message = f"{rows!r} ends before it begins: write {last}-{first}?"
-            raise typer.BadParameter(message, param_hint="--without")
+            refuse(f"{rows!r} ends before it begins: write {last}-{first}?", "--without")
         if name in shared or (name not in names and (name or len(data) > 1)):
-            message = f"which file {rows} are rows of is not clear: write {data[0]}:{rows}"
-            raise typer.BadParameter(message, param_hint="--without")
+            refuse(f"which file {rows} are rows of is not clear: write {data[0]}:{rows}", "--without")
         yield name, first, last
         part = ""
     if part or not text.strip():
-        message = f"{part!r} names no rows: write 183-240, or 310 for one"
-        raise typer.BadParameter(message, param_hint="--without")
-
-
-def _limits(span: str) -> tuple[float, float]:
-    begin, colon, end = span.partition(":")
-    try:
-        first, last = float(begin.strip() or "-inf"), float(end.strip() or "inf")
-    except ValueError:
-        first = last = math.nan
-    if not colon or math.isnan(first) or math.isnan(last):
-        message = f"{span!r} is not two times, as in 10:250; one may be left out, as in 10:"
-        raise typer.BadParameter(message, param_hint="--range")
-    if last < first:
-        raise typer.BadParameter(
-            f"it ends at {last:g}, before it begins at {first:g}: write {last:g}:{first:g}?",
-            param_hint="--range",
-        )
-    return first, last
+        refuse(f"{part!r} names no rows: write 183-240, or 310 for one", "--without")

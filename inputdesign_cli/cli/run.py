@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from inputdesign_cli.cli.options import Shown
+from inputdesign_cli.cli.options import Into, Shown
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.regular_file import read_regular
@@ -22,31 +22,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run goes: to `output` or else to runs/`name`; what it was made from, the spec first."""
+    """Where a run goes, else to runs/`name`; what it was made from, the spec first."""
 
-    output: Path | None
+    into: Into
     name: str
     sources: Sequence[Path]
-    overwrite: bool = False
-    nowhere: bool = False  # nothing is written
     judges: bool = False  # the run has a verdict
     asked: str = ""  # the spec as it was read
 
     def __post_init__(self) -> None:
-        if self.nowhere and self.output is not None:
+        if self.into.no_output and self.into.output is not None:
             raise typer.BadParameter("--no-output writes nothing, and --output says where")
 
     @property
     def directory(self) -> Path:
         """The run directory."""
-        return self.output or Path("runs") / self.name
+        return self.into.output or Path("runs") / self.name
 
     @property
     def origin(self) -> Origin:
         """What the run is made from."""
         from inputdesign_cli.outcome.origin import Origin
 
-        return Origin(self.sources, self.asked, self.overwrite, self.judges)
+        return Origin(self.sources, self.asked, self.into.overwrite, self.judges)
 
     def checked(self, spec: Spec | None) -> Place:
         """Return the place for the run of a spec that was read, before anything is computed.
@@ -55,7 +53,7 @@ class Place:
             OutputError: the directory cannot take the run, see `check_place`, and `output-is-the-spec`.
         """
         place = self if spec is None else replace(self, asked=spec.to_yaml())
-        if not place.nowhere:
+        if not place.into.no_output:
             from inputdesign_cli.outcome.origin import check_place
 
             check_place(place.directory, place.origin, place.spared(place.asked))
@@ -97,7 +95,7 @@ def keep(results: Results, place: Place, shown: Shown, *, page: bool = False) ->
     Raises:
         OutputError: as `write_run`, and `output-is-the-spec`.
     """
-    if place.nowhere:
+    if place.into.no_output:
         _show(results, [], shown)
         return
     results = replace(results, resolved_spec=place.spared(results.resolved_spec))

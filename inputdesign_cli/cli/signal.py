@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,19 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Json, Quiet, path_option
+from inputdesign_cli.cli.options import Json, Quiet, path_option, refuse_existing
+from inputdesign_cli.cli.rows import TimeUnit, refuse, span
 from inputdesign_cli.cli.terminal import aligned
-from inputdesign_cli.errors import OutputError
 from inputdesign_cli.plugins import names
 
 if TYPE_CHECKING:
     from inputdesign_cli.outcome.results import Results
+    from inputdesign_cli.questions.ready_made import ReadyMade
 
 _ENDINGS = ("csv", "mat", "npz", "h", "png")
 _ROUNDING = 1e-12
 # Beyond these sizes squares and their sums leave double precision.
 _SMALLEST, _LARGEST = 1e-15, 1e15
-_TIME_UNITS = ("s", "ms", "us", "min", "h", "d")
 
 
 @dataclass(frozen=True)
@@ -60,14 +59,13 @@ class Kinds:
         Raises:
             typer.BadParameter: There is none, or more than one.
         """
-        kinds = {name: value for name, value in vars(self).items() if value not in (None, "")}
-        if len(kinds) != 1:
-            said = " and ".join(f"--{name}" for name in kinds) or "none of them"
+        stated = {name: value for name, value in vars(self).items() if value not in (None, "")}
+        if len(stated) != 1:
+            said = " and ".join(f"--{name}" for name in stated) or "none of them"
             raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
         if self.kind and self.kind not in names("idesign.signals"):
-            message = f"no package adds a kind {self.kind!r}"
-            raise typer.BadParameter(message, param_hint="--kind")
-        return self.kind or next(iter(kinds))
+            refuse(f"no package adds a kind {self.kind!r}", "--kind")
+        return self.kind or next(iter(stated))
 
 
 @dataclass(frozen=True)
@@ -90,25 +88,42 @@ class Form:
     periods: Annotated[int, typer.Option(min=1, help="Equal periods of a multisine in the record.")] = 1
     seed: Annotated[int, typer.Option(min=0, help="Of the random numbers.")] = 0
     sample_time: Annotated[float, typer.Option(metavar="T", help="Time between samples.")] = 1.0
-    time_unit: Annotated[str, typer.Option(metavar="UNIT", help="s, ms, us, min, h or d.")] = "s"
+    time_unit: Annotated[TimeUnit, typer.Option(help="Of the sample time.")] = "s"
 
-    def check(self, kind: str) -> None:
-        """Check that every option means something to this kind.
+    def asked(self, kinds: Kinds) -> ReadyMade:
+        """Return the signal of the kind that is asked for.
 
         Raises:
-            typer.BadParameter: An option does not, or cannot be used.
+            typer.BadParameter: There is none or more than one, or an option cannot be used for it.
         """
-        others = {"--band": (bool(self.band), "multisine"), "--odd": (self.odd, "multisine")}
-        others |= {"--periods": (self.periods > 1, "multisine"), "--hold": (self.hold > 1, "prbs")}
-        for option, (stated, owner) in others.items():
-            if stated and kind != owner and kind not in names("idesign.signals"):
-                message = f"it is of --{owner}, and does nothing to --{kind}: leave it out"
-                raise typer.BadParameter(message, param_hint=option)
+        from inputdesign_cli.questions.ready_made import ReadyMade
+
+        kind = kinds.chosen()
+        owners = {"--band": (self.band, "multisine"), "--odd": (self.odd, "multisine")}
+        owners |= {"--periods": (self.periods > 1, "multisine"), "--hold": (self.hold > 1, "prbs")}
+        for option, (is_stated, owner) in owners.items():
+            if is_stated and kind not in (owner, kinds.kind):
+                refuse(f"it is of --{owner}, and does nothing to --{kind}: leave it out", option)
         if not _SMALLEST <= self.sample_time <= _LARGEST:
-            message = f"it is a positive number, from {_SMALLEST:g} to {_LARGEST:g}"
-            raise typer.BadParameter(message, param_hint="--sample-time")
-        if self.time_unit not in _TIME_UNITS:
-            raise typer.BadParameter(f"it is one of {', '.join(_TIME_UNITS)}", param_hint="--time-unit")
+            refuse(f"it is a positive number, from {_SMALLEST:g} to {_LARGEST:g}", "--sample-time")
+        band, option = (kinds.chirp, "--chirp") if kinds.chirp else (self.band, "--band")
+        ranges = tuple(_pair(part, "--range") for part in self.span.split(","))
+        if len(ranges) not in (1, self.inputs):
+            refuse(f"it has {len(ranges)} ranges, and there are {self.inputs} inputs", "--range")
+        return ReadyMade(
+            kind,
+            bits=kinds.prbs,
+            number=kinds.multisine or kinds.steps,
+            band=_pair(band, option, least=0.0) if band else None,
+            samples=self.samples,
+            levels=ranges * (self.inputs // len(ranges)),
+            hold=self.hold,
+            periods=self.periods,
+            odd=self.odd,
+            seed=self.seed,
+            sample_time=self.sample_time,
+            time_unit=self.time_unit,
+        )
 
 
 def signal(
@@ -134,28 +149,11 @@ def signal(
     persistent excitation and the band of each channel; -o writes the samples, a C header for hardware among
     the kinds. With several inputs a prbs is shifted, a multisine has a period for each input.
     """
-    kind = kinds.chosen()
     files = _files(output or [], overwrite)
-    form.check(kind)
-    from inputdesign_cli.questions.ready_made import ReadyMade, make_signal
+    asked = form.asked(kinds)
+    from inputdesign_cli.questions.ready_made import make_signal
 
-    band, option = (kinds.chirp, "--chirp") if kinds.chirp else (form.band, "--band")
-    results = make_signal(
-        ReadyMade(
-            kind,
-            bits=kinds.prbs,
-            number=kinds.multisine or kinds.steps,
-            band=_pair(band, option) if band else None,
-            samples=form.samples,
-            levels=_levels(form.span, form.inputs),
-            hold=form.hold,
-            periods=form.periods,
-            odd=form.odd,
-            seed=form.seed,
-            sample_time=form.sample_time,
-            time_unit=form.time_unit,
-        )
-    )
+    results = make_signal(asked)
     for file in files:
         _write(file, results)
     if json_output:
@@ -178,47 +176,21 @@ def _files(names: Sequence[str], overwrite: bool) -> list[Path]:
         if file.suffix.removeprefix(".").lower() not in _ENDINGS:
             listed = ", ".join(f".{ending}" for ending in _ENDINGS)
             raise typer.BadParameter(f"{file.name} ends with none of {listed}", param_hint="--output")
-        if file.exists() and not overwrite:
-            hint = "choose another name, or replace it with --overwrite"
-            raise OutputError.because("output-exists", f"{file} exists already", hint)
+        refuse_existing(file, overwrite)
     return files
 
 
-def _pair(text: str, option: str) -> tuple[float, float]:
+def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, float]:
     """Return two numbers, the second larger.
 
     Raises:
         typer.BadParameter: The text is something else.
     """
-    from inputdesign_cli.specification.yaml.scalars import plain_number
-
-    low, colon, high = text.partition(":")
-    try:
-        found = plain_number(low), plain_number(high)
-    except ValueError:
-        found = (math.nan, math.nan)
-    if not colon or not all(map(math.isfinite, found)):
-        raise typer.BadParameter(f"{text!r} is not of the form LOW:HIGH, as in 0.1:2", param_hint=option)
-    if not found[0] < found[1]:
-        message = f"in {text!r}, LOW:HIGH, {low.strip()} is not below {high.strip()}"
-        if found[0] > found[1]:
-            message += f": write the lower one first, {high.strip()}:{low.strip()}"
-        raise typer.BadParameter(message, param_hint=option)
-    if option != "--range" and found[0] < 0.0:
-        message = f"in {text!r}, LOW:HIGH, {low.strip()} is negative, and frequencies are not"
-        raise typer.BadParameter(message, param_hint=option)
-    if max(map(abs, found)) > _LARGEST or found[1] - found[0] < _SMALLEST:
-        message = f"{text!r} is beyond {_LARGEST:g}, or narrower than {_SMALLEST:g}: take another unit"
-        raise typer.BadParameter(message, param_hint=option)
+    low, high = found = span(text, option, "LOW:HIGH")
+    if not (max(map(abs, found)) <= _LARGEST and high - low >= _SMALLEST and low >= least):
+        sizes = f"{max(least, -_LARGEST):g} to {_LARGEST:g}, {_SMALLEST:g} apart or more"
+        refuse(f"{text!r} is no LOW:HIGH within {sizes}", option)
     return found
-
-
-def _levels(text: str, inputs: int) -> tuple[tuple[float, float], ...]:
-    found = tuple(_pair(part, "--range") for part in text.split(","))
-    if len(found) not in (1, inputs):
-        message = f"it has {len(found)} ranges, and there are {inputs} inputs"
-        raise typer.BadParameter(message, param_hint="--range")
-    return found * inputs if len(found) == 1 else found
 
 
 def _write(file: Path, results: Results) -> None:

@@ -3,38 +3,26 @@
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import (
-    Confine,
-    FigureFormat,
-    Json,
-    Quiet,
-    SpecFile,
-    SweepOutput,
-    Workers,
-    one_of,
-)
+from inputdesign_cli.cli.options import Confine, FigureFormat, Json, Output, Quiet, SpecFile, Workers
 from inputdesign_cli.cli.reading import name_of, standard_input
-from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
+from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned, status
 from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweeps.running import Listing, Progress, SweepSummary
-
-VERBS = ("solve", "analyse", "simulate")
 
 
 @dataclass(frozen=True)
@@ -55,14 +43,16 @@ class Asked:
         bool, typer.Option("--zip", help="Take the values side by side, not in every combination.")
     ] = False
     confine: Confine = None
-    output: SweepOutput = None
+    output: Output = None
     overwrite: Annotated[
         bool,
         typer.Option(
             "--overwrite", help="Replace the table of a sweep of another spec, other keys or another command."
         ),
     ] = False
-    verb: Annotated[str, one_of(VERBS, "The command to run at every point")] = "solve"
+    verb: Annotated[
+        Literal["solve", "analyse", "simulate"], typer.Option(help="The command to run at every point.")
+    ] = "solve"
 
 
 def sweep(
@@ -128,18 +118,16 @@ def sweep(
 
 
 @contextmanager
-def _watched(directory: Path, *, quiet: bool) -> Iterator[ProgressLine]:
+def _watched(directory: Path, *, quiet: bool) -> Iterator[Callable[[Progress], None]]:
     """Show how far a sweep is; where it is ended by Ctrl-C or SIGTERM, say how to finish it."""
-    line = ProgressLine(quiet=quiet)
+    started = time.monotonic()
     try:
-        yield line
+        with status(f"{directory}: sweeping ...", quiet=quiet) as show:
+            yield lambda progress: show(pace(progress, time.monotonic() - started))
     except (KeyboardInterrupt, SystemExit):
-        line.close()
         if not quiet:
             typer.echo(f"what is done is in {directory}; the same command finishes the rest", err=True)
         raise
-    finally:
-        line.close()
 
 
 def _show(done: SweepSummary, *, json_output: bool, quiet: bool) -> None:
@@ -175,38 +163,9 @@ def _list(points: Iterable[Listing], *, json_output: bool) -> None:
     typer.echo(f"\n{sum(counts.values())} points: {listed}")
 
 
-class ProgressLine:
-    """Shows progress on stderr, if anybody is looking; call it with each `Progress`, and `close` it."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self._started = time.monotonic()
-        self._bar = None
-        if sys.stderr.isatty() and not quiet:
-            from rich import progress
-            from rich.console import Console
-
-            columns = (progress.BarColumn(24), progress.MofNCompleteColumn(), "{task.description}")
-            self._bar = progress.Progress(*columns, console=Console(stderr=True), transient=True)
-            self._task = self._bar.add_task("", total=None)
-            self._bar.start()
-            # A sweep may be killed at any moment, and nobody would bring a hidden cursor back.
-            self._bar.console.show_cursor(True)
-
-    def __call__(self, progress: Progress) -> None:
-        """Show how far the sweep is."""
-        if self._bar is not None:
-            told = pace(progress, time.monotonic() - self._started)
-            self._bar.update(self._task, completed=progress.passed, total=progress.total, description=told)
-
-    def close(self) -> None:
-        """Clear the line."""
-        if self._bar is not None:
-            self._bar.stop()
-
-
 def pace(progress: Progress, seconds: float) -> str:
-    """The rate, the time left and the failures. Points done before do not count as speed."""
-    told = []
+    """The points, the rate, the time left and the failures. Points done before do not count as speed."""
+    told = [f"{progress.passed}/{progress.total}"]
     if progress.computed and seconds > 0:
         rate = progress.computed / seconds
         left = timedelta(seconds=round((progress.total - progress.passed) / rate))

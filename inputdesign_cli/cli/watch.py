@@ -13,7 +13,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Fast, Figures, Output, Overwrite, Quiet, Shown, path_option
+from inputdesign_cli.cli.options import (
+    Changes,
+    Fast,
+    Figures,
+    Into,
+    Output,
+    Overwrite,
+    Quiet,
+    Shown,
+    path_option,
+)
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain, status
@@ -109,7 +119,7 @@ def watch(
             _follow_directory(spec, board)
         if fast:
             changes = replace(changes, overrides=[*(changes.overrides or []), "solver.any_spectrum=false"])
-        place = Place(output, spec.stem, [spec], overwrite)
+        place = Place(Into(output, overwrite), spec.stem, [spec])
         _follow_spec(spec, changes, place, board, figures)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Changes, Overwrite, Quiet, Shown
+from inputdesign_cli.cli.options import Changes, Into, Overwrite, Quiet, Shown, refuse_existing
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import complain, computing, status
 from inputdesign_cli.errors import OutputError, SpecError
@@ -54,19 +54,17 @@ def wizard(
     At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
     They are asked in the terminal where no option answers them. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import QUESTIONS, Answers, known_from, read_answers
+    from inputdesign_cli.wizard.questions import Answers, needed_of, read_answers
 
     _check_place(output, answers, overwrite)
     said = read_answers(answers, given or [])
-    known = said.texts
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
-    there = {*known, *known_from(known)}
-    unanswered = [one.key for one in QUESTIONS if one.default is None and one.key not in there]
-    if unanswered and not known and not terminal:
-        _refuse(unanswered)
-    draft = None
+    draft, known = None, said.texts
+    unanswered = needed_of(known)
     if unanswered and terminal:
         draft, said = _asked(known, output, quiet), Answers()  # what is typed stands in no file
+    elif unanswered and not known:
+        _refuse(unanswered)
     with said.located(), computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.outcome.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
@@ -78,12 +76,9 @@ def wizard(
         draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
     if not quiet:
-        for sentence in draft.notes:
-            typer.echo(sentence)
-        typer.echo(f"{output}: written; every line says why it stands there, and may be changed")
-    if solve is None:
-        solve = terminal and typer.confirm("Design the experiment now?", default=True)
-    if solve:
+        done = f"{output}: written; every line says why it stands there, and may be changed"
+        typer.echo("\n".join([*draft.notes, done]))
+    if solve or (solve is None and terminal and typer.confirm("Design the experiment now?", default=True)):
         _solve(output, draft.there, trade=trade, overwrite=overwrite, quiet=quiet)
 
 
@@ -93,12 +88,10 @@ def _check_place(output: Path, answers: Path | None, overwrite: bool) -> None:
     Raises:
         OutputError: `output-exists`.
     """
-    if output.exists() and not overwrite:
-        hint = "choose another name with -o, or overwrite it with --overwrite"
-        raise OutputError.because("output-exists", f"{output} exists already", hint)
     if answers is not None and output.exists() and output.samefile(answers):
         hint = "choose another name for the spec with -o"
         raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
+    refuse_existing(output, overwrite)
 
 
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
@@ -108,7 +101,7 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
 
         spec = load_spec(file)
         results = questions.solve(spec)
-    place = Place(None, file.stem, [file], overwrite)
+    place = Place(Into(overwrite=overwrite), file.stem, [file])
     keep(results, place, Shown(quiet=True))
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
         with computing(file, quiet=quiet, doing="what else would do"):

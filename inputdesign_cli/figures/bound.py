@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from inputdesign_cli.figures.apart import stroke
 from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import (
     BLACK,
@@ -23,12 +22,14 @@ from inputdesign_cli.figures.style import (
     GREY,
     ORANGE,
     OTHERS,
+    legend_above,
     limiting_label,
     log_axes,
     marked,
     plain_decades,
     plot_admitted,
     positive,
+    stroke,
 )
 from inputdesign_cli.outcome.curves import BoundCurves, BoundPanel
 from inputdesign_cli.outcome.results import Array
@@ -53,23 +54,21 @@ def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
     draw_panels(page, curves.panels, _plot, time_unit, magnitude="error of G", title=title, below=below)
 
 
-def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
-    """The curves of one entry on `axes`, in the range of the errors; the handles of their legend."""
+def _plot(axes: Axes, curves: BoundPanel) -> None:
+    """The curves of one entry on `axes`, in the range of the errors."""
     w = curves.frequency
     log_axes(axes, "y")
-    handles: list[Artist] = []
     for error in _drawn(curves):
-        handles += error.plot(axes, w, positive(error.values), f"r_u, {error.name}")
+        error.plot(axes, w, positive(error.values), f"r_u, {error.name}")
     if curves.r_adm is not None:
-        handles += plot_admitted(axes, w, curves.r_adm)
+        plot_admitted(axes, w, curves.r_adm)
     else:
         least = _FAR * min(float(np.nanmin(positive(error.values))) for error in _drawn(curves))
         gain = np.maximum(curves.G_abs, least)  # one that vanishes would stretch the axis without end
-        handles += axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
+        axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
-        handles += marked(axes, curves.active, height, color=BLUE, label=limiting_label(curves.active.size))
-    return handles
+        marked(axes, curves.active, height, color=BLUE, label=limiting_label(curves.active.size))
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def _drawn(curves: BoundPanel) -> list[_Error]:
     return found
 
 
-def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> list[Artist]:
+def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> None:
     """r_u / r_adm, with the largest in the legend: of one entry all curves, of several that of each."""
     handles: list[Artist] = []
     tops, drawn_ratios = [1.0], list[Array]()
@@ -130,4 +129,4 @@ def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> list[Artist]:
         plain_decades(axes, "y")
         axes.set_ylim(max(0.8 * float(ratios.min()), _FAR * float(ratios.max())), 1.3)
     axes.set_ylabel("r_u / r_adm")
-    return handles
+    legend_above(axes, handles)

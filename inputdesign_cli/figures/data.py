@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -62,31 +62,27 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
     axes[-1].set_xlabel(f"time ({unit})")
     axes[-1].set_xlim(curves.time[part][0], curves.time[part][-1])
     time = shown.broken(curves.time)
-    borders: list[Artist] = [
-        place.axvline(at, color=GREY, linestyle=DOTTED, linewidth=1.2, label="another record begins")
-        for place in axes
-        for at in shown.borders(curves.time).tolist()
-    ][:1]
     same = all(_coincide(panel, part) for panel in curves.panels)
     if single:
         (panel,) = curves.panels
         explained = "" if panel.fit is None else f" (fit {panel.fit:.1f} %)"
-        handles = _plot(axes[0], time, panel, shown, "y", f"simulated from u{explained}", same=same)
+        _plot(axes[0], time, panel, shown, "y", f"simulated from u{explained}", same=same)
         axes[0].set_ylabel(panel.label or "output")
         axes[1].plot(time, shown.broken(panel.y - panel.predicted), color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
-        legend_above(axes[0], [*handles, *borders])
-        return
-    longest: list[Artist] = []
-    for panel, place in zip(curves.panels, axes, strict=True):
-        handles = _plot(place, time, panel, shown, "recorded", "simulated from u", same=same)
-        longest = max(longest, handles, key=len)
+    for panel, place in () if single else zip(curves.panels, axes, strict=True):
+        _plot(place, time, panel, shown, "recorded", "simulated from u", same=same)
         explained = "" if panel.fit is None else f", fit {panel.fit:.1f} %"
         name = f"y{panel.output + 1}"
         place.set_title(f"{name}{explained}", loc="left", color=GREY)
         place.set_label(name)
         place.set_ylabel(panel.label or "output")
-    legend_over_all(page, [*longest, *borders])
+    for place, at in product(axes, shown.borders(curves.time).tolist()):
+        place.axvline(at, color=GREY, linestyle=DOTTED, linewidth=1.2, label="another record begins")
+    if single:
+        legend_above(axes[0])
+    else:
+        legend_over_all(page)
 
 
 def stretch(outputs: Sequence[Array]) -> slice:
@@ -106,17 +102,13 @@ def stretch(outputs: Sequence[Array]) -> slice:
 
 def _plot(
     axes: Axes, time: Array, panel: FitPanel, shown: _Shown, recorded: str, simulated: str, *, same: bool
-) -> list[Artist]:
+) -> None:
     """Curves of an output; one for prediction and simulation where these are the `same` in all panels."""
-    handles: list[Artist] = []
-    handles += axes.plot(time, shown.broken(panel.y), color=BLACK, linewidth=1.0, label=recorded)
+    axes.plot(time, shown.broken(panel.y), color=BLACK, linewidth=1.0, label=recorded)
     label = f"predicted one step ahead, and {simulated}" if same else "predicted one step ahead"
-    handles += axes.plot(time, shown.broken(panel.predicted), color=BLUE, linewidth=1.0, label=label)
+    axes.plot(time, shown.broken(panel.predicted), color=BLUE, linewidth=1.0, label=label)
     if panel.simulated is not None and not same:
-        handles += axes.plot(
-            time, shown.broken(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated
-        )
-    return handles
+        axes.plot(time, shown.broken(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated)
 
 
 def _coincide(panel: FitPanel, shown: slice) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -16,13 +15,11 @@ def draw_deviations(page: Figure, curves: DeviationCurves, time_unit: str) -> No
     draw_panels(page, curves.panels, _plot, time_unit, magnitude="magnitude")
 
 
-def _plot(axes: Axes, panel: DeviationPanel) -> list[Artist]:
+def _plot(axes: Axes, panel: DeviationPanel) -> None:
     w = panel.frequency
     log_axes(axes, "y")
-    handles: list[Artist] = []
-    handles += axes.plot(w, panel.G_abs, ".-", color=BLACK, linewidth=1.0, markersize=4, label="|G|")
-    handles += axes.plot(w, panel.deviation, "o", color=BLUE, markersize=5, label="standard deviation")
+    axes.plot(w, panel.G_abs, ".-", color=BLACK, linewidth=1.0, markersize=4, label="|G|")
+    axes.plot(w, panel.deviation, "o", color=BLUE, markersize=5, label="standard deviation")
     if panel.found is not None:
-        handles += axes.plot(w, panel.found, "x", color=GREEN, markersize=6, label=panel.label)
-    handles += plot_admitted(axes, w, panel.r_adm)
-    return handles
+        axes.plot(w, panel.found, "x", color=GREEN, markersize=6, label=panel.label)
+    plot_admitted(axes, w, panel.r_adm)

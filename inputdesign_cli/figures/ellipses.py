@@ -21,12 +21,11 @@ def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
     for axes, pair in zip(grid, curves.pairs, strict=True):
         axes.locator_params(axis="x", nbins=_TICKS)
         _draw(axes, pair, curves.probability)
-    handles, _ = grid[0].get_legend_handles_labels()
-    legend_over_all(page, handles)
+    legend_over_all(page)
 
 
 def _draw(axes: Axes, pair: Ellipse, probability: float) -> None:
-    label = f"{100 * probability:g} % of estimates, design"
+    label = f"{100 * probability:g} % of estimates"
     axes.plot(*boundary(pair.center, pair.covariance, probability), color=BLUE, linewidth=1.8, label=label)
     if pair.white is not None:
         outline = boundary(pair.center, pair.white, probability)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from inputdesign_cli.figures.style import (
     BLACK,
@@ -31,20 +30,18 @@ def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
     rows = curves.ratios[:_MOST_LINES]
     width = 0.5 if len(rows) > 20 else 0.8
     axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
-    handles = []
     if len(rows):
         largest = f"largest of {len(curves.ratios)} plants"
         axes.plot(w, curves.ratios.max(axis=0), color=GREY, linewidth=width, label=largest)
-        handles.append(Line2D([], [], color=GREY, linewidth=0.8, label=f"{len(curves.ratios)} plants"))
-    handles += axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
+    axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
     named = list(curves.active.items())[:MOST_NAMED]
     for (name, ratio), color in zip(named, OTHERS, strict=False):
-        handles += axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
+        axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
     shown = curves.nominal if not len(rows) else rows
     top = 1.3 * max(float(shown.max()), 1.0)
-    handles.append(axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit"))
+    axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit")
     axes.axhspan(1.0, top, color=ORANGE, alpha=0.07, linewidth=0)
     axes.set_ylim(max(float(shown.min()) * 0.8, _LEAST * float(shown.max())), top)
     frequency_axis(axes, w, time_unit)
     axes.set_ylabel("r_u / r_adm")
-    legend_above(axes, handles)
+    legend_above(axes)

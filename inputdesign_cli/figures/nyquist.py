@@ -17,6 +17,7 @@ from inputdesign_cli.figures.style import (
     GREY,
     ORANGE,
     frequency_label,
+    labelled,
     legend_over_all,
     limiting_label,
     marked,
@@ -62,8 +63,7 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     line = Traced(L.real, L.imag, curves.frequency, frequency_label(time_unit), told, color=BLUE)
     line.set_label("C G, nominal")
     axes.add_line(line)
-    handles: list[Artist] = [line]
-    handles.append(Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)"))
+    handles: list[Artist] = [line, Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)")]
     if curves.circle is not None:
         axes.add_patch(Circle((-1.0, 0.0), curves.circle, color=ORANGE, alpha=0.07, linewidth=0))
         axes.add_patch(
@@ -74,15 +74,14 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     limiting = np.interp(curves.limiting, curves.frequency, L)
     limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
     if limiting.size:
-        label = limiting_label(limiting.size)
-        handles += marked(axes, limiting.real, limiting.imag, color=BLUE, label=label)
+        marked(axes, limiting.real, limiting.imag, color=BLUE, label=limiting_label(limiting.size))
     axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)
     axes.annotate("−1", (-1.0, 0.0), (4, 5), textcoords="offset points")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.6)
     axes.set_xlabel("real part of C G")
     axes.set_ylabel("imaginary part of C G")
-    legend_over_all(page, handles)
+    legend_over_all(page, list(dict.fromkeys([*handles, *labelled(axes)])))
 
 
 def _shown(L: NDArray[np.complex128]) -> NDArray[np.bool_]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
 
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -45,14 +44,14 @@ P = TypeVar("P", bound=Panel)
 def draw_panels(
     page: Figure,
     panels: Sequence[P],
-    plot: Callable[[Axes, P], list[Artist]],
+    plot: Callable[[Axes, P], None],
     time_unit: str,
     *,
     magnitude: str,
     title: str | None = None,
-    below: Callable[[Axes, Sequence[P]], list[Artist]] | None = None,
+    below: Callable[[Axes, Sequence[P]], object] | None = None,
 ) -> None:
-    """Draw each panel with `plot`, and all of them together with `below`; both return handles of legends.
+    """Draw each panel with `plot`, and all of them together with `below`.
 
     Args:
         page: the figure.
@@ -71,10 +70,9 @@ def draw_panels(
         page.set_figheight((_TALL if single else _TALLER) * page.get_figheight())
         heights.append(2)
     cells = page.add_gridspec(len(heights), columns, height_ratios=heights)
-    drawn: list[tuple[Axes, list[Artist]]] = []
     for panel, (i, j) in zip(panels, places, strict=True):
         axes = page.add_subplot(cells[i, j])
-        drawn.append((axes, plot(axes, panel)))
+        plot(axes, panel)
         frequency_axis(axes, panel.frequency, time_unit)
         if not any(row == i and column < j for row, column in places):
             axes.set_ylabel(magnitude)
@@ -88,13 +86,13 @@ def draw_panels(
             axes.set_xlabel("")
     if title and single:
         title_above(page, title)
-    axes, handles = max(drawn, key=lambda one: len(one[1]))
     if single:
-        legend_above(axes, handles)
+        legend_above(axes)
     else:
-        legend_over_all(page, handles, title)
+        legend_over_all(page, title=title)
     if below is not None:
-        axes = page.add_subplot(cells[rows, :])
-        handles = below(axes, panels)
-        frequency_axis(axes, panels[0].frequency, time_unit)
-        legend_above(axes, handles)
+        lowest = page.add_subplot(cells[rows, :])
+        below(lowest, panels)
+        frequency_axis(lowest, panels[0].frequency, time_unit)
+        if lowest.get_legend() is None:
+            legend_above(lowest)

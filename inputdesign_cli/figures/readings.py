@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.outcome.results import Array, Json
+from inputdesign_cli.arrays import Array
 
 # Fewer points without a line are marks; more points are thinned out evenly.
 _FEWEST, _MOST = 20, 400
@@ -25,13 +26,13 @@ class Traced(Line2D):
     """
 
     def __init__(
-        self, x: Array, y: Array, along: Array, name: str, told: Mapping[str, Array], **style: Json
+        self, x: Array, y: Array, along: Array, name: str, told: Mapping[str, Array], **style: Any
     ) -> None:
         super().__init__(x, y, **style)
         self.along, self.name, self.told = along, name, told
 
 
-def readings(page: Figure) -> list[dict[str, Json]]:
+def readings(page: Figure) -> list[dict[str, object]]:
     """Return the panels of a laid-out page with named curves over an axis, or along one in the plane.
 
     `box` is left, top, width and height in shares of the page; `low` and `high` are the ends of the axis. A
@@ -40,48 +41,36 @@ def readings(page: Figure) -> list[dict[str, Json]]:
     return [panel for panel in map(_panel, page.axes) if panel["curves"]]
 
 
-def _panel(axes: Axes) -> dict[str, Json]:
+def _panel(axes: Axes) -> dict[str, object]:
     place, (low, high) = axes.get_position(), axes.get_xlim()
     lines = axes.get_lines()
     box = [float(f"{v:.4f}") for v in (place.x0, 1.0 - place.y1, place.width, place.height)]
+    ends = {"box": box, "low": float(low), "high": float(high)}
     traced = next((line for line in lines if isinstance(line, Traced)), None)
     if traced is not None:
-        return {"box": box, "log": False, "low": low, "high": high, **_along(axes, traced)}
-    return {
-        "box": box,
-        "log": axes.get_xscale() == "log",
-        "low": float(low),
-        "high": float(high),
-        "x": _below(axes).split(";")[0],
-        "y": _beside(axes),
-        "curves": [curve for line in lines for curve in _curves(axes, line)],
-    }
+        return {**ends, "log": False, **_along(axes, traced)}
+    below, beside = (label.replace("$_{", "_").replace("}$", "") for label in _labels(axes))
+    curves = [curve for line in lines for curve in _curves(axes, line)]
+    return {**ends, "log": axes.get_xscale() == "log", "x": below, "y": beside, "curves": curves}
 
 
-def _below(axes: Axes) -> str:
-    """What the horizontal axis is called: its own label, that of the lowest panel, or that of the page."""
+def _labels(axes: Axes) -> tuple[str, str]:
+    """Return the labels of a panel: its own, those of panels beside and below it, or those of the page.
+
+    The second label names the panel where there are several.
+    """
     page = axes.get_figure(root=True)
     assert page is not None
     lowest = next((other for other in reversed(page.axes) if other.get_xlabel()), axes)
-    return axes.get_xlabel() or page.get_supxlabel() or lowest.get_xlabel()
-
-
-def _beside(axes: Axes) -> str:
-    """What the vertical axis is called, and which panel it is of several."""
-    page = axes.get_figure(root=True)
-    assert page is not None
-    row = (other.get_ylabel() for other in page.axes if _side_by_side(axes, other))
-    called = axes.get_ylabel() or next(filter(None, row), "") or page.get_supylabel()
+    height = axes.get_position().y0
+    row = (other.get_ylabel() for other in page.axes if np.isclose(other.get_position().y0, height))
+    below = axes.get_xlabel() or page.get_supxlabel() or lowest.get_xlabel()
+    beside = axes.get_ylabel() or next(filter(None, row), "") or page.get_supylabel()
     several = str(axes.get_label()) or ("" if axes.get_ylabel() else axes.get_title(loc="left"))
-    return ", ".join(filter(None, (several, called)))
+    return below.split(";")[0], ", ".join(filter(None, (several, beside)))
 
 
-def _side_by_side(one: Axes, other: Axes) -> bool:
-    """Whether two panels stand in one row of a page."""
-    return bool(np.isclose(one.get_position().y0, other.get_position().y0))
-
-
-def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, Json]]:
+def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, object]]:
     """A named curve over the axis; not a limit across it, and no marks."""
     name = str(line.get_label()).strip()
     if not name or name.startswith("_") or line.get_transform() != axes.transData:
@@ -93,7 +82,7 @@ def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, Json]]:
         yield {"name": name.split(": ")[0], "x": _told(x[kept]), "y": _told(y[kept])}
 
 
-def _along(axes: Axes, line: Traced) -> dict[str, Json]:
+def _along(axes: Axes, line: Traced) -> dict[str, object]:
     """The points of a curve in the plane that are within the axes."""
     x, y = (np.asarray(line.get_data()[k], dtype=float) for k in (0, 1))
     across, down = axes.transAxes.inverted().transform(axes.transData.transform(np.stack([x, y], 1))).T

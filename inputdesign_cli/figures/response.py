@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.figures.apart import stroke
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, frequency_axis, legend_above, log_axes, lowered
+from inputdesign_cli.figures.style import BLACK, BLUE, frequency_axis, legend_above, log_axes, lowered, stroke
 from inputdesign_cli.outcome.curves import ResponseCurves, ResponsePanel
 
 
@@ -23,39 +21,32 @@ def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
         return
     (panel,) = curves.panels
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    legend_above(above, _magnitude(above, panel))
+    _magnitude(above, panel)
+    legend_above(above)
     above.set_ylabel("magnitude")
     _phase(below, panel, BLUE, BLACK)
     below.set_ylabel("phase (degrees)")
     frequency_axis(below, panel.frequency, time_unit)
 
 
-def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
+def _magnitude(axes: Axes, panel: ResponsePanel) -> None:
     w, size, modelled = panel.frequency, np.abs(panel.G), np.abs(panel.model)
     log_axes(axes, "y")
-    handles: list[Artist] = []
-    handles += axes.plot(w, size, ".", color=BLUE, markersize=4, label="|G|, data alone")
-    handles += axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="|G|, model")
+    axes.plot(w, size, ".", color=BLUE, markersize=4, label="|G|, data alone")
+    axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="|G|, model")
     least = 0.1 * min(float(size.min()), float(modelled.min()))
     below = np.maximum(size - panel.radius, least)
     axes.fill_between(w, below, size + panel.radius, color=BLUE, alpha=0.15, linewidth=0)
-    return handles
 
 
-def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> list[Artist]:
-    """Draw the phases of all entries and return the handles of their legend.
-
-    A negative gain begins half a turn away from a positive one.
-    """
-    handles: list[Artist] = []
+def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> None:
+    """Draw the phases of all entries; a negative gain begins half a turn away from a positive one."""
     for number, panel in enumerate(panels):
         color, dashes = stroke(number)
         row, column = panel.entry or (0, 0)
         (line,) = _phase(axes, panel, color, color)
         line.set(linestyle=dashes, label=f"G{lowered(row + 1, column + 1)}")
-        handles.append(line)
     axes.set_ylabel("phase (degrees)")
-    return handles
 
 
 def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import chain
+from itertools import chain, product
+from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -18,6 +18,7 @@ ROWS = 4  # channels that fit, of the record and of the outputs together
 MARGIN = 0.08  # above and below, as a share of the range shown
 _HIGHER = 0.25  # of the page, for each row beyond the second
 _BAND = 2.0  # standard deviations
+_LIMIT: dict[str, Any] = {"color": ORANGE, "linewidth": 1.2, "linestyle": DASHED}
 
 
 def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
@@ -33,23 +34,21 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     shown = min(samples, SHOWN)
     time = curves.time[:shown]
     grid = page.subplots(rows, 2, sharex="col", squeeze=False, width_ratios=[5, 1])
-    handles: dict[str, Artist] = {}
+    applied: dict[str, Any] = {"color": BLUE, "linewidth": 0.9, "markersize": 4, "label": "to be applied"}
+    if curves.held:
+        applied |= {"drawstyle": "steps-post", "label": "to be applied, held between samples"}
     for (name, values), (record, histogram) in zip(channels, grid, strict=False):
-        style = "steps-post" if curves.held else "default"
-        (line,) = record.plot(
-            time, values[:shown], _mark(time), color=BLUE, linewidth=0.9, drawstyle=style, markersize=4
-        )
-        handles.setdefault("to be applied, held between samples" if curves.held else "to be applied", line)
+        record.plot(time, values[:shown], _mark(time), **applied)
         _name(record, name, curves.labels.get(name, ""), "")
         limits = curves.limits.get(name, ())
-        for bound, axes in ((bound, axes) for bound in limits for axes in (record, histogram)):
-            handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
+        for bound, axes in product(limits, (record, histogram)):
+            axes.axhline(bound, label="limits", **_LIMIT)
         if name in curves.moves:
             record.set_title("largest move {:.4g}, limit {:.4g}".format(*curves.moves[name]), loc="left")
         _frame(record, values, *limits)
         _draw_histogram(histogram, values, record.get_ylim())
     for panel, (below, beside) in zip(predicted, grid[len(channels) :], strict=True):
-        _draw_predicted(below, time, panel, handles, levels=curves.levels)
+        _draw_predicted(below, time, panel, levels=curves.levels)
         beside.set_axis_off()
     for record, _ in grid[:-1]:
         record.tick_params(labelbottom=False)
@@ -62,9 +61,7 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     last.set_xlabel(f"time ({time_unit}); {part}")
     counts.tick_params(labelbottom=True)
     grid[0][1].set_title("share (%)", loc="left")
-    for label, handle in handles.items():
-        handle.set_label(label)
-    legend_over_all(page, list(handles.values()))
+    legend_over_all(page)
 
 
 def _mark(time: Array) -> str:
@@ -79,20 +76,15 @@ def _name(axes: Axes, name: str, label: str, what: str) -> None:
     axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
 
 
-def _draw_predicted(
-    axes: Axes, time: Array, panel: PredictedPanel, handles: dict[str, Artist], *, levels: bool
-) -> None:
+def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: bool) -> None:
     y, noise = panel.values[: time.size], _BAND * panel.deviation[: time.size]
-    grows = bool(noise[0] < noise[-1])
-    band = axes.fill_between(time, y - noise, y + noise, color=GREY, alpha=0.3, linewidth=0)
-    since = " since the start" if grows else ""
-    handles.setdefault(f"± 2 standard deviations of noise{since}", band)
-    (line,) = axes.plot(time, y, _mark(time), color=GREEN, linewidth=1.0, markersize=4)
+    label = f"± 2 standard deviations of noise{' since the start' if noise[0] < noise[-1] else ''}"
+    axes.fill_between(time, y - noise, y + noise, color=GREY, alpha=0.3, linewidth=0, label=label)
     # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
     said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
-    handles.setdefault(said, line)
+    axes.plot(time, y, _mark(time), color=GREEN, linewidth=1.0, markersize=4, label=said)
     for bound in panel.limits or ():
-        handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
+        axes.axhline(bound, label="limits", **_LIMIT)
     _name(axes, panel.name, panel.label, "Δ " if levels else "")
     _frame(axes, y - noise, y + noise, *(panel.limits or ()))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
@@ -45,50 +44,35 @@ def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     axes = page.add_subplot()
     shown = curves.frequency > 0
     w, power = curves.frequency[shown], curves.spectrum[shown, 0, 0].real
-    axis = w
     if curves.lines:
-        handles = _plot_lines(axes, w, power, curves)
-        if w.size:
-            axis = _room(w) if curves.band is None else np.append(w, [w.min() / 3, curves.band[1]])
+        _plot_lines(axes, w, power, curves)
+        margins = [] if curves.band is None or not w.size else [w.min() / 3, curves.band[1]]
+        w = np.append(w, margins) if margins else _room(w)
     else:
-        record = None if curves.record is None else curves.record[shown, 0]
-        handles = _plot_density(axes, w, power, record, curves)
-    frequency_axis(axes, axis, time_unit)
-    legend_above(axes, handles)
+        _plot_density(axes, w, power, None if curves.record is None else curves.record[shown, 0], curves)
+    frequency_axis(axes, w, time_unit)
+    legend_above(axes)
 
 
-def _plot_density(
-    axes: Axes, w: Array, density: Array, record: Array | None, curves: SpectrumCurves
-) -> list[Artist]:
+def _plot_density(axes: Axes, w: Array, density: Array, record: Array | None, curves: SpectrumCurves) -> None:
     phi = f"Φ{lowered(curves.symbol)}"
-    handles: list[Artist] = []
-    handles += axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"{phi}, design")
+    axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"{phi}, {curves.label}")
     if record is not None:
-        handles += axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
-    if curves.white is not None:
-        handles.append(_plot_white(axes, curves.white, f"{phi}, white"))
+        axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
+    _plot_white(axes, curves.white, f"{phi}, white")
     axes.set_ylabel(f"spectral density {phi}(ω)")
-    peak = float(density.max())
-    if peak > LOG_FROM * (curves.white or float(np.median(density))):
-        log_axes(axes, "y", "mask")
-        low, high = axes.get_ylim()
-        axes.set_ylim(max(low, peak * 10.0**-DECADES), high)
-    else:
-        axes.set_ylim(bottom=0.0)
-    return handles
+    _scale(axes, density, curves.white or float(np.median(density)))
 
 
-def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> list[Artist]:
+def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> None:
     few = w.size <= FEW
     total = f"sinusoids, total power {power.sum():.4g}"
     if curves.white is not None:
         total += f" (white: {curves.white:.4g})"
-    stems = axes.vlines(w, 0.0, power, color=BLUE, linewidth=1.8 if few else 0.8, label=total)
-    (heads,) = axes.plot(w, power, "o", color=BLUE, markersize=5 if few else 2.5)
-    heads.set_label("power")
+    axes.vlines(w, 0.0, power, color=BLUE, linewidth=1.8 if few else 0.8)
+    axes.plot(w, power, "o", color=BLUE, markersize=5 if few else 2.5, label=total)
     axes.set_ylim(0.0, 1.08 * float(power.max(initial=0.0)) or 1.0)
     axes.set_ylabel(f"power of each sinusoid of {curves.symbol} (mean square)")
-    return [stems]
 
 
 def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
@@ -97,31 +81,24 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     entries = np.asarray(np.abs(curves.spectrum), dtype=float)
     pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    handles: list[Artist] = []
     for number, (label, values) in enumerate(_told_apart(entries, pairs)[:MOST]):
-        handles += _plot_power(above, w, values, lines=curves.lines, number=number, label=label)
+        _plot_power(above, w, values, lines=curves.lines, number=number, label=label)
     if curves.record is not None:
         drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
         drawn[0].set_label("record, smoothed")
-        handles += drawn[:1]
     of = f"power of each line of {curves.symbol}"
     above.set_ylabel(of if curves.lines else f"density of {curves.symbol}")
     shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
-    if float(shown.max(initial=0.0)) > LOG_FROM * float(np.median(shown)):
-        _logarithmic(above, shown)
-    else:
-        above.set_ylim(bottom=0.0)
-    legend_above(above, handles)
+    _scale(above, shown, float(np.median(shown)))
+    legend_above(above)
     values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
-    handles = []
     for number in range(min(r, MOST)):
         label = f"λ{lowered(number + 1)}"
-        handles += _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
-    if curves.white is not None:
-        handles.append(_plot_white(below, curves.white))
+        _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
+    _plot_white(below, curves.white)
     _logarithmic(below, values)
     below.set_ylabel("eigenvalues")
-    legend_above(below, handles)
+    legend_above(below)
     frequency_axis(below, _room(w) if curves.lines else w, time_unit)
 
 
@@ -155,58 +132,64 @@ def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> No
     """The gains of the plant above; below, the power of the input along each of its input directions."""
     w = curves.frequency
     upper, lower = page.subplots(2, 1, sharex=True)
-    gains: list[Artist] = []
-    powers: list[Artist] = []
     for i, (gain, power) in enumerate(zip(curves.gain.T, curves.power.T, strict=True)):
-        gains += upper.plot(w, gain, color=PALETTE[i % MOST], label=f"σ{lowered(i + 1)}(G)")
+        upper.plot(w, gain, color=PALETTE[i % MOST], label=f"σ{lowered(i + 1)}(G)")
         label = "v{0}* Φᵤ v{0}".format(lowered(i + 1))
-        powers += _plot_power(lower, w, power, lines=curves.lines, number=i, label=label)
+        _plot_power(lower, w, power, lines=curves.lines, number=i, label=label)
     log_axes(upper, "y", "mask")
     upper.set_ylabel("gains of the plant")
-    legend_above(upper, gains)
-    if curves.white is not None:
-        powers.append(_plot_white(lower, curves.white))
+    legend_above(upper)
+    _plot_white(lower, curves.white)
     _logarithmic(lower, curves.power)
     lower.set_ylabel("input along them")
     frequency_axis(lower, w, time_unit)
-    legend_above(lower, powers)
+    legend_above(lower)
 
 
 def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> None:
     """What a unit of cost buys at each frequency, relative to the best: one on the support, never more."""
     axes = page.add_subplot()
-    (ratio,) = axes.plot(
-        curves.frequency, curves.ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost"
-    )
-    handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="the most that is allowed")]
-    if curves.support.size:
-        height = np.interp(curves.support, curves.frequency, curves.ratio)
-        handles += marked(axes, curves.support, height, color=ORANGE, label="where the optimum has its power")
-    axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
+    w, ratio, support = curves.frequency, curves.ratio, curves.support
+    axes.plot(w, ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost")
+    axes.axhline(1.0, color=BLACK, linewidth=1.0, label="the most that is allowed")
+    if support.size:
+        label = "where the optimum has its power"
+        marked(axes, support, np.interp(support, w, ratio), color=ORANGE, label=label)
+    axes.set_ylim(0.0, 1.08 * max(1.0, float(ratio.max())))
     axes.set_ylabel("relative worth of excitation")
-    frequency_axis(axes, curves.frequency, time_unit)
+    frequency_axis(axes, w, time_unit)
     page.suptitle(
         "A unit of cost buys nowhere more than where the optimum has its power:\n"
         "no other spectrum can do better than the proved bound",
         x=0.01,
         ha="left",
     )
-    legend_above(axes, handles)
+    legend_above(axes)
 
 
-def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> list[Artist]:
+def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> None:
     """A power over frequency, the `number`th of its panel: a curve, or stems of `lines`."""
     colour = PALETTE[number % MOST]
-    if not lines:
+    if lines:
+        axes.vlines(w, 0.0, values, color=colour, linewidth=1.0, alpha=0.6)
+        axes.plot(w, values, linestyle="none", marker="o", markersize=4, color=colour, label=label)
+    else:
         dashes = DASHES[number % len(DASHES)]
-        return list(axes.plot(w, values, color=colour, linestyle=dashes, linewidth=1.8, label=label))
-    axes.vlines(w, 0.0, values, color=colour, linewidth=1.0, alpha=0.6)
-    return list(axes.plot(w, values, linestyle="none", marker="o", markersize=4, color=colour, label=label))
+        axes.plot(w, values, color=colour, linestyle=dashes, linewidth=1.8, label=label)
 
 
-def _plot_white(axes: Axes, level: float, label: str = "white, same power") -> Artist:
+def _plot_white(axes: Axes, level: float | None, label: str = "white, same power") -> None:
     """The level of white excitation."""
-    return axes.axhline(level, color=GREY, linestyle=DASHED, label=label)
+    if level is not None:
+        axes.axhline(level, color=GREY, linestyle=DASHED, label=label)
+
+
+def _scale(axes: Axes, values: Array, usual: float) -> None:
+    """A logarithmic axis where the peak is far above what is usual, else one from zero."""
+    if float(values.max(initial=0.0)) > LOG_FROM * usual:
+        _logarithmic(axes, values)
+    else:
+        axes.set_ylim(bottom=0.0)
 
 
 def _logarithmic(axes: Axes, values: Array) -> None:

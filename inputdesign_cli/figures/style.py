@@ -18,6 +18,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import TICKDOWN, TICKLEFT
+from matplotlib.text import Text
 from matplotlib.ticker import (
     FuncFormatter,
     LogFormatterSciNotation,
@@ -26,6 +27,7 @@ from matplotlib.ticker import (
     NullFormatter,
     NullLocator,
 )
+from matplotlib.typing import LineStyleType
 
 from inputdesign_cli.outcome.results import Array
 
@@ -61,6 +63,9 @@ _RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "idesign",
+    "svg.fonttype": "none",  # text stays text
+    "pdf.fonttype": 42,  # TrueType, as journals ask for
+    "mathtext.default": "regular",
     # One size for all text: titles, ticks and legends alike.
     "font.size": TYPE_SIZE,
     "axes.titlesize": TYPE_SIZE,
@@ -77,7 +82,7 @@ _RC: dict[Any, Any] = {
     "lines.linewidth": 1.6,
     "legend.frameon": False,
     "legend.fontsize": TYPE_SIZE,
-    # Names and units are the user's: no $ begins a formula, and ours are plain text too.
+    # Names and units are the user's: no $ begins a formula; our symbols are typeset one by one.
     "text.parse_math": False,
 }
 
@@ -101,6 +106,27 @@ class _LogTicks(LogFormatterSciNotation):
         if formula is None or formula[1][:1] not in _LABELLED:
             return ""
         return formula[1].replace(r"\times", "×") + (formula[2] or "").translate(_RAISED)
+
+
+_SYMBOL = re.compile(r"\br_(u|adm)\b")
+
+
+class Page(Figure):
+    """A figure that a notebook shows, whether pyplot has been imported or not."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        FigureCanvasAgg(self).print_png(buffer)
+        return buffer.getvalue()
+
+
+def _typeset(page: Figure) -> None:
+    """Set the indices of r_u and r_adm low, in texts that have no formula otherwise."""
+    for text in page.findobj(Text):
+        written = text.get_text()
+        if _SYMBOL.search(written) and not set(written) & set("$\\"):
+            text.set_parse_math(True)
+            text.set_text(_SYMBOL.sub(r"r$_{\1}$", written))
 
 
 def rendered(
@@ -140,8 +166,9 @@ def rendered(
 def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE) -> Figure:
     """The figure that `paint` draws on an empty page."""
     with mpl.rc_context(_RC):
-        page = Figure(figsize=size, dpi=DPI, layout="constrained")
+        page = Page(figsize=size, dpi=DPI, layout="constrained")
         paint(page)
+        _typeset(page)
     return page
 
 
@@ -217,11 +244,10 @@ def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
     return BLACK if luminance > 0.179 else "#FFFFFF"
 
 
-def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Line2D]:
+def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> None:
     """Rings around points of a curve."""
     (rings,) = axes.plot(x, y, "o", markersize=6, clip_on=False, zorder=5, label=label)
     rings.set(markerfacecolor="white", markeredgecolor=color, markeredgewidth=1.5)
-    return [rings]
 
 
 def limiting_label(count: int) -> str:
@@ -229,7 +255,7 @@ def limiting_label(count: int) -> str:
     return "limiting frequency" if count == 1 else "limiting frequencies"
 
 
-def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> list[Artist]:
+def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
     """What is admitted, drawn alike wherever it is: a dashed line, and beyond it a shade.
 
     To be called last: the shade ends where the axis does.
@@ -239,9 +265,25 @@ def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> list[Artist]:
     top = max(high, 1.15 * float(np.nanmax(admitted, initial=0.0)))
     bottom = min(low, 0.87 * float(np.nanmin(admitted, initial=np.inf)))
     axes.fill_between(w, admitted, top, color=ORANGE, alpha=0.07, linewidth=0)
-    drawn = axes.plot(w, admitted, color=ORANGE, linestyle=DASHED, label="r_adm, admitted")
+    axes.plot(w, admitted, color=ORANGE, linestyle=DASHED, label="r_adm, admitted")
     axes.set_ylim(bottom, top)
-    return list(drawn)
+
+
+# Round after round of the colours.
+_DASHES: tuple[LineStyleType, ...] = ("solid", (0, (3, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1, 1)))
+# As many as have no divisor in common with the colours.
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+
+def stroke(number: int, colours: Sequence[str] = PALETTE) -> tuple[str, LineStyleType]:
+    """Colour and dashes of a curve by its number from zero: other dashes where the colours are used up."""
+    again, place = divmod(number, len(colours))
+    return colours[place], _DASHES[again % len(_DASHES)]
+
+
+def point(number: int) -> tuple[str, str]:
+    """Colour and marker of a set of points by its number from zero: no two of the first 42 are alike."""
+    return PALETTE[number % len(PALETTE)], _MARKERS[number % len(_MARKERS)]
 
 
 def positive(values: Array) -> Array:
@@ -260,10 +302,20 @@ def page_of_pairs(page: Figure, pairs: int, columns: int) -> list[Axes]:
     return grid[:pairs]
 
 
-def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:
-    """A legend over the axes, where it cannot cover a curve, in as many columns as the page is wide."""
+def labelled(*panels: Axes) -> list[Artist]:
+    """What has a label, in the order in which it was drawn; of equal labels the first."""
+    found: dict[str, Artist] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    return list(found.values())
+
+
+def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
+    """A legend over the axes, where it cannot cover a curve: all that has a label, or `handles`."""
     page = axes.get_figure(root=True)
     assert page is not None
+    handles = labelled(axes) if handles is None else handles
     labels = [str(handle.get_label()) for handle in handles]
     axes.legend(
         handles=handles,
@@ -301,8 +353,9 @@ def _wrapped(page: Figure, title: str) -> str:
     return textwrap.fill(title, max(int(page.get_figwidth() * _TITLE_PER_INCH), 1))
 
 
-def legend_over_all(page: Figure, handles: Sequence[Artist], title: str | None = None) -> None:
-    """One legend for all panels of a page, above them."""
+def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str | None = None) -> None:
+    """One legend for all panels of a page, above them: all that has a label, or `handles`."""
+    handles = labelled(*page.axes) if handles is None else handles
     labels = [str(handle.get_label()) for handle in handles]
     page.legend(
         handles=handles,

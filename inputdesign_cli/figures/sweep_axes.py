@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
@@ -32,10 +31,10 @@ def key_label(key: str) -> str:
     return _NAMES.get(key, key)
 
 
-def curve(axes: Axes, x: Array, y: Array, **style: Any) -> list[Artist]:
+def curve(axes: Axes, x: Array, y: Array, **style: Any) -> None:
     """A curve through the points in the order of x."""
     order = np.argsort(x, kind="stable")
-    return list(axes.plot(x[order], y[order], **style))
+    axes.plot(x[order], y[order], **style)
 
 
 def mark_failures(axes: Axes, where: Array) -> None:

@@ -7,13 +7,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from inputdesign_cli.figures.style import (
@@ -25,9 +23,11 @@ from inputdesign_cli.figures.style import (
     PALETTE,
     TYPE_SIZE,
     ink_on,
+    labelled,
     legend_above,
     legend_over_all,
     log_axes,
+    lowered,
     rendered,
     title_above,
 )
@@ -39,7 +39,6 @@ from inputdesign_cli.figures.sweep_axes import (
     plain_numbers,
     scale_key,
 )
-from inputdesign_cli.figures.sweep_moments import draw_moments, moment_entries
 from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable
 from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
 from inputdesign_cli.outcome.results import Array
@@ -53,6 +52,7 @@ NAMES = ("curves", "map", "moments")
 COLUMNS, ROW = 3, 0.6  # of small multiples: beside each other, and what a further row adds to the page
 MOST_LABELLED = 100  # cells of a map that carry their number
 _CELL = 0.6  # inches of the page that a column of a map takes where it has numbers
+_PREFIX, _TRACE = "moments.entries.", "moments.trace"
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
 
 
@@ -102,8 +102,8 @@ def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]
         few = all(len(set(table.columns[key])) <= MOST_CURVES for key in (across, panels) if key)
         if few:
             found.append(("curves", partial(_draw_panels, table, quantity, along, across, panels)))
-        if across is None and moment_entries(table):
-            found.append(("moments", partial(draw_moments, table, along)))
+        if across is None and _moment_entries(table):
+            found.append(("moments", partial(_draw_moments, table, along)))
     if not zipped and len(axes) == 2 and len(numeric) == 2:
         found.append(("map", partial(_draw_map, table, quantity, axes[0], axes[1])))
     return found
@@ -127,11 +127,9 @@ def _draw_panels(
     rows = -(-len(values) // columns)
     page.set_figheight((1.0 + ROW * (rows - 1)) * page.get_figheight())
     grid = page.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
-    longest: list[Artist] = []
     for value, axes in zip(values, grid.flat, strict=False):
         member = np.array([not panels or text == value for text in table.columns[panels or along]])
-        handles = _draw_curves(axes, table, quantity, along, across, member)
-        longest = max(longest, handles, key=len)
+        _draw_curves(axes, table, quantity, along, across, member)
         if panels:
             axes.set_title(f"{_short(panels)} = {value}", loc="left", color=GREY)
             axes.label_outer()
@@ -145,17 +143,17 @@ def _draw_panels(
         page.supylabel(_label(table, quantity), fontsize=TYPE_SIZE)
     named = table.best
     title = f"best: {named[1]}" if named and named[0] == quantity else None
-    if panels or len(longest) > 4:
-        legend_over_all(page, longest, title)
+    if panels or len(labelled(grid[0][0])) > 4:
+        legend_over_all(page, title=title)
     else:
         if title:
             title_above(page, title)
-        legend_above(grid[0][0], longest)
+        legend_above(grid[0][0])
 
 
 def _draw_curves(
     axes: Axes, table: SweepTable, quantity: str, along: str, across: str | None, shown: NDArray[np.bool_]
-) -> list[Artist]:
+) -> None:
     """The quantity over one key, a curve for each value of the other, each with its bound; white if alone.
 
     Of the points (n,) that are `shown`; what the scales depend on is asked of all.
@@ -165,30 +163,24 @@ def _draw_curves(
     assert y is not None
     groups = list(dict.fromkeys(table.columns[across])) if across else [""]
     bound, whatever = bound_of(table) if quantity == "objective.value" else (None, "")
-    side = "ceiling" if table.maximised else "floor"
-    handles: list[Artist] = []
+    side = f"{'ceiling' if table.maximised else 'floor'}: {whatever}"
     everything = [y] if bound is None else [y, bound]
     for group, colour in zip(groups, PALETTE, strict=False):
         own = np.array([not across or text == group for text in table.columns[across or along]])
         member = own & shown
         name = f"{_short(across)} = {group}" if across else "design"
-        handles += curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
+        curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
         if bound is not None:
             shade = colour if across else BLACK
-            told = f"{side}, {name}" if across else side
-            curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1, label=told)
-    if bound is not None:
-        label = f"{side}: {whatever}"
-        handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
+            curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1, label=side)
     white = table.numbers(f"baseline.white.{objective(table.kind).white}")
     if quantity == "objective.value" and not across and white is not None:
-        handles += curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
+        curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
         everything.append(white)
     mark_failures(axes, x[~np.isfinite(y) & shown])
     _scale_values(axes, table, np.concatenate([part[np.isfinite(part)] for part in everything]))
     scale_key(axes, along, x)
     axes.set_ylabel(_label(table, quantity))
-    return handles
 
 
 def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
@@ -259,3 +251,47 @@ def _ticks(axis: Axis, texts: list[str]) -> None:
 
 def _short(key: str | None) -> str:
     return (key or "").rpartition(".")[2]
+
+
+def _moment_entries(table: SweepTable) -> list[str]:
+    """The columns of R to draw: its upper triangle, or of a large R its diagonal; none without moments."""
+    if table.numbers(_TRACE) is None:
+        return []
+    found = [name for name in table.columns if name.startswith(_PREFIX) and table.numbers(name) is not None]
+    if len(found) > MOST_CURVES:
+        found = [name for name in found if len(set(_place(name))) == 1]
+    return found[:MOST_CURVES]
+
+
+def _draw_moments(table: SweepTable, along: str, page: Figure) -> None:
+    """R11, R12, .. and the trace over a key, as in [eckhard-mse], Figures 1, 2; crosses without a result.
+
+    The axis is logarithmic if the trace spans more than a decade and no entry is zero or negative.
+    """
+    x, trace = table.numbers(along), table.numbers(_TRACE)
+    assert x is not None
+    assert trace is not None
+    entries = _moment_entries(table)
+    # Entries may coincide (R11 = R22 if the regressors are delayed copies): the later, the thinner.
+    widths = np.linspace(5.0, 1.2, len(entries))
+    axes = page.add_subplot()
+    values = [trace]
+    for name, colour, width in zip(entries, PALETTE, widths, strict=False):
+        y = table.numbers(name)
+        assert y is not None
+        curve(axes, x, y, color=colour, linewidth=width, label=f"R{lowered(*_place(name))}")
+        values.append(y)
+    curve(axes, x, trace, color=BLACK, linestyle=DASHED, label="trace R")
+    mark_failures(axes, x[~np.isfinite(trace)])
+    span = float(np.nanmax(trace) / np.nanmin(trace))
+    if span > LOG_FROM and min(float(np.nanmin(part)) for part in values) > 0:
+        log_axes(axes, "y")
+        plain_numbers(axes.yaxis, span)
+    scale_key(axes, along, x)
+    axes.set_ylabel("moments, summed over the samples")
+    legend_above(axes)
+
+
+def _place(name: str) -> list[str]:
+    """Row and column of an entry, from 1."""
+    return name.removeprefix(_PREFIX).split("_")[1:]

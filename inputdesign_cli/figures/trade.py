@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from inputdesign_cli.figures.apart import stroke
-from inputdesign_cli.figures.style import BLACK, DASHED, legend_above, log_axes
+from inputdesign_cli.figures.style import BLACK, DASHED, legend_above, log_axes, stroke
 from inputdesign_cli.figures.sweep_axes import curve, mark_failures, plain_numbers
 from inputdesign_cli.outcome.results import Array
 
@@ -34,13 +33,11 @@ class Trade:
 def draw_trade(trade: Trade, page: Figure) -> None:
     """Ratios to what is asked, which stands at one, or the criterion."""
     axes = page.add_subplot()
-    handles = []
     for number, (text, row) in enumerate(zip(trade.amplitudes, trade.values, strict=True)):
         name = f"amplitude {text}" if text else "best record"
         colour, dashes = stroke(number)
-        handles += curve(
-            axes, trade.lengths, row, color=colour, linestyle=dashes, marker="o", markersize=4, label=name
-        )
+        drawn = {"color": colour, "linestyle": dashes, "label": name}
+        curve(axes, trade.lengths, row, marker="o", markersize=4, **drawn)
     log_axes(axes, "x")
     axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
     axes.xaxis.set_minor_locator(NullLocator())
@@ -49,9 +46,9 @@ def draw_trade(trade: Trade, page: Figure) -> None:
     if trade.criterion:
         axes.set_ylabel("criterion")
     else:
-        handles.append(axes.axhline(1.0, color=BLACK, linestyle=DASHED, linewidth=1.1, label="what is asked"))
+        axes.axhline(1.0, color=BLACK, linestyle=DASHED, linewidth=1.1, label="what is asked")
         known = np.append(trade.values[np.isfinite(trade.values)], 1.0)
         log_axes(axes, "y")
         plain_numbers(axes.yaxis, float(known.max() / known.min()))
         axes.set_ylabel("error of the record / what is asked")
-    legend_above(axes, handles)
+    legend_above(axes)

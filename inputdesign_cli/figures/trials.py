@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from inputdesign_cli.figures.ellipses import boundary
 from inputdesign_cli.figures.panels import draw_panels
@@ -70,32 +68,27 @@ def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> N
     )
 
 
-def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
-    """The curves of one entry; the handles of their legend."""
+def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> None:
+    """Draw the curves of one entry."""
     w, levels = curves.frequency, sorted(curves.quantiles)
     low, high = levels[0], levels[-1]
     log_axes(axes, "y")
     label = f"{100 * low:g} to {100 * high:g} % of {runs} runs"
-    band = axes.fill_between(
+    axes.fill_between(
         w, curves.quantiles[low], curves.quantiles[high], color=BLUE, alpha=0.25, linewidth=0, label=label
     )
-    handles: list[Artist] = [band]
     for level in levels[1:-1]:
-        handles += axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
+        axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
     if curves.r_u is not None:
-        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DOTTED, label="r_u, predicted")
+        axes.plot(w, curves.r_u, color=BLACK, linestyle=DOTTED, label="r_u, predicted")
     if curves.r_adm is not None:
         admitted = positive(curves.r_adm)
         beyond = curves.quantiles[high] > admitted
         if np.any(beyond):
             label = f"where more than {100 * (1.0 - high):.2g} % of the runs leave r_adm"
-            handles.append(
-                axes.fill_between(
-                    w, admitted, curves.quantiles[high], where=beyond, color=ORANGE, linewidth=0, label=label
-                )
-            )
-        handles += plot_admitted(axes, w, curves.r_adm)
-    return handles
+            outer = curves.quantiles[high]
+            axes.fill_between(w, admitted, outer, where=beyond, color=ORANGE, linewidth=0, label=label)
+        plot_admitted(axes, w, curves.r_adm)
 
 
 def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
@@ -103,17 +96,15 @@ def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
     axes = page.add_subplot()
     top = max(float(np.quantile(loss, SHOWN)) for loss in curves.losses.values())
     bins = np.linspace(0.0, top, BINS + 1)
-    handles = []
     for index, (name, loss) in enumerate(curves.losses.items()):
         colour = COLOURS[index % len(COLOURS)]
         weights = np.full(loss.size, 100.0 / loss.size)
         label = f"{name}: mean {loss.mean():.4g}, sd {loss.std(ddof=1):.4g}"
-        axes.hist(loss, bins=bins.tolist(), weights=weights, color=colour, alpha=SHADE)
-        handles.append(Patch(color=colour, alpha=SHADE, label=label))
+        axes.hist(loss, bins=bins.tolist(), weights=weights, color=colour, alpha=SHADE, label=label)
         axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
         if name in curves.theory:
             axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
     axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
     axes.set_ylabel("share of the runs (%)")
     axes.set_xlim(0.0, top)
-    legend_above(axes, handles)
+    legend_above(axes)

@@ -30,6 +30,7 @@ class SpectrumCurves(Curves):
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
     record: Array | None = None  # (n, r), smoothed periodograms of the record
     band: tuple[float, float] | None = None  # where the sinusoids might be
+    label: str = "design"  # what gave it
 
 
 @dataclass(frozen=True)

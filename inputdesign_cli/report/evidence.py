@@ -38,9 +38,8 @@ def estimate_facts(outcome: Outcome) -> Iterator[Fact]:
     found = outcome.identification
     if found is not None and found.variance is not None:
         value = found.variance
-        single = isinstance(value, float)
-        text = f"variance {value:.5g}" if single else f"covariance [{'; '.join(map(listed, value))}]"
-        yield "noise", text, ""
+        rows = "" if isinstance(value, float) else "; ".join(map(listed, value))
+        yield "noise", f"covariance [{rows}]" if rows else f"variance {value:.5g}", ""
     fit = None if found is None else found.fit_percent
     if fit is not None:
         several = "" if isinstance(fit, float) else "s"

@@ -11,7 +11,7 @@ from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.objectives import objective
 from inputdesign_cli.outcome.run_directory import read_outcome, read_run
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.charts import run_charts
+from inputdesign_cli.report.charts import Chart, run_charts
 from inputdesign_cli.report.evidence import (
     campaign_answer,
     campaign_facts,
@@ -58,51 +58,27 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
     verb = _verb(outcome)
     question, text = _asked(run, verb)
     charts = run_charts(run, question.time_unit) if pictures else {}
-    data = [name for name in _OF_DATA if name in charts]
-    runs = [name for name in charts if name.startswith(_OF_RUNS)]
-    placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
-    sections = [(heading, [n for n in names if n in charts]) for heading, names in _SECTIONS]
-    sections.append(("Further figures", [name for name in charts if name not in placed]))
-    proved = [f"{text[0].upper()}{text[1:]}." for text in proofs(outcome)]
-    shown = [(h, names) for h, names in sections if names or (h == "The certificate" and proved)]
-    estimated, simulated = estimate_table(outcome), simulation_table(outcome.simulation)
-    cited, assumed = citations(question, outcome), assumptions(question, outcome)
     top_up = None if outcome.assessment is None else outcome.assessment.top_up_status
     made_from, environment = (outcome.provenance.get(name) for name in ("made_from", "environment"))
     sources = [Path(str(name)).name for name in made_from] if isinstance(made_from, list) else []
     return {
+        **_figures(charts, [f"{text[0].upper()}{text[1:]}." for text in proofs(outcome)]),
         "title": question.title or run.resolve().name,
-        "contents": [
-            "The question",
-            "The answer",
-            *(["The data"] if estimated or data else []),
-            *(heading for heading, _ in shown),
-            *(["What was assumed"] if assumed else []),
-            *(["Simulation"] if simulated or runs else []),
-            "How to reproduce it",
-            *(["Methods"] if cited else []),
-            "All numbers",
-        ],
         "question": question.sentences,
         "answer": " ".join([_answer(verb, outcome), *simulation_answer(outcome)]),
         "notes": outcome.notes or (),
-        "estimate": estimated,
+        "estimate": estimate_table(outcome),
         "estimate_facts": list(estimate_facts(outcome)),
         "verdicts": requirement_table(outcome, question.time_unit),
-        "data_figures": data,
         "facts": [
             ("status", top_up or outcome.status or "", ""),
             *((name, text, "") for name, text in campaign_facts(outcome)),
             *facts(outcome, question.time_unit),
             ("units", question.units, ""),
         ],
-        "charts": charts,
-        "sections": shown,
-        "proofs": proved,
-        "simulation": simulated,
+        "simulation": simulation_table(outcome.simulation),
         "simulated_runs": None if outcome.simulation is None else outcome.simulation.runs,
-        "run_charts": runs,
-        "assumptions": assumed,
+        "assumptions": assumptions(question, outcome),
         "command": _command(verb, outcome, sources),
         "explored": outcome.exploration is not None,
         "campaign": verb == "campaign",
@@ -115,9 +91,20 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
                 ("seed of the signal", str(question.seed), ""),
             ],
         ),
-        "citations": cited,
+        "citations": citations(question, outcome),
         "numbers": flat({key: value for key, value in result.items() if key not in _NOT_NUMBERS}),
     }
+
+
+def _figures(charts: Mapping[str, Chart], proved: Sequence[str]) -> dict[str, object]:
+    """Return the charts, and the names that stand in each part of the page."""
+    data = [name for name in _OF_DATA if name in charts]
+    runs = [name for name in charts if name.startswith(_OF_RUNS)]
+    placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
+    sections = [(heading, [n for n in names if n in charts]) for heading, names in _SECTIONS]
+    sections.append(("Further figures", [name for name in charts if name not in placed]))
+    shown = [(h, names) for h, names in sections if names or (h == "The certificate" and proved)]
+    return {"charts": charts, "data_figures": data, "sections": shown, "run_charts": runs, "proofs": proved}
 
 
 def run_sources(run: Path) -> list[Source]:

@@ -28,7 +28,8 @@ class Source:
         authors = f"{', '.join(others)} and {last}" if others else last
         names = ("journal", "volume", "edition", "publisher", "eprint", "year", "pages")
         known = {name: self.fields[name].replace("--", "-") for name in names if name in self.fields}
-        forms = {"edition": "{} edition,", "publisher": "{},", "eprint": "arXiv:{},", "year": "({})"}
+        forms = {"edition": "{} edition,", "publisher": "{},", "eprint": "arXiv:{},"}
+        forms |= {"year": "({})"} if "volume" in known else {}
         where = " ".join(forms.get(name, "{}").format(text) for name, text in known.items())
         return f"{authors}, {self.fields['title']}{f', {where}' if where else ''}."
 

@@ -48,14 +48,6 @@ def sweep_page(root: Path) -> dict[str, object]:
     cited = citations(question, first) if question else []
     return {
         "title": summary.title or root.resolve().name,
-        "contents": [
-            "The question",
-            "The answer",
-            "The points",
-            *(["Points without a result"] if any(table.columns["code"]) else []),
-            "How to reproduce it",
-            *(["Methods"] if cited else []),
-        ],
         "question": question.sentences if question else (),
         "zipped": summary.zip,
         "axes": [(axis.key, _values(axis.values), "") for axis in summary.axes],

@@ -27,10 +27,12 @@ class Question:
     default: str | None = None
 
 
-QUESTIONS = tuple(
-    Question(**entry)
-    for entry in yaml.safe_load((resources.files(__package__) / "questions.yaml").read_text(encoding="utf-8"))
-)
+def package_text(name: str) -> str:
+    """Return the text of a file of this package."""
+    return (resources.files(__package__) / name).read_text(encoding="utf-8")
+
+
+QUESTIONS = tuple(Question(**entry) for entry in yaml.safe_load(package_text("questions.yaml")))
 KEYS = tuple(question.key for question in QUESTIONS)
 _ALL = f"the questions are {', '.join(KEYS)}"
 AS_LOG = "as the log"
@@ -45,6 +47,12 @@ def known_from(answers: Mapping[str, str]) -> dict[str, str]:
     """Return the answers that the answer `plant` gives: a log shows the noise, and whether it drifts."""
     explored = answers.get("plant", "").strip().lower().startswith("log ")
     return {"noise": AS_LOG, "drift": "not known"} if explored else {}
+
+
+def needed_of(answers: Mapping[str, str]) -> list[str]:
+    """Return the questions without a default that the answers leave open."""
+    there = {*answers, *known_from(answers)}
+    return [one.key for one in QUESTIONS if one.default is None and one.key not in there]
 
 
 def bad_answer(key: str, why: str) -> SpecError:

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from types import MappingProxyType
+from typing import Annotated, Any
 
 import numpy as np
+import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.grammar import LARGEST, Phrase, needed, short
-from inputdesign_cli.wizard.questions import bad_answer
+from inputdesign_cli.wizard.questions import bad_answer, package_text
 
+_NONE: Mapping[str, float] = MappingProxyType({})
 _QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
 
 
@@ -105,36 +108,20 @@ def plant_of_words(text: str, head: str = "plant:  # as you said") -> PlantAnswe
     return PlantAnswer(lines, slow, _around(values, shares), values, tunable=True)
 
 
-def _template(lines: str, slow: float, controller: str | None = None, **values: float) -> PlantAnswer:
+def _template(
+    name: str, about: str, words: str = "", lines: str = "", values: Mapping[str, float] = _NONE, **more: Any
+) -> PlantAnswer:
+    head = f"plant:  # template {name}: {about}"
+    if words:
+        return plant_of_words(words, head)
     around = _around(values, dict.fromkeys(values, 0.2))
-    return PlantAnswer((*lines.split("\n"), "  sample: zoh"), slow, around, values, controller)
+    text = (head, *(f"  {line}" for line in lines.splitlines()), "  sample: zoh")
+    return PlantAnswer(text, intervals=around, values=values, **more)
 
 
 TEMPLATES = {
-    "heater": plant_of_words("gain 2.1, time constant 180 s, dead time 25 s, within 20 %",
-                              "plant:  # template heater: degrees over per cent of power"),
-    "tank": _template(
-        "plant:  # template tank: level over valve, it integrates\n"
-        "  parameters: {k: 0.05, L: 5}\n  continuous: {numerator: [k], denominator: [1, 0], delay: L}",
-        60.0, "{pid: {Kp: 0.8, Ti: 60}}", k=0.05, L=5.0,
-    ),
-    "motor": plant_of_words("gain 0.1, time constant 0.5 s, dead time 0.02 s, within 20 %",
-                             "plant:  # template motor: speed over voltage"),
-    "axis": _template(
-        "plant:  # template axis: a flexible axis, its first resonance\n"
-        "  continuous: {gain: 1, damping: 0.1, natural_frequency: 30}",
-        0.2, gain=1.0, damping=0.1, natural_frequency=30.0,
-    ),
-    "column": replace(
-        _template(
-            "plant:  # template column: two compositions over reflux and steam, seconds\n  continuous:\n"
-            "    gain: [[12.8, -18.9], [6.6, -19.4]]\n    time_constant: [[1002, 1260], [654, 864]]\n"
-            "    dead_time: [[60, 180], [420, 180]]",
-            1000.0,
-        ),
-        sampling=60.0, channels=2,
-    ),
-}  # fmt: skip
+    name: _template(name, **entry) for name, entry in yaml.safe_load(package_text("templates.yaml")).items()
+}
 
 
 _Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]  # NaN is in no interval

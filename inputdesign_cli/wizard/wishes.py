@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
 from inputdesign_cli.wizard.grammar import ALONE, NUMBER, Phrase, needed, short
@@ -13,6 +12,11 @@ from inputdesign_cli.wizard.stated_plants import PlantAnswer
 
 _NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations
 _LINES = 20
+_WITHIN = {
+    "prediction": r"\bpredict\w*",
+    "parameters": r"\bparameters?\b",
+    "response": r"\b(?:bode(?: plot| diagram)?|frequency response)\b",
+}
 
 
 def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> list[str]:
@@ -31,64 +35,47 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
     part = said.share()
     if part is None or not 0.0 < part < 1.0:
         raise bad_answer("wish", "it does not say within how many per cent, between 0 and 100")
-    for words, lines in _WITHIN.items():
-        if said.take(words):
-            return lines(said, plant, part, duration)
-    raise bad_answer("wish", f'"{text}" is none of these')
-
-
-def _prediction(said: Phrase, plant: PlantAnswer, part: float, duration: float) -> list[str]:
-    high = needed(said.after("up to|to", "frequency"), "wish", "up to which frequency (rad/s)")
-    said.finish()
-    _below_nyquist(high, plant)
-    low = min(2.0 * math.pi / duration, 0.1 * high)
-    return [
-        f"accuracy:  # G known within {100 * part:g} %, from one period in the experiment to what you named",
-        f"  model_error: {{relative: {short(part)}, band: [{short(low)}, {short(high)}]}}",
-    ]
-
-
-def _parameters(said: Phrase, plant: PlantAnswer, part: float, _: float) -> list[str]:
-    said.finish("physical")
-    if not plant.values:
-        why = "this plant has no parameters with names; ask for a prediction or a Bode plot"
-        raise bad_answer("wish", why)
-    listed = ", ".join(
-        f"{name}: {short(part * abs(value) / _NORMAL)}" for name, value in plant.values.items()
-    )
-    return [
-        f"accuracy:  # {100 * part:g} % is 1.96 standard deviations, so that 95 % of estimates are within it",
-        f"  standard_deviation: {{{listed}}}",
-    ]
-
-
-def _response(said: Phrase, plant: PlantAnswer, part: float, _: float) -> list[str]:
+    kind = next((kind for kind, words in _WITHIN.items() if said.take(words)), None)
+    if kind is None:
+        raise bad_answer("wish", f'"{text}" is none of these')
+    if kind == "parameters":
+        said.finish("physical")
+        return _parameters(plant, part)
     begins, ends = said.band()
-    low = needed(begins, "wish", "from which frequency (rad/s)")
-    high = needed(ends, "wish", "to which frequency (rad/s)")
+    high = needed(ends, "wish", "up to which frequency (rad/s)")
     said.finish()
-    if low >= high:
-        raise bad_answer("wish", f"{low:g} is not below {high:g}")
-    _below_nyquist(high, plant)
-    return [
-        f"accuracy:  # {100 * part:g} % is {_RAYLEIGH:.3g} deviations of a complex error: 95 % are within it",
-        f"  frequency_response: {{relative: {short(part / _RAYLEIGH)}, "
-        f"band: [{short(low)}, {short(high)}], lines: {_LINES}}}",
-    ]
-
-
-_WITHIN: dict[str, Callable[[Phrase, PlantAnswer, float, float], list[str]]] = {
-    r"\bpredict\w*": _prediction,
-    r"\bparameters?\b": _parameters,
-    r"\b(?:bode(?: plot| diagram)?|frequency response)\b": _response,
-}
-
-
-def _below_nyquist(high: float, plant: PlantAnswer) -> None:
     highest, step = math.pi / plant.sample_time, short(plant.sample_time)
     if high > highest:
         why = f"a sample every {step} s, which suits this plant, reaches up to {highest:.3g} rad/s"
         raise bad_answer("wish", why)
+    if kind == "prediction" and begins is None:
+        begins = min(2.0 * math.pi / duration, 0.1 * high)  # one period in the experiment
+    low = needed(begins, "wish", "from which frequency (rad/s)")
+    if low >= high:
+        raise bad_answer("wish", f"{low:g} is not below {high:g}")
+    band = f"band: [{short(low)}, {short(high)}]"
+    if kind == "prediction":
+        return [
+            f"accuracy:  # G known within {100 * part:g} %, from one period in the experiment to what you "
+            "named",
+            f"  model_error: {{relative: {short(part)}, {band}}}",
+        ]
+    return [
+        f"accuracy:  # {100 * part:g} % is {_RAYLEIGH:.3g} deviations of a complex error: 95 % are within it",
+        f"  frequency_response: {{relative: {short(part / _RAYLEIGH)}, {band}, lines: {_LINES}}}",
+    ]
+
+
+def _parameters(plant: PlantAnswer, part: float) -> list[str]:
+    if not plant.values:
+        why = "this plant has no parameters with names; ask for a prediction or a Bode plot"
+        raise bad_answer("wish", why)
+    sizes = {name: short(part * abs(value) / _NORMAL) for name, value in plant.values.items()}
+    listed = ", ".join(f"{name}: {size}" for name, size in sizes.items())
+    return [
+        f"accuracy:  # {100 * part:g} % is 1.96 standard deviations, so that 95 % of estimates are within it",
+        f"  standard_deviation: {{{listed}}}",
+    ]
 
 
 def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
@@ -103,9 +90,8 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
     derivative = said.take(r"\bPID\b") is not None
     settings = pid(said, stated=said.take(r"\b(?:my\s+)?own\b|\bmy\b") is not None)
     tuned = settings is None and plant.tunable
-    speed = (
-        said.after(r"(?:closed[- ]loop )?time constant|tau_c", "time") if tuned and not derivative else None
-    )
+    fast = tuned and not derivative
+    speed = said.after(r"(?:closed[- ]loop )?time constant|tau_c", "time") if fast else None
     said.finish("PI controller margin")
     if settings is not None:
         return ["accuracy:", f"  loop: {{controller: {{pid: {settings}}}, {margin}}}"]
@@ -135,9 +121,8 @@ def _margin(said: Phrase) -> str:
     if factor is not None:
         size = 10.0 ** (float(factor[1]) / 20.0) if factor[2] else float(factor[1])
         if not 1.0 < size < math.inf:
-            raise bad_answer(
-                "wish", f"a gain margin is a factor above one, or dB above zero, not {factor[1]}"
-            )
+            why = f"a gain margin is a factor above one, or dB above zero, not {factor[1]}"
+            raise bad_answer("wish", why)
         return f"gain_margin: {short(size)}"
     peak = said.number(rf"{ALONE}{NUMBER}\s*dB\b")
     if peak is not None:

@@ -3,6 +3,7 @@
 import json
 import sys
 from pathlib import Path
+from typing import get_args
 from xml.etree import ElementTree
 
 import pytest
@@ -11,7 +12,7 @@ import typer
 import inputdesign_cli
 from inputdesign_cli import questions
 from inputdesign_cli.cli import app
-from inputdesign_cli.cli.reference import KINDS
+from inputdesign_cli.cli.reference import Kind
 from inputdesign_cli.error_codes import explanation
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.findings import explanations
@@ -122,15 +123,6 @@ def test_a_golden_file_that_compares_nothing_fails(run, verbs, tmp_path, text):
     assert ElementTree.parse(tmp_path / "report.xml").getroot().get("errors") == "1"
 
 
-def test_golden_files_come_with_the_package(run, verbs, monkeypatch, tmp_path):
-    (tmp_path / "shipped" / "golden").mkdir(parents=True)
-    (tmp_path / "shipped" / "golden" / "g.yaml").write_text(GOLDEN % "0.2585")
-    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "shipped")
-    code, out, _ = run("check")
-    assert code == 0
-    assert "2 of 2 quantities agree" in out
-
-
 def test_nothing_is_written_with_no_output(run, verbs, tmp_path):
     code, out, err = run("solve", "a.yaml", "--json", "--no-output")
     assert (code, err) == (0, "")
@@ -176,7 +168,7 @@ def test_init_writes_once(run, tmp_path):
     assert (tmp_path / "mine.yaml").read_text() == text
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", get_args(Kind))
 def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
     assert run("init", "--kind", kind, "a.yaml")[0] == 0
     spec = inputdesign_cli.load_spec(tmp_path / "a.yaml", [])
@@ -185,15 +177,11 @@ def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
     assert (tmp_path / "a.yaml").read_text().count("#") > 8
 
 
-@pytest.mark.parametrize(
-    ("arguments", "nearest"),
-    [(("init", "--kind", "closd-loop"), "closed-loop"), (("sweep", "a", "--verb", "slove"), "solve")],
-)
-def test_an_unknown_word_is_refused_in_plain_words(run, arguments, nearest):
+@pytest.mark.parametrize("arguments", [("init", "--kind", "closd-loop"), ("sweep", "a", "--verb", "slove")])
+def test_an_unknown_word_is_refused_with_those_that_are_known(run, arguments):
     code, _, err = run(*arguments)
     assert code == 2
-    assert f'did you mean "{nearest}"?' in " ".join(err.split())
-    assert "Value error" not in err
+    assert f"'{arguments[-1]}' is not one of" in " ".join(err.split())
 
 
 def test_explain(run):

@@ -62,19 +62,18 @@ def test_pictures_are_drawn(tmp_path):
         (["--prbs", 5, "--steps", 3], "give one of"),
         (["--prbs", 5, "-o", "u.txt"], "ends with none of"),
         (["--chirp", "2"], "LOW:HIGH"),
-        (["--chirp", "1:0.1"], "LOW:HIGH"),
+        (["--chirp", "1:0.1"], "write 0.1:1?"),
         (["--chirp", "0.1:9"], "Nyquist"),
-        (["--chirp=-1:1"], "negative"),
-        (["--multisine", 5, "--range", "5:1"], "write the lower one first, 1:5"),
-        (["--multisine", 5, "--range", "5:5"], "5 is not below 5"),
+        (["--chirp=-1:1"], "within 0 to 1e+15"),
+        (["--multisine", 5, "--range", "5:1"], "write 1:5?"),
+        (["--multisine", 5, "--range", "5:5"], "1e-15 apart"),
         (["--chirp", "0.1:1", "--inputs", 2], "one frequency at a time"),
-        (["--multisine", 5, "--range", "1:0"], "LOW:HIGH"),
         (["--multisine", 5, "--inputs", 2, "--range", "0:1,0:1,0:1"], "3 ranges"),
         (["--multisine", 500, "--samples", 100], "49 harmonics"),
         (["--multisine", 5, "--samples", 100, "--periods", 3], "--samples 99"),
         (["--steps", 3, "--sample-time", 0], "positive"),
         (["--steps", 3, "--sample-time", "nan"], "positive"),
-        (["--steps", 3, "--time-unit", "fortnight"], "one of"),
+        (["--steps", 3, "--time-unit", "fortnight"], "is not one of"),
     ],
 )
 def test_what_cannot_be_made_is_refused(words, said):
@@ -122,19 +121,3 @@ def test_an_option_without_effect_is_refused(words):
     result = run(*words)
     assert result.exit_code == 2
     assert "does nothing to" in result.output
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("--prbs", 5, "--prbs", 6),
-        ("--prbs", 5, "--samples", 20, "--samples=30"),
-        ("--range", "0:1", "--steps", 5, "--range", "0:2"),
-        ("--chirp", "0.1:1", "--seed", 1, "--seed", 1),
-    ],
-)
-def test_an_option_that_stands_twice_is_refused(words, tmp_path):
-    result = run(*words, "-o", tmp_path / "u.csv", "-o", tmp_path / "u.npz")
-    assert result.exit_code == 2
-    assert "stands there twice" in result.output
-    assert not list(tmp_path.iterdir())

@@ -101,84 +101,15 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     assert not (tmp_path / "r").exists()
 
 
-LOST = """
+BEGIN = """
 import signal, sys, time
-import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
-
-class Finalised:
-    def __del__(self):
-        signal.raise_signal(int(sys.argv[1]))
-
-def run():
-    cli.streams.prepare_signals()
-    Finalised()
-    time.sleep(20)
-
-cli.main = run
-command.main()
-"""
-
-
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_that_comes_while_something_is_finalised_is_not_lost(number, code):
-    done = subprocess.run([sys.executable, "-c", LOST, str(int(number))], capture_output=True, text=True)
-    assert (done.returncode, "Traceback" in done.stderr) == (code, False)
-
-
-DROPPED = """
-import signal, sys, time
-import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
-from inputdesign_cli.cli.terminal import guarded
-
-_, number, name, where = sys.argv
-sys.argv = sys.argv[:1]
-
-def work():
-    try:
-        __import__(name)
-        time.sleep(20)
-    finally:
-        print("tidied up")
-
-def run():
-    cli.streams.prepare_signals()
-    cli.typer.run(guarded(work)) if where == "guarded" else work()
-
-cli.main = run
-command.main()
-"""
-
-
-@pytest.mark.parametrize("where", ["guarded", "outside"])
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_that_an_import_would_drop_is_not_lost(tmp_path, number, code, where):
-    dropping = (
-        f"import signal\ntry:\n    signal.raise_signal({int(number)})\nexcept BaseException:\n    pass\n"
-    )
-    (tmp_path / "dropping.py").write_text(dropping)
-    command = [sys.executable, "-c", DROPPED, str(int(number)), "dropping", where]
-    paths = os.pathsep.join([str(tmp_path), str(ROOT)])
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=60, env={**os.environ, "PYTHONPATH": paths}
-    )
-    assert (done.returncode, "Traceback" in done.stderr, done.stdout) == (code, False, "tidied up\n")
-
-
-WRAPPED = """
-import signal, sys
 import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
 from inputdesign_cli.cli.terminal import guarded
 
 _, number, where = sys.argv
 sys.argv = sys.argv[:1]
-
-class Attribute:
-    def __set_name__(self, owner, name):
-        signal.raise_signal(int(number))
-
-def work():
-    type("Made", (), {"attribute": Attribute()})
-
+"""
+END = """
 def run():
     cli.streams.prepare_signals()
     cli.typer.run(guarded(work)) if where == "guarded" else work()
@@ -186,14 +117,56 @@ def run():
 cli.main = run
 command.main()
 """
+# A signal that comes while an object is finalised, while an import swallows it, while a class is made.
+WORK = {
+    "finalised": """
+class Finalised:
+    def __del__(self):
+        signal.raise_signal(int(number))
+
+def work():
+    try:
+        Finalised()
+        time.sleep(20)
+    finally:
+        print("tidied up")
+""",
+    "dropped": """
+def work():
+    try:
+        import dropping
+        time.sleep(20)
+    finally:
+        print("tidied up")
+""",
+    "wrapped": """
+class Attribute:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(int(number))
+
+def work():
+    try:
+        type("Made", (), {"attribute": Attribute()})
+        time.sleep(20)
+    finally:
+        print("tidied up")
+""",
+}
 
 
+@pytest.mark.parametrize("work", WORK)
 @pytest.mark.parametrize("where", ["guarded", "outside"])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_that_comes_while_a_class_is_made_is_not_a_fault(number, code, where):
-    command = [sys.executable, "-c", WRAPPED, str(int(number)), where]
-    done = subprocess.run(command, capture_output=True, text=True)
+def test_a_signal_is_neither_lost_nor_a_fault_whatever_python_does_meanwhile(
+    tmp_path, number, code, where, work
+):
+    swallowed = f"try:\n    signal.raise_signal({int(number)})\nexcept BaseException:\n    pass\n"
+    (tmp_path / "dropping.py").write_text(f"import signal\n{swallowed}")
+    command = [sys.executable, "-c", BEGIN + WORK[work] + END, str(int(number)), where]
+    paths = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=paths)
     assert (done.returncode, "Traceback" in done.stderr, "internal" in done.stderr) == (code, False, False)
+    assert done.stdout == "tidied up\n"
 
 
 def test_names_that_are_no_text_end_in_no_fault(tmp_path):

@@ -82,19 +82,6 @@ def test_a_question_that_there_is_not_is_told_with_its_line(tmp_path):
     assert place.line == 2
 
 
-@pytest.mark.parametrize(("name", "words"), [(".", "is a folder"), ("none.csv", "there is no file")])
-@pytest.mark.parametrize("key", ["plant", "noise"])
-def test_what_is_no_file_is_told_as_what_it_is(run, tmp_path, key, name, words):
-    word = {"plant": "step", "noise": "rest"}[key]
-    given = [part for k, text in GOOD.items() if k != key for part in ("-a", f"{k}={text}")]
-    path = tmp_path / name
-    code, _, err = run(
-        "wizard", *given, "-a", f"{key}={word} {path}", "-o", tmp_path / "s.yaml", "--no-solve"
-    )
-    assert code == 2
-    assert words in err
-
-
 @pytest.mark.slow
 def test_an_integrator_in_open_loop_asks_for_a_controller(run, tmp_path):
     (tmp_path / "p.json").write_text('{"num": [2], "den": [180, 1, 0], "delay": 25}')

@@ -70,17 +70,8 @@ def test_a_page_of_another_site_is_refused(served):
     assert ask(address, address.path, Host=f"localhost:{address.port}")[0] == 200
 
 
-NOWHERE = (
-    "/",
-    "/x/",
-    "{secret}x",
-    "{secret}../",
-    "{secret}../../../../etc/passwd",
-    "{secret}%2e%2e/etc/passwd",
-    "{secret}result.json",
-    "//etc/passwd",
-    "/etc/passwd",
-)
+NOWHERE = ["/", "/x/", "{secret}x", "{secret}../", "{secret}../../../../etc/passwd", "//etc/passwd"]
+NOWHERE += ["{secret}%2e%2e/etc/passwd", "{secret}result.json", "/etc/passwd"]
 
 
 @pytest.mark.parametrize("path", NOWHERE)
@@ -146,50 +137,19 @@ def test_a_port_that_is_taken_is_told(served):
 def malformed() -> list[bytes]:
     """Requests that are none: broken targets, versions and headers, and random bytes in each place."""
     rng = np.random.default_rng(1)
-    marks = [
-        b"[",
-        b"]",
-        b"//",
-        b"\x00",
-        b"%",
-        b"%zz",
-        b"\xff",
-        b"\x85",
-        b"@:",
-        b"?version=\xb2",
-        b" ",
-        b"\t",
-        b"\r",
-        b"#",
-    ]
+    marks = [*rb"[ ] // % %zz @: #".split(), b"\x00", b"\xff", b"\x85", b"?version=\xb2", b" ", b"\t", b"\r"]
     targets = [
-        b"http://[::1",
-        b"//[",
-        b"http://]:x/",
-        b"*",
+        *b"http://[::1 //[ http://]:x/ * http://[v1.x]/ http://a\xe2\x84\x80/".split(),
         b"",
-        b"http://[v1.x]/",
-        b"http://a\xe2\x84\x80/",
         b"/" * 70000,
     ]
     targets += [b"http://" + b"".join(rng.choice(marks, 4)) + b"/" for _ in range(60)]
     requests = [b"GET " + target + b" HTTP/1.1\r\n\r\n" for target in targets]
     versions = [b"HTTP/1.\xb2", b"HTTP/9", b"HTTP/-1.1", b"HTTP/1.1.1", b"FTP/1.0", b"HTTP/2.0", b"HTTP/"]
     requests += [b"GET / " + version + b"\r\n\r\n" for version in versions]
-    headers = [
-        b"Host",
-        b": x",
-        b"Host: \xff\x00",
-        b" folded",
-        b"Content-Length: -1",
-        b"Expect: 100-continue",
-        b"A: " + b"x" * 70000,
-    ]
-    headers += [
-        b"\r\n".join(b"h%d: 1" % k for k in range(300)),
-        b'Content-Type: multipart/mixed; boundary="',
-        b"Sec-Fetch-Site: \xff",
-    ]
+    headers = [b"Host", b": x", b"Host: \xff\x00", b" folded", b"Content-Length: -1", b"Expect: 100-continue"]
+    headers += [b"A: " + b"x" * 70000, b"\r\n".join(b"h%d: 1" % k for k in range(300))]
+    headers += [b'Content-Type: multipart/mixed; boundary="', b"Sec-Fetch-Site: \xff"]
     requests += [b"GET / HTTP/1.1\r\n" + header + b"\r\n\r\n" for header in headers]
     requests += [rng.bytes(int(rng.integers(1, 200))) + b"\r\n\r\n" for _ in range(60)]
     return [*requests, b"\r\n\r\n", b"GET\r\n\r\n", b"GET / HTTP/1.1 x\r\n\r\n", b"TRACE / HTTP/1.1\r\n\r\n"]

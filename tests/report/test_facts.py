@@ -7,17 +7,15 @@ from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.report.facts import facts, proofs
 from tests.support.outcomes import typed
 
-ROBUST = {
-    "source": "intervals",
-    "scenarios": 31,
-    "discarded": 0,
-    "rejected": 0,
-    "active": [],
-    "r_adm": "own",
-    "cost": "worst",
-    "worst_share": 1.0,
-    "worst_scenario": 0,
-    "support": 0,
+ROBUST = {"source": "intervals", "scenarios": 31, "discarded": 0, "rejected": 0, "active": [], "r_adm": "own"}
+ROBUST |= {"cost": "worst", "worst_share": 1.0, "worst_scenario": 0, "support": 0}
+SEARCHED = {
+    "proved": False,
+    "parameters": {},
+    "share": 1.0,
+    "region": "the intervals",
+    "added": 1,
+    "tried": 40,
 }
 
 
@@ -63,15 +61,7 @@ def test_channels_are_enumerated_and_equal_costs_are_told_as_such():
 
 
 def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
-    robust = {**ROBUST}
-    robust["searched"] = {
-        "proved": False,
-        "parameters": {},
-        "share": 1.0,
-        "region": "the intervals",
-        "added": 1,
-        "tried": 40,
-    }
+    robust = ROBUST | {"searched": SEARCHED}
     limits = [{"name": "amplitude.input", "binding": True}]
     result = {"objective": {"kind": "accuracy_factor", "value": 0.5}, "robust": robust, "limits": limits}
     told = {name: value for name, value, _ in facts(typed(result), "s")}
@@ -103,15 +93,7 @@ def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
 )
 def test_the_worst_plant_is_measured_by_what_is_admitted_whatever_is_sought(objective, share, words):
     """`share` is one of the ratio that is reached where the best accuracy is sought: times that ratio."""
-    robust = {**ROBUST}
-    robust["searched"] = {
-        "proved": False,
-        "parameters": {},
-        "share": share,
-        "region": "the intervals",
-        "added": 1,
-        "tried": 40,
-    }
+    robust = ROBUST | {"searched": SEARCHED | {"share": share}}
     told = {name: value for name, value, _ in facts(typed({"objective": objective, "robust": robust}), "s")}
     assert told["worst plant"] == words
 

@@ -69,14 +69,7 @@ def _log(folder, samples=1200, *, beside=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("drift", "drifts"),
-    [
-        ("yes", True),
-        pytest.param("no", False, marks=pytest.mark.slow),
-        pytest.param("not known", False, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize(("drift", "drifts"), [("yes", True), ("no", False), ("not known", False)])
 def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     _log(tmp_path)
     answers = {**ENGINEER, "plant": "log log.csv", "noise": "standard deviation 0.2", "drift": drift}

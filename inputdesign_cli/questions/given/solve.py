@@ -226,7 +226,8 @@ class GivenTask:
         found = White(cost=cost, excitation_power=level)
         kind = None if self.asked.criterion is None else self.asked.criterion(experiment).letter
         labels = white_labels(kind, found, experiment.samples)
-        informed = Informed(units, errors, information, bool(stated), white=white, white_labels=labels)
+        known = (units, errors, information, bool(stated))
+        informed = Informed(*known, white=white, white_labels=labels, label="given")
         return informed, found
 
     def _report(
@@ -260,9 +261,10 @@ class GivenTask:
         tables, curves = informed.curves(experiment, self.shown.ellipses)
         if excitation.basis is not None and excitation.x is not None:
             level = white.excitation_power if units.inputs == 1 else None
-            tables["spectrum"], curves["spectrum"] = spectrum_curves(
+            tables["spectrum"], drawn = spectrum_curves(
                 units, excitation.basis, excitation.x, experiment.band, white=level
             )
+            curves["spectrum"] = replace(drawn, label="given")
         plants = self.asked.plants
         if plants is not None:
             excited = AtPlants(excitation.information, excitation.scale, experiment.samples)
