@@ -11,7 +11,7 @@ from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage
 from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.outcome.design import Coverage as Reached
-from inputdesign_cli.questions.common import simulated_estimates
+from inputdesign_cli.questions.common import confidence
 from inputdesign_cli.questions.common.confidence import SimulatedEstimates
 
 SPEC = """
@@ -27,13 +27,13 @@ signal: {{candidates: 1}}
 @pytest.mark.parametrize(("samples", "each"), [(12, 1), (200, 20)])
 def test_short_records_differ_so_much_that_each_has_one_run(monkeypatch, samples, each):
     """Twenty runs of each of five records of 8 samples told of these five: it cost 1.7 times too much."""
-    seen, genuine = set(), simulated_estimates.Reapplied
+    seen, genuine = set(), confidence.Reapplied
 
     def noted(excitation, times):
         seen.add(times)
         return genuine(excitation, times)
 
-    monkeypatch.setattr(simulated_estimates, "Reapplied", noted)
+    monkeypatch.setattr(confidence, "Reapplied", noted)
     solve(parse_spec(SPEC.format(samples=samples)))
     assert seen == {each}
 
@@ -46,7 +46,7 @@ def test_runs_that_check_are_none_of_those_that_correct(monkeypatch):
         return np.zeros((1, 1))
 
     monkeypatch.setattr(SimulatedEstimates, "_estimates", noted)
-    monkeypatch.setattr(simulated_estimates, "largest_error", lambda errors, estimates: np.zeros(1))
+    monkeypatch.setattr(confidence, "largest_error", lambda errors, estimates: np.zeros(1))
     told = SimulatedEstimates(None, None, 100, 1.0, sets=4)
     told.corrected(SimpleNamespace(corrected=lambda *_: Calibration(0.9, 100)), [], np.eye(1))
     correcting = set(seen)
