@@ -105,13 +105,10 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
     keep(results, place, Shown(quiet=True))
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
         with computing(file, quiet=quiet, doing="what else would do"):
-            found = verdict(spec, results.result, _result, there)
+            found = list(verdict(spec, results.result, _result, there))
         if not quiet:
-            typer.echo(
-                "\n".join(
-                    ["", *found.sentences, *to_log(spec, results, str(file)), f"files: {place.directory}"]
-                )
-            )
+            lines = ["", *found, *to_log(spec, results, str(file)), f"files: {place.directory}"]
+            typer.echo("\n".join(lines))
     if trade:
         from inputdesign_cli.cli.trade import WORDS, show_trade
 

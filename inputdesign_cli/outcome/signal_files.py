@@ -27,7 +27,7 @@ def npz_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
     """For numpy: columns under their names, and `sample_time`."""
     buffer = io.BytesIO()
     arrays = {name.split()[0]: values for name, values in channels.items()}
-    np.savez(buffer, **arrays, sample_time=sample_time)
+    np.savez(buffer, allow_pickle=False, **arrays, sample_time=np.asarray(sample_time))
     return buffer.getvalue()
 
 
