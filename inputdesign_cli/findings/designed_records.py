@@ -93,7 +93,7 @@ def accuracy_missed(record: Record, *, held: bool) -> list[Finding]:
         "the limits on the powers, the level asked for or its length leave no room: a little more power or "
         "a few more samples would do"
         if held
-        else "no level of it would do, since too little of what it causes comes before its last sample: take "
+        else "no level of it would do, since too little of its effect comes before its last sample: take "
         "more samples"
     )
     message = f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; {why}"
@@ -121,8 +121,8 @@ def length_of_record(record: Record, asked: int, block: int, shares: Mapping[str
         return [RECORD_LONGER.found(message, where="signal", samples=size, of_spectrum=asked)]
     message = (
         f"the record costs {times:.3g} times what the designed spectrum does: its {size} samples are few "
-        "beside the dead times and time constants of the plant; much of what they cause comes after the "
-        "last one; take more samples"
+        "beside the dead times and time constants of the plant; much of their effect comes after the last "
+        "one; take more samples"
     )
     found = RECORD_DEAR.found(message, where="signal.samples", times=times)
     return [found] if record.extra_power > _DEAR else []

@@ -135,7 +135,7 @@ def on_the_circle(model: Model, estimate: Estimate) -> list[Finding]:
         if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
     )
     message = (
-        f"{letters} has a root on the unit circle, as far as {samples} samples can tell: the covariance is "
+        f"{letters} has a root on the unit circle, as far as {samples} samples can show: the covariance is "
         "not to be trusted there, and a design on this model would count on noise that vanishes or never "
         "fades; take more data, or a lower order"
     )
@@ -148,7 +148,7 @@ def near_zero(model: Model, estimate: Estimate) -> list[Finding]:
     vague = np.flatnonzero(deviations > np.abs(estimate.theta))
     quantity, found = quantities(model), []
     for physical, advice in (
-        (True, "the data hardly tell of it; take more of them, or list what is known in plant.known"),
+        (True, "the data hardly determine it; take more of them, or list what is known in plant.known"),
         (False, "an order may be too high"),
     ):
         listed = ", ".join(estimate.names[k] for k in vague if quantity[k] == physical)
@@ -157,7 +157,7 @@ def near_zero(model: Model, estimate: Estimate) -> list[Finding]:
             found.append(NEAR_ZERO.found(message, where=listed))
     for k in vague[model.dead_times[vague]]:
         most, name = float(estimate.theta[k] + _NORMAL * deviations[k]), estimate.names[k]
-        message = f"{name} of a dead time cannot be told from zero: {most:.3g} at most (95 %)"
+        message = f"{name} of a dead time cannot be distinguished from zero: {most:.3g} at most (95 %)"
         found.append(NEAR_ZERO.found(message, where=name, at_most=most))
     return found
 

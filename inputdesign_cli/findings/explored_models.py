@@ -65,7 +65,7 @@ UNSTABLE = doubt(
 OPEN_PARAMETERS = doubt(
     "rival-explains-log",
     "Another set of parameters explains the log as well. The likelihood has another minimum of about the "
-    "same depth, where G is another.",
+    "same depth, where G differs.",
     "Move the inputs independently of each other, and at more frequencies.",
 )
 

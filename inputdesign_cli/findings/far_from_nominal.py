@@ -123,7 +123,7 @@ def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
         FAR,
         (
             f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec (all "
-            f"parameters of G together, {chi_squared}): it is another plant, its units are others, or the "
+            f"parameters of G together, {chi_squared}): the plant differs, its units are others, or the "
             "numbers of the spec, on which the design rested, were poor. The verdict holds for the "
             "estimate: r_u and r_adm are those at its parameters"
         ),

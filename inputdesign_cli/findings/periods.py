@@ -22,7 +22,7 @@ _DOUBT = 0.05
 # The two tests of odd lines: their power, and their likeness to a cube.
 _WAYS = 2
 MATTERS = 0.5
-"""From this share of what is admitted on, a quarter in mean square, a change leaves a verdict open."""
+"""From this share of the admissible error on, a quarter in mean square, a change leaves a verdict open."""
 
 SILENT_LINES = doubt(
     "silent-lines-answer",

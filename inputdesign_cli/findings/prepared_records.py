@@ -67,7 +67,7 @@ COLUMNS_UNUSED = note(
 )
 UNIT_NOT_CONVERTED = note(
     "unit-not-converted",
-    "A column has another unit than the spec. Values are taken as they stand.",
+    "A column has another unit than the spec. Values are not converted.",
     "Convert the column, or correct the unit in the spec.",
 )
 SHEETS_UNREAD = note(

@@ -75,7 +75,7 @@ def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[s
     if model.continuous:
         sampled = "sample the plant (plant.sample: zoh), so that noise may have"
         return {"noise": f"{sampled} C and D", "drift": f"{sampled} drift: true"}
-    first = " (such as noise: {C: [1, -0.1], D: [1, -0.8]})" if not {"C", "D"} & set(noise) else ""
+    first = " (for example noise: {C: [1, -0.1], D: [1, -0.8]})" if not {"C", "D"} & set(noise) else ""
     polynomials = "" if "continuous" in plant or "state_space" in plant else " (or A)"
     drifts = "drift" in noise
     drift = "raise the order of D under noise" if drifts else "let the noise drift (noise: {drift: true})"

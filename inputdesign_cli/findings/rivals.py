@@ -27,7 +27,7 @@ OTHER_MINIMUM = unsure(
 RULED_OUT = note(
     "minimum-ruled-out",
     "A minimum does not count. Other parameters would explain the data nearly as well. They lie far outside "
-    "of what `uncertainty` says of the plant.",
+    "the region of `uncertainty` for the plant.",
     "See whether `uncertainty` is right.",
 )
 FORESEEN = doubt(
@@ -140,7 +140,7 @@ def ruled_out(estimate: Estimate, found: Sequence[Rival]) -> list[Finding]:
     first = min(found, key=lambda one: one.excess)
     message = (
         f"{_parameters(estimate, first)}{_more(found)} would explain the data nearly as well "
-        f"({_higher(first)}), but is far outside of what uncertainty says of the plant, and does not count"
+        f"({_higher(first)}), but is far outside the uncertainty of the plant, and does not count"
     )
     return [RULED_OUT.found(message, where="uncertainty", excess=first.excess, minima=len(found))]
 
@@ -151,7 +151,7 @@ def foreseen_rivals(units: Units, estimate: Estimate, found: Sequence[Apart], re
         return []
     nearest = min(found, key=lambda one: one.rival.excess)
     message = (
-        "other parameters would explain such a record nearly as well: in a simulated one also "
+        "other parameters would explain this kind of record nearly as well: in a simulated one also "
         f"{_parameters(estimate, nearest.rival)}{_more(found)}, of which {_higher(nearest.rival)} and G "
         f"differs by {_far(units, nearest)}. Estimates may end there, whatever r_u says, and assess would "
         f"call such a record undecided: {remedy}"
@@ -162,7 +162,7 @@ def foreseen_rivals(units: Units, estimate: Estimate, found: Sequence[Apart], re
 def not_foreseen(reason: str) -> Finding:
     """Return the finding that other minima were not looked for, and why."""
     return NOT_FORESEEN.found(
-        f"{reason}: whether other dead times would explain such a record nearly as well was not looked at"
+        f"{reason}: whether other dead times would explain the record nearly as well was not examined"
     )
 
 

@@ -136,7 +136,7 @@ def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array
         ended = [f"{name} = {value:.4g}" for name, value in zip(names, theta, strict=True)]
         raise bad_spec(
             "not-exciting",
-            f"the data cannot tell these parameters apart: {taking_part(names, untold)}",
+            f"the data cannot distinguish these parameters: {taking_part(names, untold)}",
             hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; or "
             f"the search went astray ({taking_part(ended, untold)}): start elsewhere, beyond poles of "
             "expressions too",

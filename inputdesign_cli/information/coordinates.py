@@ -124,15 +124,15 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
         if len(even) and not triangular_factor(even)[1].size:
             raise InaccurateError.because(
                 "numerically-singular",
-                f"flat {excitation} does not tell these parameters apart in double precision: "
+                f"flat {excitation} does not distinguish these parameters in double precision: "
                 f"{taking_part(names, untold)}",
-                hint="nearly all that it tells stands next to a pole at the unit circle: leave those "
+                hint="nearly all its information stands next to a pole at the unit circle: leave those "
                 "frequencies out, with limits.band and spectrum: {type: multisine, ..}",
                 key="plant",
             )
         raise bad_spec(
             "not-identifiable",
-            f"no {excitation} can tell these parameters apart: {taking_part(names, untold)}",
+            f"no {excitation} can distinguish these parameters: {taking_part(names, untold)}",
             hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
             "order too high, and take it out; or list in plant.known what is known of them",
             key="plant",

@@ -159,7 +159,7 @@ def integrate(
         raise InaccurateError.because(
             "numerically-singular",
             "an integral of the information matrix did not settle: parameters have so nearly the same effect "
-            "on the samples that what tells them apart is rounding",
+            "on the samples that the difference between them is rounding",
             hint="look for dynamics much faster than the sampling, for orders too high, or for poles and "
             "zeros that nearly cancel; plant.known takes what need not be estimated",
             key="plant",

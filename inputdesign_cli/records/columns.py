@@ -297,7 +297,9 @@ def count_of(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
     first = [f"{x}{i + 1}" for x in "uy" for i in range(max(sum(name[0] == x for name in columns), 1))]
     kept = {channel: name for channel, name in columns.items() if channel in ("time", *first)}
     option = columns_option(sheet, kept, [channel for channel in first if channel not in columns])
-    raise sheet.error("data-missing-column", message, f"name them, or give their numbers, such as {option}")
+    raise sheet.error(
+        "data-missing-column", message, f"name them, or give their numbers, for example {option}"
+    )
 
 
 def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) -> str:

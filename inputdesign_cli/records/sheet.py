@@ -13,7 +13,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location
 
 _PLAIN = (
-    "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave "
+    "write plain numbers like -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave "
     "a cell empty where there is no value, and write 1 and 0 for ON and OFF"
 )
 

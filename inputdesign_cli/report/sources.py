@@ -45,7 +45,7 @@ def assumptions(question: Question, outcome: Outcome) -> list[str]:
     rests = "The design is best" if outcome.objective is not None else "The figures hold"
     if outcome.frequency_response is not None and outcome.frequency_response.method:
         said = [
-            "The plant is linear and in steady state; the noise is that which the scatter of the data tells."
+            "The plant is linear and in steady state; the noise is estimated from the scatter of the data."
         ]
     elif outcome.identification is not None:
         from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."

@@ -238,7 +238,7 @@ def _out_of_reach(excess: float) -> InfeasibleError:
     ratio = float(np.exp(excess))
     return InfeasibleError.because(
         "infeasible",
-        "no power is enough: the accuracy asks for parameters of which only the noise tells, and the "
+        "no power is enough: the accuracy asks for parameters that act on the noise only, and the "
         f"error stays at {ratio:.6g} times what is asked",
         f"take {ratio**2:.4g} times as many samples, or allow {ratio:.4g} times the error",
         "accuracy",

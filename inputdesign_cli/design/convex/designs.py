@@ -193,8 +193,8 @@ def check_excites(problem: Problem, start: Array) -> None:
     names = problem.experiment.unexcited(vectors[:, faint])
     raise bad_spec(
         "too-few-lines",
-        f"these lines cannot tell the parameters apart: nothing is learnt about {names}",
-        hint="each sinusoid tells at most two parameters apart (one at frequency 0 or pi): give more "
+        f"these lines cannot distinguish the parameters: nothing is learnt about {names}",
+        hint="each sinusoid determines at most two parameters (one at frequency 0 or pi): give more "
         "frequencies, or use type: free",
         key="spectrum",
     )
@@ -220,7 +220,7 @@ def _check_reachable(problem: Problem, start: Array) -> None:
             "no power of these lines reaches the accuracy: they excite only "
             f"{int(np.sum(excited > _UNEXCITED * excited[-1]))} combinations of the "
             f"{problem.experiment.size} parameters",
-            "each sinusoid tells at most two parameters apart: give more frequencies, or use type: free",
+            "each sinusoid determines at most two parameters: give more frequencies, or use type: free",
             "spectrum",
         )
 

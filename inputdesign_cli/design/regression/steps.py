@@ -21,7 +21,7 @@ _TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class Region:
-    """The shapes rho = origin + span x: all with P >= 0, or (`lines`) those of powers x >= 0 with sum one."""
+    """The shapes rho = origin + span x: all with P >= 0, or (`lines`) all by powers x >= 0 with sum one."""
 
     origin: Array
     span: NDArray[np.float64]

@@ -96,7 +96,7 @@ def check_assessable(task: Identification) -> None:
         raise bad_spec(
             "nothing-to-assess",
             "the spec states no accuracy that data could meet or miss",
-            hint="state one, such as accuracy: {model_error: {relative: 0.05}}",
+            hint="state one, for example accuracy: {model_error: {relative: 0.05}}",
             key="accuracy",
         )
 

@@ -221,7 +221,7 @@ def estimated(
     if task.earlier is not None and task.earlier.is_of_these_data(estimate.theta, estimate.factor):
         raise DataError.because(
             "data-repeated",
-            f"experiment.prior is the estimate from {first.name} itself: what that tells would count twice",
+            f"experiment.prior is the estimate from {first.name} itself: its information would count twice",
             "leave the prior out, or give only records that it was not made of",
             "experiment.prior",
         )

@@ -67,7 +67,7 @@ title: {json.dumps(f"The next experiment after {source}")}
 sample_time: {log.step!r}          # in time_unit; frequencies are in rad per time_unit
 time_unit: {log.time_unit}
 
-# What the record tells: {kind} ({structures}).
+# Known from the record: {kind} ({structures}).
 # {names}
 """
     for key, block in blocks.items():
