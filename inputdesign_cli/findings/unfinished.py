@@ -164,7 +164,7 @@ def floor_findings(floor: FloorUse | None, scenarios: int) -> list[Finding]:
         values = ", ".join(f"{name} {value:.4g}" for name, value in first.parameters.items())
         reaches = "" if first.peak is None else f" (|S| reaches {first.peak:.4g})"
         message = (
-            f"{lost} of {scenarios} plants miss what is asked even if they are known exactly, for example plant "
+            f"{lost} of {scenarios} plants miss what is asked even if they are known exactly, like plant "
             f"{first.scenario}{reaches}: {values}. Their r_adm is that of uncertainty.floor, {share} of "
             "that of the plant of the spec. No experiment makes this controller keep what is asked there: "
             "ask for less, take another controller, or state the plant more tightly (floor in result.json)"

@@ -24,7 +24,7 @@ _SINGULAR_PRICE = 1e-12
 
 
 class FaceSizes(NamedTuple):
-    """Up to order `whole` a face is the whole cone; else it has that number of generators, the first, which are kept."""
+    """Up to order `whole` a face is the whole cone; else the first generators are kept, this number of them."""
 
     whole: int = 28
     first: int = 16
