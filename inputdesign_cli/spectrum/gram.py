@@ -24,7 +24,7 @@ _SINGULAR_PRICE = 1e-12
 
 
 class FaceSizes(NamedTuple):
-    """Up to order `whole` a face is the whole cone; else the first generators are kept, this number of them."""
+    """Up to order `whole` a face is the whole cone; beyond it only the first generators are kept."""
 
     whole: int = 28
     first: int = 16
