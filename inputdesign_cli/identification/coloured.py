@@ -160,9 +160,10 @@ class ColouredKind(Kind):
             found.append((index, late_echo(known, one.power, lengths)))
         return tuple(found)
 
-    def caused(self, theta: Array, u: Array, begun: Array) -> Array:
-        """Return what inputs and the start cause in the plant, the start before it was filtered."""
-        return self.plant.caused(theta[: self._first], u, self.model.at(theta).shaped(begun))
+    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
+        """Return what inputs and the start cause in the plant, by errors before they were filtered."""
+        shaped = self.model.at(theta).shaped
+        return self.plant.caused(theta[: self._first], u, y, shaped(errors), shaped(begun))
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs of the plant can be simulated."""

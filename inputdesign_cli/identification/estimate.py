@@ -186,8 +186,9 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
 def _simulation(records: Records, point: Point, y: Array) -> Simulation:
     """Return the simulation of the inputs, and the part that unknown starts explain."""
     kind, lengths = records.kind, records.lengths
-    parts = split(records.u, point.near.begun, lengths)
-    outputs = np.concatenate([kind.caused(point.theta, *part) for part in parts]) + y - records.y
+    parts = zip(records.parts, split(point.errors, point.near.begun, lengths), strict=True)
+    caused = [kind.caused(point.theta, *signals, *errors) for signals, errors in parts]
+    outputs = np.concatenate(caused) + y - records.y
     fit = tuple(
         fit_percent(measured, explained, lengths) if runs else None
         for measured, explained, runs in zip(y.T, outputs.T, kind.simulates(point.theta), strict=True)

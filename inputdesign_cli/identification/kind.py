@@ -184,8 +184,8 @@ class Kind(ABC):
         """Return what past errors add to gradients at theta (k,), in records of `lengths`; None: unknown."""
         return ()
 
-    def caused(self, theta: Array, u: Array, begun: Array) -> Array:
-        """Return the response (N, p) to inputs, and to errors that the start of the record explains."""
+    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
+        """Return the response (N, p) to inputs, and to errors that the start explains: `begun`."""
         with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
             return np.asarray(sum(self.model.at(theta).simulate(u, begun, 1.0)))
 

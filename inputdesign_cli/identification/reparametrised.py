@@ -173,9 +173,9 @@ class ReparametrisedKind(Kind):
         moved = np.flatnonzero(np.any(self._moved[[index for index, _ in of_all]], axis=0)).tolist()
         return tuple((j, _weighed([(jacobian[index, j], one) for index, one in of_all])) for j in moved)
 
-    def caused(self, theta: Array, u: Array, begun: Array) -> Array:
+    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
         """Return what inputs and the start cause at the coefficients."""
-        return self.coefficients.caused(self._at(theta), u, begun)
+        return self.coefficients.caused(self._at(theta), u, y, errors, begun)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs can be simulated at the coefficients."""
