@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def mat_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
 def npz_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
     """For numpy: columns under their names, and `sample_time`."""
     buffer = io.BytesIO()
-    arrays = {name.split()[0]: values for name, values in channels.items()}
+    arrays: dict[str, Any] = {name.split()[0]: values for name, values in channels.items()}
     np.savez(buffer, **arrays, sample_time=sample_time)
     return buffer.getvalue()
 

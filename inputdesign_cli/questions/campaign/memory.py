@@ -112,7 +112,7 @@ def _read(directory: Path, withdrawing: int | None) -> Memory:
     names = {name for name in result.get("files", ()) if _KEPT.fullmatch(name) or name in (SPEC, SIGNAL)}
     with output_errors(directory):
         files = {name: read_regular(directory / name) for name in sorted(names)}
-    due = dict.fromkeys([RESULT, *(one.file for one in (*found.records, *found.plans))], "")
+    due = dict.fromkeys([RESULT, *(r.file for r in found.records), *(p.file for p in found.plans)], "")
     known = due | {**found.digests, SPEC: result.get("spec_sha256", ""), SIGNAL: result.get("signal_sha256")}
     out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
     now = {name: _sha256(content) for name, content in files.items()} | {RESULT: _decisions(campaign)}
