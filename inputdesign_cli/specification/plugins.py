@@ -8,13 +8,13 @@ what it asks for, and its `CODES` explain the errors that it raises.
 from __future__ import annotations
 
 from functools import cache, reduce
-from importlib.metadata import entry_points
 from operator import or_
 from typing import Annotated, get_args
 
 from pydantic.fields import FieldInfo
 
 from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.plugins import points
 from inputdesign_cli.specification.models.accuracy import Accuracy
 from inputdesign_cli.specification.models.loop import ClosedLoopError, Control
 from inputdesign_cli.specification.models.section import Section, optional
@@ -33,7 +33,7 @@ def added(group: str) -> dict[str, type[Section]]:
         SpecError: `bad-plug-in`, an entry point cannot be loaded, or is no section with a method `build`.
     """
     found: dict[str, type[Section]] = {}
-    for point in entry_points(group=f"idesign.{group}"):
+    for point in points(f"idesign.{group}").values():
         try:
             section = point.load()
         except Exception as error:  # whatever the code of another package raises
