@@ -105,6 +105,7 @@ def explain(
             autocompletion=error_codes,
         ),
     ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Explain all codes, one after the other.")] = False,
 ) -> None:
     """Explain the code of an error or of a finding.
 
@@ -113,7 +114,9 @@ def explain(
     from inputdesign_cli.error_codes import explanation
     from inputdesign_cli.findings import explanations
 
-    if code is None:
+    if every and code is None:
+        typer.echo("\n\n".join(explanation(name, explanations()) for name in sorted(explanations())))
+    elif code is None:
         known = sorted(explanations().items())
         typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
     else:

@@ -192,6 +192,9 @@ def test_explain(run):
     assert all(len(explanation(name, explanations())) > 40 for name in names)
     for name in (names[0], "yaml-syntax"):
         assert run("explain", name) == (0, explanation(name, explanations()) + "\n", "")
+    code, out, _ = run("explain", "--all")
+    assert code == 0
+    assert all(explanation(name, explanations()) in out for name in names)
     code, _, err = run("explain", "no-such-code")
     assert code == 2
     assert "no-such-code" in err
