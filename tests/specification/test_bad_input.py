@@ -45,7 +45,7 @@ ROWS: list[Row] = [
     ("empty-value", "plant.F", "no value", {"plant": "{B: [0, 1], §F: null}"}),
     ("empty-value", "accuracy.model_error.45", "decimal point", {
         "accuracy": "{model_error: {relative: 0.01, alpha: 2,§45}}"}),
-    ("duplicate-key", "plant.B", "twice, on line 3", {"plant": "{B: [0, 1], §B: [0, 2]}"}),
+    ("duplicate-key", "plant.B", "twice, on line 1", {"plant": "{B: [0, 1], §B: [0, 2]}"}),
     # kinds of values
     ("wrong-shape", "plant", "mapping", {"plant": "§3"}),
     ("wrong-shape", "noise", "mapping", {"noise": "§[1]"}),
