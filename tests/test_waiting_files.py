@@ -32,7 +32,9 @@ OPENED = {
         2,
         "a new file, which has the name of the process; a comparison of plain files",
     ),
+    "report/sources.py": (1, "a file of the package"),
     "sweeps/point.py": (1, "a temporary folder of its own"),
+    "wizard/questions.py": (1, "a file of the package"),
 }
 # Functions of ours with one of these names read by `read_regular`.
 OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.records.text"}

@@ -437,6 +437,6 @@ def _values(
     if varying:
         longest = max(tables[key].shape[1] for key in varying)
         rows = [np.pad(tables[key], ((0, 0), (0, longest - tables[key].shape[1]))) for key in varying]
-        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), -1, 1, q.size)
+        at_q = evaluate(np.concatenate(rows), q).reshape(len(varying), len(rows[0]), 1, q.size)
         found |= dict(zip(varying, at_q, strict=True))
     return found

@@ -49,7 +49,7 @@ _HINTS = {
 _TERMS = {
     r"\bnominal plant\b": "plant as stated",
     r"\bthe offset\b": "the operating point",
-    r"tune the controller .* or (?=ask for less)": "",
+    r"tune more slowly .* or (?=ask for less)": "",
     r"\bmax_sensitivity_db: ([\d.]+)": r"\1 dB",
     r"\bphase_margin: ([\d.]+)": r"\1 degrees",
     r"\bgain_margin: ([\d.]+)": r"gain margin \1",

@@ -166,10 +166,10 @@ def test_ellipsoid_in_continuous_time():
 def test_what_is_no_fraction_is_refused():
     error = "accuracy.model_error={relative: 0.1, region: ellipsoid}"
     both = ["plant.F=[[[1, 0.1], [1]], [[1], [1]]]"]
-    with pytest.raises(SpecError, match=r"\[1,1\] is not: it has both A and F"):
+    with pytest.raises(SpecError, match=r"\[1,1\] is not"):
         validate(load_spec(SPECS / "two_by_two_arx.yaml", [error, *both]))
     sampled = CONTINUOUS.replace("[1, 1]]]}}", "[1, 1]]]}, sample: zoh}").replace("[0, 2.0]", "[0, 3.0]")
-    with pytest.raises(SpecError, match="sampled from s"):
+    with pytest.raises(SpecError, match="linear in the parameters"):
         validate(parse_spec(sampled, overrides=["accuracy={}", error]))
 
 

@@ -93,7 +93,8 @@ def plain(value):
 
 def planned(spec):
     decision = questions.next_round(spec, Past((), 0, None, None, None, 1))
-    head = [decision.header.title, decision.header.units, decision.rules, decision.plan.cost]
+    header = decision.task.identification.header
+    head = [header.title, header.units, decision.task.rules, decision.plan.cost]
     return json.dumps([*map(repr, head), decision.part.columns], default=plain)
 
 

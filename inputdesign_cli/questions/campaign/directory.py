@@ -13,7 +13,12 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.findings.campaigns import campaign_refuted, planned_otherwise, withdrawn_record
+from inputdesign_cli.findings.campaigns import (
+    campaign_refuted,
+    earlier_pictures,
+    planned_otherwise,
+    withdrawn_record,
+)
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.outcome.campaign import Campaign, PartRecord, PlannedPart, Round
 from inputdesign_cli.outcome.curves import CampaignCurves, Curves, EstimateCurves, SignalCurves
@@ -331,7 +336,7 @@ def history(rounds: Sequence[Round], end: int) -> tuple[Table, dict[str, Curves]
 
 
 def with_earlier_pictures(results: Results, directory: Path) -> Results:
-    """Return the results with the pictures of the last decision.
+    """Return the results with the pictures of the last decision, and a finding that they are older.
 
     Raises:
         OutputError: a picture cannot be read.
@@ -339,4 +344,5 @@ def with_earlier_pictures(results: Results, directory: Path) -> Results:
     names = [name for name in listed_files(directory) if name.endswith(".png")]
     with output_errors(directory):
         pictures = {name: read_regular(directory / name) for name in names}
-    return replace(results, files={**results.files, **pictures})
+    outcome = results.outcome.saying(earlier_pictures(names))
+    return replace(results, outcome=outcome, files={**results.files, **pictures})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,9 +163,17 @@ def _entry(limit: PowerLimit, share: float) -> dict[str, object]:
 
 
 def explain(
-    units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound] = ()
+    units: Units,
+    question: Question,
+    unreachable: UnreachableError,
+    stated: Sequence[StatedBound],
+    samples_of_record: Callable[[int], int | None],
 ) -> InfeasibleError:
-    """Say the proof that came with the failure, by the numbers of the spec that can be loosened."""
+    """Say the proof that came with the failure, by the numbers of the spec that can be loosened.
+
+    Args:
+        samples_of_record: maps the samples that a spectrum takes to the length of a record, None if unknown.
+    """
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
     involved = bought.involved
@@ -184,7 +192,7 @@ def explain(
     try:  # that it is infeasible is proved, whatever else is found out
         with time_for_hints():
             parts += _what_would_do(unreachable, question, involved)
-            remedies += _remedies(question, nearest.objective)
+            remedies += _remedies(units, question, nearest.objective, samples_of_record)
     except OutOfTimeError:
         remedies.append("what else would do was not looked for further")
     message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
@@ -195,14 +203,20 @@ def explain(
     return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
 
 
-def _remedies(question: Question, times: float) -> Iterator[str]:
-    """Yield what meets the accuracy within the limits."""
+def _remedies(
+    units: Units, question: Question, times: float, samples_of_record: Callable[[int], int | None]
+) -> Iterator[str]:
+    """Yield what meets the accuracy within the limits; what takes longest to find out comes last."""
+    longer = None
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(times):
         # Within the same limits information grows in proportion to the length.
         longer = int(np.ceil(question.experiment.samples * times))
-        yield f"with {longer} samples a spectrum can, and a record with somewhat more"
+        yield f"with {longer} samples a spectrum can"
     if _within_reach_of_any(question):
         yield "spectrum: {type: free} can meet it"
+    enough = None if longer is None else samples_of_record(longer)
+    if enough is not None:
+        yield f"with {units.length(enough)} (and signal.samples, if stated) a record can"
 
 
 def _what_would_do(

@@ -43,6 +43,8 @@ _ROOM = 1.02
 _TOLERANCE = 1e-5
 # Number of candidates of a long record: luck averages out.
 _ENOUGH = 3
+# How often a length is tried, by how much more than a spectrum takes, up to where, and to which gap.
+_LENGTHS, _LONGER, _TRIED, _ROUGH = 4, 1.03, 20_000, 1e-4
 # No record of a length is made if its pilot needs more than this multiple of that length.
 _FAR_FROM = 1.03
 # Spectra are compared on this number of frequencies, by the share of their power that differs.
@@ -269,3 +271,32 @@ def _alike(request: RecordRequest, one: Design, other: Design) -> bool:
         return False
     shapes = [powers / np.einsum("naa->", powers).real for powers in lines]
     return float(np.abs(shapes[0] - shapes[1]).sum()) < _SAME_SHAPE
+
+
+def samples_of_record(request: RecordRequest, question: Question, samples: int) -> int | None:
+    """Return the length of a record that meets the accuracy, or None if none is found.
+
+    Args:
+        samples: the length at which a spectrum meets it.
+
+    Raises:
+        OutOfTimeError: see `seconds_left`.
+    """
+    for number in range(_LENGTHS):
+        samples = max(int(np.ceil(samples * _LONGER)), 2)
+        if samples > _TRIED:
+            return None
+        try:
+            design = solve_design(question.of_length(samples), tolerance=_ROUGH, any_spectrum_tolerance=None)
+        except UnreachableError:
+            return None
+        if number == 0 and samples > LONG:
+            record = _pilot(request, design, samples).record
+        else:
+            record = make_record(replace(request, samples=None), design, samples, first=True)
+        if record is None or not np.isfinite(record.worst_ratio):
+            return None
+        if record.met and len(record.samples) >= samples:
+            return samples
+        samples = max(int(np.ceil(len(record.samples) * record.worst_ratio**2)), samples)
+    return None

@@ -30,6 +30,7 @@ from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.robust import Plants, delivered_samples, without_dearest
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.outcome import Answer, Designed
+from inputdesign_cli.questions.least_cost.record_search import samples_of_record
 from inputdesign_cli.questions.least_cost.worst_case import with_worst_plants
 from inputdesign_cli.spectrum import PolynomialBasis, flat_basis, hvec, svec
 
@@ -155,12 +156,12 @@ class Sought:
             InaccurateError: the proof did not close, or nothing that meets everything was found in time.
         """
         if self.exact is None:
-            return self._designed(self.question, Confidence(self.alpha, self.alpha))
-        return self.exact.designed(self._designed, request)
+            return self._designed(request, self.question, Confidence(self.alpha, self.alpha))
+        return self.exact.designed(partial(self._designed, request), request)
 
-    def _designed(self, question: Question, confidence: Confidence) -> Designed:
+    def _designed(self, request: RecordRequest, question: Question, confidence: Confidence) -> Designed:
         solve = partial(
-            self._by_exchange if self.grid is None else self.grid.design,
+            partial(self._by_exchange, request) if self.grid is None else self.grid.design,
             tolerance=self.tolerance,
             any_spectrum_tolerance=self.any_spectrum_tolerance,
         )
@@ -179,7 +180,12 @@ class Sought:
         return Designed(self.header, question, answer, experiment, self.cost, confidence, kept, plants)
 
     def _by_exchange(
-        self, question: Question, *, tolerance: float, any_spectrum_tolerance: float | None
+        self,
+        request: RecordRequest,
+        question: Question,
+        *,
+        tolerance: float,
+        any_spectrum_tolerance: float | None,
     ) -> Answer:
         ended = None
         try:
@@ -187,7 +193,8 @@ class Sought:
                 question, tolerance=tolerance, any_spectrum_tolerance=any_spectrum_tolerance
             )
         except UnreachableError as unreachable:
-            raise explain(self.header.units, question, unreachable, self.stated) from unreachable
+            enough = partial(samples_of_record, request, question)
+            raise explain(self.header.units, question, unreachable, self.stated, enough) from unreachable
         except UnfinishedDesignError as unfinished:
             if self.exact is not None:  # it need not keep the confidence that alpha is sought for
                 raise
