@@ -11,31 +11,31 @@ from inputdesign_cli.finding import Finding, doubt, note, refuted
 RECORD_WITHOUT_EXCITATION = note(
     "record-without-excitation",
     "A record has no column of the reference. In closed loop the plan is the reference, column r. Without "
-    "it the record cannot be compared with its plan, which then gives its energy.",
+    "it no comparison with the plan is possible, and the energy is taken from the plan.",
     "Record r as well.",
 )
 RECORD_SHORTER = note(
     "record-shorter",
     "A record ends before its plan. The next plan makes up for the missing samples.",
-    "Nothing. If the record should be complete, withdraw it and give the complete one.",
+    "Nothing, or withdraw it and give the complete record.",
 )
 PART_REPEATED = doubt(
     "part-repeated",
     "An earlier part was applied again. The record follows another plan better than the current one. It was "
-    "accepted because of `--as-applied`.",
+    "accepted by `--as-applied`.",
     "If it was given by mistake, withdraw it with `--withdraw`: samples must not count twice.",
 )
 RECORD_UNLIKE_PLAN = doubt(
     "record-unlike-plan",
-    "A record does not follow its plan. It was accepted because of `--as-applied`. Estimates use the "
-    "recorded signals.",
+    "A record does not follow its plan. It was accepted by `--as-applied`. Estimates use the recorded "
+    "signals.",
     "If it was given by mistake, withdraw it with `--withdraw`.",
 )
 RECORD_SCALED = note(
     "record-scaled",
-    "A part was applied at another scale than planned. It was accepted because of `--as-applied`. Estimates "
-    "use the recorded signals.",
-    "If a column has the wrong unit, withdraw the record with `--withdraw` and give it in the right unit.",
+    "A part was applied at another scale than planned. It was accepted by `--as-applied`. Estimates use the "
+    "recorded signals.",
+    "If a column has the wrong unit, withdraw the record (`--withdraw`) and correct it.",
 )
 RECORD_WITHDRAWN = note(
     "record-withdrawn",
@@ -45,8 +45,8 @@ RECORD_WITHDRAWN = note(
 )
 RECORD_FOLLOWS_IN_PART = note(
     "record-follows-in-part",
-    "A record follows its plan only in part. Their correlation is below 0.9. Lost samples, clipping or "
-    "rounding are possible causes. Estimates use the recorded signals.",
+    "A record follows its plan only in part. Their correlation is below 0.9, perhaps by lost samples, "
+    "clipping or rounding. Estimates use the recorded signals.",
     "Compare the columns of the record with the plan.",
 )
 NO_ESTIMATE_YET = note(
@@ -67,9 +67,9 @@ CAMPAIGN_DOUBTED = doubt(
 )
 CAMPAIGN_REFUTED = refuted(
     "campaign-refuted",
-    "The campaign ends because the data refute the model. Tests of the residuals after every part refute "
-    "its structure. More samples of the same experiment would not help.",
-    "Look for another structure with `idesign explore`, or use `idesign next DIR --regardless`.",
+    "The campaign ends because the data refute the model. Tests of the residuals refute its structure. More "
+    "samples of the same experiment would not help.",
+    "Try `idesign explore` for another structure, or `idesign next DIR --regardless`.",
 )
 PART_WITHOUT_DESIGN = note(
     "part-without-design",
@@ -84,14 +84,14 @@ PLAN_CAPPED = note(
 )
 PART_SCALED = note(
     "part-scaled",
-    "The next part is weaker than its plan. Its power is reduced so that a sample costs at most "
-    "`campaign.power_cap`, at the estimate and at the plant of the spec.",
+    "The next part is weaker than its plan. Otherwise a sample would cost more than `campaign.power_cap`, "
+    "at the estimate or at the plant of the spec.",
     "Raise `campaign.power_cap` if the plant can bear it.",
 )
 EARLIER_PARTS_COST = note(
     "earlier-parts-cost",
-    "Earlier parts make the next one expensive. The plant still responds to them while the next part is "
-    "applied. A sample then costs more than `campaign.power_cap` allows.",
+    "Earlier parts make the next one expensive. The plant still responds to them. A sample then costs more "
+    "than `campaign.power_cap` allows.",
     "Wait until the plant is at rest, or accept the cost.",
 )
 PART_NOT_ROBUST = note(

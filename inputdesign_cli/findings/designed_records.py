@@ -32,8 +32,8 @@ RECORD_MISSES = doubt(
 )
 RECORD_DEAR = doubt(
     "record-dear",
-    "The record costs far more than the spectrum. A record that is short beside dead times and time "
-    "constants loses the response after its last sample.",
+    "The record costs far more than the spectrum. A short record loses the response after its last sample, "
+    "because of dead times and time constants.",
     "Take more samples.",
 )
 RECORD_LONGER = note(
@@ -50,8 +50,8 @@ RECORD_LESS_ACCURATE = note(
 )
 RECORD_MISSES_SIDE = doubt(
     "record-misses-requirement",
-    "The record misses a requirement that the design meets. It is a requirement beside the accuracy for "
-    "which the record is sought.",
+    "The record misses a requirement that the design meets. The search for the record aims at another "
+    "requirement.",
     "Take more samples, or loosen the requirement.",
 )
 START_MATTERS = doubt(

@@ -145,7 +145,7 @@ def met_within_table(error: float) -> Finding:
 LIMIT_NOT_KEPT = doubt(
     "limit-not-kept",
     "The given excitation breaks a limit. It is analysed unchanged. Its powers, samples and length are "
-    "compared with `limits`, and each exceeded limit is named.",
+    "compared with `limits`.",
     "Scale or shorten the excitation, or widen the limit.",
 )
 

@@ -21,27 +21,27 @@ _NORMAL = 1.96  # 95 % of a Gaussian estimate
 
 NOT_SETTLED = unsure(
     "search-not-settled",
-    "The search for the estimate did not converge. It still moved at its last step. The estimate may be far "
-    "from the minimum.",
+    "The search for the estimate did not converge. It still moved at its last step, perhaps far from the "
+    "minimum.",
     "Lower the orders, which may be too high for these data, or start nearer to the plant.",
     "unsettled",
 )
 STOPPED = unsure(
     "stopped-at-an-end",
-    "The search stopped where an expression ceases to exist. Beyond the estimate an expression of the spec "
-    "is not defined. The likeliest parameters may lie there, and the standard deviation is unreliable.",
-    "Write the expression so that it is defined for every possible plant.",
+    "The search stopped at the boundary of an expression. Beyond the estimate an expression of the spec is "
+    "not defined. The likeliest parameters may lie there, and the standard deviation is unreliable.",
+    "Rewrite it so that it is defined for every possible plant.",
     "unsettled",
 )
 START = note(
     "start-estimated",
-    "The initial state of a record was estimated too. The record may not begin at rest about zero. The "
-    "level of each output and the initial state cost some accuracy.",
+    "The initial state of a record was estimated too. The record may not begin at rest about zero. Output "
+    "levels and initial state cost some accuracy.",
     "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
 )
 ON_CIRCLE = doubt(
     "noise-on-the-circle",
-    "A noise polynomial has a root on the unit circle. The covariance is unreliable there. A design would "
+    "A noise polynomial has a root on the unit circle. The covariance is unreliable, and a design would "
     "assume noise that vanishes or never decays.",
     "Take more data, or a lower order.",
 )
@@ -65,8 +65,8 @@ UNASKED = unsure(
 )
 LARGER_NOISE = note(
     "noise-estimated-along",
-    "The noise has more structure than the spec says. Small orders of C and D were therefore estimated too. "
-    "All tests, the covariance and the verdict hold for this larger model.",
+    "The noise has more structure than the spec says. Small orders of C and D were estimated too. Tests, "
+    "covariance and verdict hold for this larger model.",
     "Copy `noise` from `model.yaml` into the spec, because the next design depends on it.",
 )
 

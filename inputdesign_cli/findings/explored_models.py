@@ -33,26 +33,25 @@ UNJUDGED = doubt(
 )
 EXPLAINS_LITTLE = doubt(
     "simulation-explains-little",
-    "The simulation explains next to nothing. The validation part of the record is simulated from the "
-    "inputs alone. The model explains no more of it than chance would.",
+    "The simulation explains next to nothing. From the inputs alone, the model explains no more of the "
+    "validation part than chance would.",
     "Move the inputs more, or record for longer.",
 )
 UNRELATED = doubt(
     "inputs-unrelated",
-    "The inputs do not help to predict an output. Two signals that wander, drift or follow one cycle can "
-    "agree for long without any causal link. The prediction errors of the output do not depend on the "
-    "inputs.",
+    "The inputs do not help to predict an output. Signals that wander, drift or share a cycle agree for "
+    "long without any link. The prediction errors of the output do not depend on the inputs.",
     "Move the inputs by steps of your own, at times that nothing else follows.",
 )
 UNEXPLAINED = doubt(
     "structure-unexplained",
     "No tested structure explains an output. The simulation explains less than half of it, and tests refute "
-    "the model. The plant may be nonlinear, vary with time, or have unrecorded inputs.",
+    "the model. The plant may be nonlinear, time-varying, or have unrecorded inputs.",
     "Record about one operating point, or record what else acts on the output.",
 )
 LIKE_INTEGRATOR = doubt(
     "like-integrator",
-    "The plant may be an integrator. G rises towards the lowest frequencies of the record. Such a record "
+    "The plant may be an integrator. G rises towards the lowest frequencies of the record. The record "
     "determines only the slope, not static gain and time constant.",
     "Record until the output settles. If it never does, use `idesign explore DATA --structure integrator`.",
 )

@@ -33,8 +33,8 @@ WITHOUT_MODEL = note(
 )
 BIASED = doubt(
     "response-biased-by-loop",
-    "The response without a model is biased towards -1/C. The data come from a loop without a recorded "
-    "reference. Where noise is strong, the ratio of y to u shows the inverse controller.",
+    "The response without a model is biased towards -1/C. The reference of the loop is not recorded. Where "
+    "noise is strong, the ratio of y to u shows the inverse controller.",
     "Record the reference as column r.",
 )
 CONTRADICTED = doubt(
@@ -47,13 +47,13 @@ UNEXCITED = doubt(
     "unexcited-lines",
     "The inputs do not excite some lines of the spec. Their power there is only rounding or noise, and the "
     "response is not measured.",
-    "Apply the signal of the spec, and record the inputs as they were applied.",
+    "Apply the signal of the spec, and record the applied inputs.",
 )
 DIFFERING = doubt(
     "inputs-do-not-repeat",
     "The inputs differ from period to period. More than half of their power does not repeat, contrary to "
     "the spec.",
-    "Apply the signal of the spec, and record the inputs as they were applied.",
+    "Apply the signal of the spec, and record the applied inputs.",
 )
 LEFT_OUT = note(
     "samples-before-periods",
@@ -65,7 +65,7 @@ PIECES = note(
     "periods-between-gaps",
     "Only periods without a gap count. They are the whole periods of one phase between the gaps, after the "
     "transient.",
-    "Record without gaps if more periods are needed.",
+    "Record without gaps, if more are needed.",
 )
 START = doubt(
     "start-shifts-response",

@@ -33,9 +33,9 @@ MATTERS = doubt(
 )
 RESTS_ON_STRUCTURE = note(
     "verdict-rests-on-structure",
-    "The verdict depends on the model structure. The data do not exclude one more parameter, or a gain that "
-    "changes steadily. It could change G by more than the admissible error, and at most as the message says "
-    "(95 %).",
+    "The verdict depends on the model structure. One more parameter, or a steadily changing gain, could "
+    "change G by more than the admissible error. The data do not exclude it. The message gives its largest "
+    "effect (95 %).",
     "If the structure is not known from physics, excite the frequencies where G would change.",
 )
 

@@ -35,8 +35,8 @@ PRIOR_CONTRADICTED = refuted(
 )
 PRIOR_REPEATED = refuted(
     "prior-of-these-data",
-    "The prior seems to come from these data. Prior and data agree more closely than two independent "
-    "records. The same samples would count twice.",
+    "The prior seems to come from these data. They agree more closely than independent records. The same "
+    "samples would count twice.",
     "Remove the prior, or give only records that it does not include.",
 )
 RECORDS_DIFFER = refuted(
@@ -47,7 +47,7 @@ RECORDS_DIFFER = refuted(
 )
 SAMPLES_REPEATED = refuted(
     "samples-repeated",
-    "Two files have rows in common. Samples that count twice make an estimate look more accurate than it is.",
+    "Two files have rows in common. The estimate would look more accurate than it is.",
     "Give each sample once.",
 )
 

@@ -25,8 +25,8 @@ SPIKES_REPLACED = note(
 )
 SENSOR_SATURATED = note(
     "sensor-saturated",
-    "An output stays at its largest or smallest value. A sensor at the end of its range shows one value "
-    "while the plant moves on. At least two per cent of the samples lie there, in runs of three or more.",
+    "An output stays at its largest or smallest value. At least two per cent of the samples lie there, in "
+    "runs of three or more. The sensor may be at the end of its range.",
     "Leave these rows out with `--without`, or measure with another range.",
 )
 SENSOR_ROUNDED = note(

@@ -157,15 +157,15 @@ SPIKES = unsure(
 )
 DRIFT = unsure(
     "drifting-periods",
-    "Outputs drift from period to period. The means of the periods follow a polynomial in time. A drift "
-    "leaks into every line and changes the response or its scatter.",
+    "Outputs drift from period to period. The means of the periods follow a polynomial in time. Drift leaks "
+    "into every line and changes the response or its scatter.",
     "Add `--detrend linear`, or subtract the slow trend from the column first.",
     "drift",
 )
 CHANCE = unsure(
     "response-within-chance",
-    "The scatter of the periods leaves the verdict open. Two limits contain the true deviation, with 95 % "
-    "for all lines together. The admissible error lies between these limits.",
+    "The scatter of the periods leaves the verdict open. The admissible error lies between two limits for "
+    "the true deviation (95 % for all lines together).",
     "Record as many periods as the finding names.",
     "chance",
 )

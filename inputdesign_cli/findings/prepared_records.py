@@ -27,7 +27,7 @@ JITTER_EVENED = note(
     "jitter-evened-out",
     "Times were made uniform. Outputs are interpolated linearly; inputs are held, so the nearest sample "
     "counts. Steps may differ by 25 % of the sample time, with `--resample` by more.",
-    "Nothing. An estimate from a logger with less jitter is more accurate.",
+    "Nothing. Less jitter would give a more accurate estimate.",
 )
 INPUTS_MOVE_BETWEEN = doubt(
     "inputs-move-between-samples",

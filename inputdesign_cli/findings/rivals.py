@@ -39,8 +39,7 @@ FORESEEN = doubt(
 )
 NOT_FORESEEN = note(
     "other-minima-not-looked-at",
-    "Other minima were not searched for. A plant with dead times may have some, whole periods away. The "
-    "message gives the reason.",
+    "Other minima were not searched for. A plant with dead times may have some, whole periods away.",
     "Allow more time, or try `idesign simulate`.",
 )
 

@@ -39,7 +39,7 @@ ONE_MINIMUM = note(
 UNSTABLE = doubt(
     "unstable-runs",
     "Controllers of some simulated runs destabilise the loop. Each run designs a controller from its "
-    "estimate. If the true loop is unstable, the loss is infinite, and means exclude this run.",
+    "estimate. Means exclude runs with an unstable true loop, whose loss is infinite.",
     "Take more samples or more power, or ask for a slower loop.",
 )
 

@@ -17,13 +17,13 @@ DESIGN_UNFINISHED = doubt(
 OTHER_SPECTRA_LEFT_OUT = note(
     "other-spectra-left-out",
     "There is no bound over every spectrum yet. The design is proved the best of its type of spectrum. "
-    "Other types were not compared, for lack of time or because the comparison was not requested.",
+    "Other types were not compared (no time, or not requested).",
     "Allow more time, leave out `--fast`, or write `solver.any_spectrum: true`.",
 )
 NO_BOUND_EXISTS = note(
     "no-bound-over-spectra",
-    "There is no bound over every spectrum. Some excitation gives information without cost or limit. "
-    "Spectra can approach it endlessly, each better than the last.",
+    "There is no bound over every spectrum. Some excitation gives information without cost or limit. Ever "
+    "better spectra approach it.",
     "Give this excitation a cost or a limit, or exclude its frequency by `limits.band`.",
 )
 ONLY_APPROACHED = doubt(
@@ -34,8 +34,7 @@ ONLY_APPROACHED = doubt(
 )
 NO_RECORD_IN_TIME = doubt(
     "no-record-in-time",
-    "There was no time for a record. The spectrum of the design is complete, but the search found no record "
-    "of it in time.",
+    "There was no time for a record. The spectrum is complete, but no record of it was found.",
     "Allow more time, or try fewer records (`signal.candidates`) or shorter ones (`signal.samples`).",
 )
 ON_GRID = doubt(
@@ -113,7 +112,7 @@ def on_grid(lines: int, ratio: float) -> Finding:
 FRESH_PLANTS_CUT = note(
     "fresh-plants-cut-short",
     "The trial on new plants was cut short. It includes fewer plants than `uncertainty.fresh`. The 95 % "
-    "limits count only these.",
+    "limits hold for these.",
     "Allow more time.",
 )
 DRAWS_UNSTABLE = doubt(

@@ -27,9 +27,9 @@ ANSWERING = refuted(
 )
 LATE = refuted(
     "input-logged-late",
-    "An output moves before the input. It precedes the input that moves it by some samples. The input was "
-    "logged late, or the columns use different clocks.",
-    "Find out when the plant really gets its input, and log both at the same times.",
+    "An output moves before the input. The input was logged some samples late, or the columns use different "
+    "clocks.",
+    "Find out when the plant really gets its input, and log both together.",
 )
 IDLE = refuted(
     "input-without-effect",
@@ -39,8 +39,8 @@ IDLE = refuted(
 )
 UNEXPLAINED = doubt(
     "output-unexplained",
-    "The inputs do not explain an output. The simulation from the inputs alone fits it worse than its mean. "
-    "No effect of the inputs can be distinguished from zero.",
+    "The inputs do not explain an output. Their simulation fits it worse than its mean. No effect can be "
+    "distinguished from zero.",
     "Check that the columns belong to the plant, in the right order and units.",
 )
 NOISE_PREVAILS = note(
