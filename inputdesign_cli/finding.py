@@ -61,7 +61,7 @@ class FindingKind:
     """A kind of finding: its code, its usual severity, and its explanation.
 
     Attributes:
-        title: a phrase of a few words.
+        title: a short statement that begins with a capital letter.
         text: what it means and how it is found.
         remedy: what to do about it.
         cause: why nothing is decided where a finding is `undecided`; what refutes, contradicts.
@@ -96,7 +96,7 @@ class FindingKind:
 def _kind(severity: Severity, code: str, text: str, remedy: str, cause: str = "undetermined") -> FindingKind:
     """Return a kind whose title is the first sentence of its text."""
     title, _, rest = text.partition(". ")
-    return FindingKind(code, severity, title[0].lower() + title[1:].rstrip("."), rest or text, remedy, cause)
+    return FindingKind(code, severity, title.rstrip("."), rest or text, remedy, cause)
 
 
 note, doubt, unsure, refuted = (partial(_kind, severity) for severity in Severity)

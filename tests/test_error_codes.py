@@ -11,6 +11,7 @@ import pytest
 import inputdesign_cli
 from inputdesign_cli.error_codes import explanation, explanations
 from inputdesign_cli.errors import SpecError
+from tests.support.wording import long_sentences, unclear_words
 
 PACKAGE = Path(inputdesign_cli.__file__).parent
 MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "PathDiagnostic", "stop", "_error", "because"}
@@ -71,10 +72,12 @@ def test_no_code_is_explained_in_vain():
 def test_explanations_are_complete():
     for code, entry in explanations().items():
         assert CODE.fullmatch(code), code
-        assert entry.title
+        assert entry.title[0].isupper(), code
         assert not entry.title.endswith("."), code
         assert entry.text.endswith("."), code
         assert entry.remedy.endswith("."), code
+        assert long_sentences(f"{entry.text} {entry.remedy}") == [], code
+        assert unclear_words(f"{entry.title}. {entry.text} {entry.remedy}") == [], code
 
 
 def test_no_code_is_explained_twice():

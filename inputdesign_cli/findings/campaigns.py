@@ -10,43 +10,43 @@ from inputdesign_cli.finding import Finding, doubt, note, refuted
 
 RECORD_WITHOUT_EXCITATION = note(
     "record-without-excitation",
-    "A record has no column of the reference. In closed loop the plan is a reference, column r. Without it "
-    "the record cannot be compared with its plan, and its energy is taken from the plan.",
+    "A record has no column of the reference. In closed loop the plan is the reference, column r. Without "
+    "it no comparison with the plan is possible, and the energy is taken from the plan.",
     "Record r as well.",
 )
 RECORD_SHORTER = note(
     "record-shorter",
-    "A record ends before its plan does. The next plan makes up for the samples that were not recorded.",
-    "Nothing, unless the record should be complete: then withdraw it and give the whole one.",
+    "A record ends before its plan. The next plan makes up for the missing samples.",
+    "Nothing, or withdraw it and give the complete record.",
 )
 PART_REPEATED = doubt(
     "part-repeated",
-    "An earlier part was applied once more. The record follows another plan better than the one that was "
-    "due. It was taken because of --as-applied.",
-    "Withdraw the record with --withdraw if it was given by mistake: samples must not count twice.",
+    "An earlier part was applied again. The record follows another plan better than the current one. It was "
+    "accepted by `--as-applied`.",
+    "If it was given by mistake, withdraw it with `--withdraw`: samples must not count twice.",
 )
 RECORD_UNLIKE_PLAN = doubt(
     "record-unlike-plan",
-    "A record does not follow its plan. It was taken because of --as-applied. Estimates use what was "
-    "recorded.",
-    "Withdraw the record with --withdraw if it was given by mistake.",
+    "A record does not follow its plan. It was accepted by `--as-applied`. Estimates use the recorded "
+    "signals.",
+    "If it was given by mistake, withdraw it with `--withdraw`.",
 )
 RECORD_SCALED = note(
     "record-scaled",
-    "A part was applied at another scale than planned. It was taken because of --as-applied. Estimates use "
-    "what was recorded.",
-    "Withdraw the record with --withdraw if a column is in another unit, and give it in the right one.",
+    "A part was applied at another scale than planned. It was accepted by `--as-applied`. Estimates use the "
+    "recorded signals.",
+    "If a column has the wrong unit, withdraw the record (`--withdraw`) and correct it.",
 )
 RECORD_WITHDRAWN = note(
     "record-withdrawn",
-    "A record does not count any more. Its samples were applied, so that its length and energy remain part "
-    "of the campaign. Its file stays.",
+    "A withdrawn record no longer counts. Its length and energy remain part of the campaign, because its "
+    "samples were applied. Its file stays.",
     "Nothing.",
 )
 RECORD_FOLLOWS_IN_PART = note(
     "record-follows-in-part",
-    "A record follows its plan in part. Their correlation is below 0.9. Lost samples, clipping or rounding "
-    "are possible causes. Estimates use what was recorded.",
+    "A record follows its plan only in part. Their correlation is below 0.9, perhaps by lost samples, "
+    "clipping or rounding. Estimates use the recorded signals.",
     "Compare the columns of the record with the plan.",
 )
 EARLIER_PICTURES = note(
@@ -62,49 +62,49 @@ NO_ESTIMATE_YET = note(
 )
 ESTIMATE_NOT_USED = doubt(
     "estimate-not-used",
-    "The estimate is not used as it is. The accuracy cannot be evaluated there, for instance because the "
-    "loop is unstable. The plan is made on the way to it from the last usable estimate.",
-    "Apply the next part. If it happens again, look at the records and at the structure of the model.",
+    "The next plan does not use the estimate itself. The accuracy cannot be evaluated there, for instance "
+    "because the loop is unstable. The plan uses a model between the last usable estimate and this one.",
+    "Apply the next part. If it happens again, check the records and the model structure.",
 )
 CAMPAIGN_DOUBTED = doubt(
     "campaign-doubted",
-    "The records speak against the model. The campaign goes on, but if it ended now it would end undecided.",
-    "See whether the structure of the model should change before more is applied.",
+    "The records cast doubt on the model. The campaign continues. If it ended now, it would be undecided.",
+    "Check the model structure before you apply more.",
 )
 CAMPAIGN_REFUTED = refuted(
     "campaign-refuted",
-    "The campaign ends because the data refute the model. Tests of the residuals after every part refute "
-    "its structure. More samples of the same experiment would not mend that.",
-    "Look for another structure with `idesign explore`, or use `idesign next DIR --regardless`.",
+    "The campaign ends because the data refute the model. Tests of the residuals refute its structure. More "
+    "samples of the same experiment would not help.",
+    "Try `idesign explore` for another structure, or `idesign next DIR --regardless`.",
 )
 PART_WITHOUT_DESIGN = note(
     "part-without-design",
-    "The next part is white noise. At the present estimate no experiment meets what is asked.",
-    "Apply the part. If it happens again, look at the structure of the model and at the limits.",
+    "The next part is white noise. At the present estimate no experiment meets the requirements.",
+    "Apply the part. If it happens again, check the model structure and the limits.",
 )
 PLAN_CAPPED = note(
     "plan-capped",
-    "The plan misses the accuracy that is asked. A sample may cost at most campaign.power_cap times a "
-    "sample of the first plan (default: 10), and the campaign ends after campaign.max_samples.",
-    "Raise campaign.power_cap, campaign.max_samples or a limit, or ask for less.",
+    "The plan misses the required accuracy. A sample may cost at most `campaign.power_cap` (default 10) "
+    "times a sample of the first plan. The campaign ends after `campaign.max_samples`.",
+    "Raise `campaign.power_cap`, `campaign.max_samples` or a limit, or ask for less accuracy.",
 )
 PART_SCALED = note(
     "part-scaled",
-    "The next part is weaker than its plan. Its power is lowered so that a sample costs no more than "
-    "campaign.power_cap, at the estimate and at the plant of the spec.",
-    "Raise campaign.power_cap if the plant can bear it.",
+    "The next part is weaker than its plan. Otherwise a sample would cost more than `campaign.power_cap`, "
+    "at the estimate or at the plant of the spec.",
+    "Raise `campaign.power_cap` if the plant can bear it.",
 )
 EARLIER_PARTS_COST = note(
     "earlier-parts-cost",
-    "Earlier parts make the next one expensive. They still move the plant while it is applied. With that a "
-    "sample costs more than campaign.power_cap allows.",
+    "Earlier parts make the next one expensive. The plant still responds to them. A sample then costs more "
+    "than `campaign.power_cap` allows.",
     "Wait until the plant is at rest, or accept the cost.",
 )
 PART_NOT_ROBUST = note(
     "part-not-robust",
-    "The last part is planned for the estimate alone. For some plant that the data leave open no experiment "
-    "within campaign.power_cap and `limits` is enough.",
-    "Raise campaign.power_cap or a limit, or write campaign.last: nominal.",
+    "The last part is planned for the estimate alone. For some plant that the data do not exclude, no "
+    "experiment within `campaign.power_cap` and `limits` is enough.",
+    "Raise `campaign.power_cap` or a limit, or write `campaign.last: nominal`.",
 )
 _NEARLY = 0.9  # a part of less than this share of its power is named
 

@@ -15,56 +15,55 @@ _DEAR = 1.0  # beyond the cost of the design, relative to it
 
 RECORD_TOO_LONG = note(
     "record-not-computed",
-    "No record this long is computed. The experiment has more samples than the longest record that is "
+    "The experiment is too long to compute its record. It has more samples than the longest record that is "
     "computed for this model.",
-    "Set a shorter record by `signal.samples`.",
+    "Set a shorter record with `signal.samples`.",
 )
 RECORD_UNDETERMINED = doubt(
     "record-undetermined",
-    "The record does not determine all parameters. To working precision the samples do not determine all "
-    "parameters. Their accuracy cannot be computed.",
+    "The record does not determine all parameters. Its information matrix is singular to working precision, "
+    "so that the accuracy cannot be computed.",
     "Take more samples (`signal.samples`), or a model of lower order.",
 )
 RECORD_MISSES = doubt(
     "record-misses-accuracy",
-    "The record misses the accuracy. The largest ratio of r_u to r_adm by the samples of the record exceeds "
-    "one.",
+    "The record misses the accuracy. The largest ratio r_u/r_adm of its samples exceeds one.",
     "Take more samples, or allow more power.",
 )
 RECORD_DEAR = doubt(
     "record-dear",
-    "The record costs far more than the spectrum. A record that is short beside dead times and time "
-    "constants loses what it causes after its last sample.",
+    "The record costs far more than the spectrum. A short record loses the response after its last sample, "
+    "because of dead times and time constants.",
     "Take more samples.",
 )
 RECORD_LONGER = note(
     "record-longer",
-    "Limits on single samples take a longer record. The spectrum alone would take fewer samples. The length "
-    "was found by trying; it is not proved.",
-    "Nothing, or widen the limit on single samples that the record takes most of.",
+    "Limits on single samples require a longer record. The spectrum alone needs fewer samples. The length "
+    "was found by trial, without proof.",
+    "Nothing, or widen the limit on single samples that the record uses most.",
 )
 RECORD_LESS_ACCURATE = note(
     "record-less-accurate",
-    "The record reaches less than the design. The accuracy of the design is that of its spectrum. The "
-    "samples reach less by their length or by limits on single samples.",
+    "The record is less accurate than the design. The accuracy of the design holds for its spectrum. The "
+    "finite length or limits on single samples reduce it.",
     "Take more samples, or more candidates (`signal.candidates`).",
 )
 RECORD_MISSES_SIDE = doubt(
     "record-misses-requirement",
-    "The record misses a requirement that the design meets. The samples of the record miss a requirement "
-    "beside the accuracy that is sought.",
+    "The record misses a requirement that the design meets. The search for the record aims at another "
+    "requirement.",
     "Take more samples, or loosen the requirement.",
 )
 START_MATTERS = doubt(
     "start-from-rest",
-    "The record relies on its start from rest. The errors of the record would be larger if its start were "
-    "unknown. Spectra have no start.",
-    "Keep the plant at rest before the record, and take inputs and outputs from their levels there.",
+    "The record relies on its start from rest. Its errors would be larger if the initial state were "
+    "unknown. Spectra have no initial state.",
+    "Keep the plant at rest before the record. Measure inputs and outputs from their levels there.",
 )
 OTHER_SIGNAL = note(
     "other-signal",
-    "The record is of another kind or spectrum than was asked for. No record of the first choice was found "
-    "that meets the accuracy within the limits on single samples.",
+    "The record has another kind or spectrum than requested. No record of the first choice met the accuracy "
+    "within the limits on single samples.",
     "Nothing, or state `signal.type`.",
 )
 

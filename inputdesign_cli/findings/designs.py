@@ -27,38 +27,37 @@ _SUPPORT = 1e-3
 
 NOTHING_NEEDED = note(
     "no-excitation-needed",
-    "No excitation is needed. The noise in normal operation, or what is known before, meets the accuracy "
-    "that is asked for.",
+    "No excitation is needed. The noise in normal operation or prior knowledge meets the required accuracy.",
     "Estimate the model from a record of normal operation, or ask for more accuracy.",
 )
 INPUT_WITHOUT_POWER = doubt(
     "input-without-power",
-    "The design does not excite an input. Criterion T adds up the information of all parameters. It can be "
-    "largest where an input has no power.",
-    "Take criterion D, A or E, which ask for every parameter.",
+    "The design does not excite an input. Criterion T adds up the information of all parameters. It may be "
+    "largest without power in an input.",
+    "Take criterion D, A or E, which require information on every parameter.",
 )
 EXPERIMENT_SHORT = doubt(
     "experiment-short",
-    "The experiment ends before the slowest mode settles. The accuracy of a spectrum is that of long "
-    "records. A short record may reach less or more.",
-    "Compare with what the record reaches by its own samples, and run `idesign simulate`.",
+    "The experiment ends before the slowest mode settles. The accuracy of a spectrum holds for long "
+    "records. A short record may be more or less accurate.",
+    "Compare with the accuracy of the samples of the record, and run `idesign simulate`.",
 )
 SIGN_OPEN = doubt(
     "error-as-large-as-plant",
-    "The admissible error is as large as the plant. The admissible error is not below the gain of the plant "
-    "at any frequency of its band.",
-    "Ask for less error. A `relative` error of 0.1 means 10 %.",
+    "The admissible error is as large as the plant. It is at least the gain of the plant at every frequency "
+    "of its band.",
+    "Ask for a smaller error. A `relative` error of 0.1 means 10 %.",
 )
 EXCITATION_FREE = note(
     "excitation-almost-free",
-    "Power at low frequencies costs next to nothing. A loop with integral action suppresses slow "
-    "excitation, so that it hardly costs anything. The power of the optimal excitation is then ill defined.",
+    "Power at low frequencies costs almost nothing. A loop with integral action suppresses slow excitation. "
+    "The power of the optimal excitation is then ill defined.",
     "Give `cost.excitation_power` a small weight, or limit it.",
 )
 MET_WITHIN_TABLE = note(
     "met-within-table",
-    "What is asked is met as far as the table describes the spectrum. A table gives a spectrum by its rows, "
-    "and straight lines between them. The error of that decides whether what is asked is met.",
+    "Interpolation of the table decides whether the requirement is met. A table gives a spectrum by its "
+    "rows and straight lines between them. The verdict is within the error of this interpolation.",
     "Give the table more rows.",
 )
 
@@ -145,8 +144,8 @@ def met_within_table(error: float) -> Finding:
 
 LIMIT_NOT_KEPT = doubt(
     "limit-not-kept",
-    "The given excitation breaks a limit. An excitation that is given is analysed as it stands. Its powers, "
-    "its samples and its length are compared with `limits`. Each limit that it exceeds is named.",
+    "The given excitation breaks a limit. It is analysed unchanged. Its powers, samples and length are "
+    "compared with `limits`.",
     "Scale or shorten the excitation, or widen the limit.",
 )
 

@@ -21,35 +21,35 @@ _NORMAL = 1.96  # 95 % of a Gaussian estimate
 
 NOT_SETTLED = unsure(
     "search-not-settled",
-    "The search for the estimate did not settle. It still moved at its last step. The estimate may be far "
-    "from the minimum.",
-    "Lower the orders, which may be too high for these data, or begin nearer to the plant.",
+    "The search for the estimate did not converge. It still moved at its last step, perhaps far from the "
+    "minimum.",
+    "Lower the orders, which may be too high for these data, or start nearer to the plant.",
     "unsettled",
 )
 STOPPED = unsure(
     "stopped-at-an-end",
-    "The search stopped where an expression ends. Beyond the estimate an expression of the spec is not "
-    "defined. The likeliest parameters may lie there, and the deviation is not to be trusted.",
-    "Write the expression so that it is defined wherever the plant may be.",
+    "The search stopped at the boundary of an expression. Beyond the estimate an expression of the spec is "
+    "not defined. The likeliest parameters may lie there, and the standard deviation is unreliable.",
+    "Rewrite it so that it is defined for every possible plant.",
     "unsettled",
 )
 START = note(
     "start-estimated",
-    "The start of a record was estimated along. A record does not begin at rest about zero, or may not. The "
-    "level of each output and the state at the start cost some accuracy.",
-    "Where the plant was at rest before, `--operating-point` with the levels gives a more certain estimate.",
+    "The initial state of a record was estimated too. The record may not begin at rest about zero. Output "
+    "levels and initial state cost some accuracy.",
+    "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
 )
 ON_CIRCLE = doubt(
     "noise-on-the-circle",
-    "A polynomial of the noise has a root on the unit circle. The covariance is not to be trusted there, and "
-    "a design would count on noise that vanishes or never fades.",
+    "A noise polynomial has a root on the unit circle. The covariance is unreliable, and a design would "
+    "assume noise that vanishes or never decays.",
     "Take more data, or a lower order.",
 )
 NEAR_ZERO = note(
     "parameter-near-zero",
-    "Zero lies within a standard deviation of a parameter. The data do not distinguish the two.",
-    "Lower the order of a polynomial. Of a physical quantity take more data, or list what is known in "
-    "`plant.known`.",
+    "A parameter may be zero. Zero lies within one standard deviation of its estimate.",
+    "Lower the order of a polynomial. For a physical quantity take more data, or list it in `plant.known` "
+    "if it is known.",
 )
 BAND_LIMITED = note(
     "input-taken-as-band-limited",
@@ -58,16 +58,16 @@ BAND_LIMITED = note(
 )
 UNASKED = unsure(
     "no-accuracy-here",
-    "The question cannot be asked of the estimate. What the spec asks has no answer there, for instance "
-    "because the loop is unstable. There is no error bound r_u, and no verdict.",
-    "See the message: mend the spec, or take data that give another estimate.",
+    "The requirement cannot be evaluated at the estimate. The loop may be unstable there, for instance. "
+    "There is no error bound r_u, and no verdict.",
+    "See the message: correct the spec, or take data that give another estimate.",
     "unasked",
 )
 LARGER_NOISE = note(
     "noise-estimated-along",
-    "The noise has more structure than the spec says. So C and D of small orders were estimated along. All "
-    "tests, the covariance and the verdict are of this larger model.",
-    "Take over `noise` of `model.yaml` into the spec, for the next design rests on it.",
+    "The noise has more structure than the spec says. Small orders of C and D were estimated too. Tests, "
+    "covariance and verdict hold for this larger model.",
+    "Copy `noise` from `model.yaml` into the spec, because the next design depends on it.",
 )
 
 

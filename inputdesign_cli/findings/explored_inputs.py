@@ -25,26 +25,26 @@ _OPEN = 100.0
 
 UNDRIVEN = doubt(
     "input-only-answers",
-    "An input follows from the outputs alone. The input is an exact function of outputs and its own past: a "
-    "loop without excitation. The inverse of the controller explains such data as well as the plant.",
+    "An input follows from the outputs alone. It is an exact function of outputs and its own past: a loop "
+    "without excitation. The inverse of the controller explains these data as well as the plant.",
     "Move the reference of the loop, or add dither to the input.",
 )
 INVERSE = doubt(
     "like-inverse-controller",
-    "The model may be the inverse of a controller. The output answers in the same sample, and nobody seems "
-    "to have set the input. In a loop -1/C explains such data ([ljung-1999], Section 13.4).",
+    "The model may be the inverse of a controller. The output responds in the same sample, and no external "
+    "signal seems to drive the input. In a loop, -1/C explains these data ([ljung-1999], Section 13.4).",
     "Move the reference of the loop, or add dither to the input.",
 )
 TOO_SIMPLE = doubt(
     "excitation-too-simple",
-    "The inputs determine fewer numbers than the model has. The inputs are persistently exciting of a lower "
-    "order than the model needs. Other models explain the record as well.",
+    "The inputs determine fewer parameters than the model has. Their order of persistent excitation is too "
+    "low for the model. Other models explain the record as well.",
     "Apply inputs that move more and independently; `idesign signal` makes some.",
 )
 OPEN = doubt(
     "parameter-undetermined",
-    "The record leaves a parameter open. A parameter deviates by many times its value, or a time constant "
-    "is much longer than the record.",
+    "The record does not determine a parameter. Its standard deviation is many times its value, or a time "
+    "constant is much longer than the record.",
     "Move that input more, or leave it out with `--columns`.",
 )
 

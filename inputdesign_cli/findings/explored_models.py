@@ -27,45 +27,44 @@ _TESTS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residua
 
 UNJUDGED = doubt(
     "model-not-judged",
-    "No data are left to judge the model by. An input moves in one stretch of the record only. That stretch "
-    "estimates the model, so that nothing judges it.",
-    "Judge it by another record (`idesign explore OTHER --validate model.yaml`), or let the inputs step "
-    "more.",
+    "No data remain to validate the model. An input moves in only one stretch of the record, and the "
+    "estimate needs it.",
+    "Use another record (`idesign explore OTHER --validate model.yaml`), or let the inputs step more.",
 )
 EXPLAINS_LITTLE = doubt(
     "simulation-explains-little",
-    "The simulation explains next to nothing. The part of the record that judges is simulated from the "
-    "inputs alone. The model explains no more of it than chance would.",
+    "The simulation explains next to nothing. From the inputs alone, the model explains no more of the "
+    "validation part than chance would.",
     "Move the inputs more, or record for longer.",
 )
 UNRELATED = doubt(
     "inputs-unrelated",
-    "The inputs do not help to predict an output. Two signals that wander, drift or follow one cycle agree "
-    "for long, though neither moves the other. What is new in the output answers nothing that the inputs do.",
+    "The inputs do not help to predict an output. Signals that wander, drift or share a cycle agree for "
+    "long without any link. The prediction errors of the output do not depend on the inputs.",
     "Move the inputs by steps of your own, at times that nothing else follows.",
 )
 UNEXPLAINED = doubt(
     "structure-unexplained",
-    "No structure that was tried explains an output. The simulation explains less than half of it, and tests "
-    "refute the model. The plant may be nonlinear, vary with time, or have inputs that the log lacks.",
-    "Record about one operating point, or log what else acts on the output.",
+    "No tested structure explains an output. The simulation explains less than half of it, and tests refute "
+    "the model. The plant may be nonlinear, time-varying, or have unrecorded inputs.",
+    "Record about one operating point, or record what else acts on the output.",
 )
 LIKE_INTEGRATOR = doubt(
     "like-integrator",
-    "The plant may be an integrator. G rises towards low frequencies for as long as the record shows. "
-    "Static gain and time constant follow from no such record, only the slope.",
+    "The plant may be an integrator. G rises towards the lowest frequencies of the record. The record "
+    "determines only the slope, not static gain and time constant.",
     "Record until the output settles. If it never does, use `idesign explore DATA --structure integrator`.",
 )
 UNSTABLE = doubt(
     "plant-unstable",
-    "The plant is unstable. The samples place a pole outside the unit circle. Stable models alone are "
-    "looked for without a spec.",
+    "The plant is unstable. The samples place a pole outside the unit circle. Without a spec, only stable "
+    "models are searched.",
     "Identify the plant with its loop: `idesign identify DATA --spec SPEC`.",
 )
 OPEN_PARAMETERS = doubt(
     "rival-explains-log",
     "Another set of parameters explains the log as well. The likelihood has another minimum of about the "
-    "same depth, where G differs.",
+    "same depth, with a different G.",
     "Move the inputs independently of each other, and at more frequencies.",
 )
 

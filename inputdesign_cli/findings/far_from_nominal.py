@@ -25,14 +25,14 @@ _AWAY, _LISTED = 4.0, 4
 
 ANOTHER = doubt(
     "another-plant",
-    "The estimate contradicts the plant of the spec. G of the two differs by more than half of the larger "
-    "one and by more than their uncertainty. The design rested on another plant.",
+    "The estimate contradicts the plant of the spec. The two G differ by more than half of the larger one "
+    "and by more than their uncertainty.",
     "Check signs and units of the record. If they are right, put the estimate into the spec.",
 )
 FAR = doubt(
     "far-from-the-spec",
-    "The estimate lies many deviations from the plant of the spec. All parameters of G together are farther "
-    "than five. It may be another plant, have other units, or the numbers of the spec were poor.",
+    "The estimate lies far from the plant of the spec. The parameters of G together differ by more than "
+    "five standard deviations. The plant, the units or the values of the spec may be wrong.",
     "The verdict holds for the estimate. Put it into the spec before the next design.",
 )
 

@@ -28,21 +28,21 @@ _BIASING, _HALF = 0.02, 50.0
 
 SPIKES = refuted(
     "spikes",
-    "A few samples decide what the data say. They hold most of the sum of squares of the residuals of an "
-    "output. They are spikes of the measurement, or events that the model does not know.",
-    "Leave out the rows that are faults of measurement with `--without`, which cuts the record there.",
+    "A few samples dominate the residuals. They hold most of the sum of squares of an output. They are "
+    "measurement spikes, or events that the model does not describe.",
+    "Leave out faulty rows with `--without`, which cuts the record there.",
 )
 FROZEN = refuted(
     "sensor-stands-still",
-    "An output stands still while the input moves. It keeps its value for longer than its rounding "
-    "explains. The sensor is frozen or saturated, or the logger repeats its last value.",
+    "An output stands still while the input moves. It keeps its value for longer than rounding explains. "
+    "The sensor is frozen or saturated, or the logger repeats its last value.",
     "Leave these rows out with `--without`, which cuts the record there.",
 )
 MISALIGNED = refuted(
     "columns-misaligned",
-    "A column was logged at another time. The controller of the spec computes u from r and y. One column, "
-    "moved by some samples, follows this law much better than the columns as they stand.",
-    "Move the column, or mend the controller of the spec.",
+    "A column was logged at another time. The controller of the spec computes u from r and y. The data "
+    "follow this law much better with one column shifted by some samples.",
+    "Shift the column, or correct the controller of the spec.",
 )
 
 
@@ -149,9 +149,9 @@ def _spikes(units: Units, estimate: Estimate, data: Samples) -> Iterator[Finding
 
 LEVEL_SHIFT = refuted(
     "level-shift",
-    "An output shifts without an input. It rises or falls at one time and stays there. The model takes the "
-    "shift for an effect of the inputs.",
-    "Leave the shift out with `--without`, or log what changed as one more input.",
+    "An output shifts without an input. It rises or falls at one time and stays there. The model attributes "
+    "the shift to the inputs.",
+    "Leave the shift out with `--without`, or record what changed as one more input.",
 )
 
 

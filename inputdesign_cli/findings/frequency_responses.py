@@ -27,61 +27,62 @@ UNLIKE = 0.5
 
 WITHOUT_MODEL = note(
     "response-without-model",
-    "The frequency response without a model. `frequency_response.csv` has G as the data have it, with discs "
-    "of 95 %. A right model lies outside of them at about 5 % of the frequencies.",
+    "The frequency response was measured without a model. `frequency_response.csv` holds G from the data, "
+    "with 95 % discs. A correct model lies outside of them at about 5 % of the frequencies.",
     "Compare it with the model in `frequency_response.png`.",
 )
 BIASED = doubt(
     "response-biased-by-loop",
-    "The response without a model is drawn towards -1/C. The data come from a loop, and no reference is "
-    "recorded. Where the noise is strong, the ratio of y to u is that of the inverse controller.",
+    "The response without a model is biased towards -1/C. The reference of the loop is not recorded. Where "
+    "noise is strong, the ratio of y to u shows the inverse controller.",
     "Record the reference as column r.",
 )
 CONTRADICTED = doubt(
     "response-contradicts-model",
-    "The data contradict G of the model. G without a model lies outside of the discs of 95 %, and farther "
-    "than a fifth of |G| beyond them, at many frequencies.",
-    "See whether the data come from a loop, the plant is linear, and all inputs are recorded.",
+    "The data contradict G of the model. At many frequencies G without a model lies outside the 95 % discs, "
+    "by more than a fifth of |G|.",
+    "Check whether the data come from a loop, the plant is linear, and all inputs are recorded.",
 )
 UNEXCITED = doubt(
     "unexcited-lines",
-    "Lines of the spec that the inputs do not excite. There they have no more power than rounding or noise, "
-    "and the response is not measured.",
-    "Apply the signal of the spec, and record the inputs as they were applied.",
+    "The inputs do not excite some lines of the spec. Their power there is only rounding or noise, and the "
+    "response is not measured.",
+    "Apply the signal of the spec, and record the applied inputs.",
 )
 DIFFERING = doubt(
     "inputs-do-not-repeat",
-    "The inputs differ from period to period. More than half of their power does, so that they do not "
-    "repeat as the spec says.",
-    "Apply the signal of the spec, and record the inputs as they were applied.",
+    "The inputs differ from period to period. More than half of their power does not repeat, contrary to "
+    "the spec.",
+    "Apply the signal of the spec, and record the applied inputs.",
 )
 LEFT_OUT = note(
     "samples-before-periods",
-    "Samples before the first whole period are left out. The record is no multiple of the period.",
+    "Samples before the first whole period are left out. The length of the record is no multiple of the "
+    "period.",
     "Record whole periods.",
 )
 PIECES = note(
     "periods-between-gaps",
-    "Only periods without a gap count. The whole periods of one phase between the gaps of the record count, "
-    "after the transient.",
-    "Record without gaps where more periods are needed.",
+    "Only periods without a gap count. They are the whole periods of one phase between the gaps, after the "
+    "transient.",
+    "Record without gaps, if more are needed.",
 )
 START = doubt(
     "start-shifts-response",
-    "The start of the record shifts the response. The plant begins at rest, and the transient has not died "
-    "out where the periods begin to count.",
+    "The start of the record biases the response. The plant begins at rest, and its transient is still "
+    "present in the periods that count.",
     "Raise `accuracy.frequency_response.transient`, or take a longer period.",
 )
 LEAKS = doubt(
     "noise-leaks",
-    "Noise that leaks through the finite record exceeds the accuracy. A finite record sees noise of "
-    "neighbouring frequencies at every line. The limits keep the powers from making up for it.",
+    "Leakage of noise exceeds the required accuracy. In a finite record, noise of neighbouring frequencies "
+    "leaks into every line. The limits forbid the power that would compensate for it.",
     "Allow a little more power, or take a few more periods.",
 )
 SHORTER = note(
     "record-of-whole-periods",
     "The record is shorter than the experiment. A record for a frequency response consists of whole periods.",
-    "Choose a number of samples that is a multiple of the periods.",
+    "Choose a number of samples that is a multiple of the period.",
 )
 
 

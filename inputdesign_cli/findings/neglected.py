@@ -27,15 +27,16 @@ _ALLOWED = 1.959963984540054
 
 MATTERS = doubt(
     "neglected-parameter",
-    "A neglected parameter would move G too far. No test refutes the model. But one more parameter is "
-    "likely, and it would move G by more than the admissible error allows beside the error of the estimate.",
-    "Estimate the parameter along, or excite the frequencies where G would move.",
+    "A neglected parameter may change G too much. No test refutes the model, but one more parameter is "
+    "likely. Its effect on G and the error of the estimate together exceed the admissible error.",
+    "Estimate the parameter too, or excite the frequencies where G would change.",
 )
 RESTS_ON_STRUCTURE = note(
     "verdict-rests-on-structure",
-    "The verdict rests on the structure. The data do not rule out one more parameter, or a gain that changes "
-    "evenly. It would move G by more than is admitted, and by what the message says at most (95 %).",
-    "Excite the frequencies where G would move, if the structure is not known from physics.",
+    "The verdict depends on the model structure. One more parameter, or a steadily changing gain, could "
+    "change G by more than the admissible error. The data do not exclude it. The message gives its largest "
+    "effect (95 %).",
+    "If the structure is not known from physics, excite the frequencies where G would change.",
 )
 
 

@@ -18,37 +18,36 @@ from inputdesign_cli.outcome.shares import chance
 
 PRIOR_COUNTS = note(
     "prior-counts",
-    "The prior counts for the estimate. `experiment.prior` has its parameters. Estimate, covariance and "
-    "accuracy are those of prior and data together.",
-    "Remove the prior to see what the data say alone.",
+    "The estimate includes the prior. `experiment.prior` has its parameters. Estimate, covariance and "
+    "accuracy combine prior and data.",
+    "Remove the prior to see the estimate from the data alone.",
 )
 PRIOR_LEFT_OUT = note(
     "prior-left-out",
-    "The prior does not count. `experiment.prior` is information without the parameters that it belongs to. "
-    "It cannot count for an estimate, nor for a verdict.",
+    "The estimate does not include the prior. `experiment.prior` gives information without its parameters, "
+    "which serves neither an estimate nor a verdict.",
     "Write its parameters beside the matrix, or name the `model.yaml` or the records of the earlier data.",
 )
 PRIOR_CONTRADICTED = refuted(
     "prior-contradicted",
-    "Prior and data contradict each other. The estimate from the data alone differs from that of the prior "
-    "by more than their covariances explain.",
-    "Remove the prior, or look for what has changed since.",
+    "Prior and data contradict each other. Their estimates differ by more than their covariances explain.",
+    "Remove the prior, or find out what has changed since.",
 )
 PRIOR_REPEATED = refuted(
     "prior-of-these-data",
-    "The prior seems to be made of these data. Prior and data agree more closely than two independent "
-    "records do. The same samples would count twice.",
-    "Leave the prior out, or give only records that it was not made of.",
+    "The prior seems to come from these data. They agree more closely than independent records. The same "
+    "samples would count twice.",
+    "Remove the prior, or give only records that it does not include.",
 )
 RECORDS_DIFFER = refuted(
     "records-differ",
-    "Records are not of one system. Parameters that are estimated from each record alone differ by more "
+    "The records come from different systems. Parameters estimated from each record alone differ by more "
     "than chance.",
-    "Assess each record alone, and look for what has changed between them.",
+    "Assess each record alone, and find out what has changed between them.",
 )
 SAMPLES_REPEATED = refuted(
     "samples-repeated",
-    "Two files have rows in common. Samples that count twice make an estimate look surer than it is.",
+    "Two files have rows in common. The estimate would look more accurate than it is.",
     "Give each sample once.",
 )
 

@@ -13,26 +13,26 @@ from inputdesign_cli.finding import Finding, listed, note
 
 OUTLYING_VALUES = note(
     "outlying-values",
-    "Values stand far from all others. They are more than eight robust standard deviations from the median, "
-    "and the inputs do not explain them. They are kept.",
-    "Look at the record. Leave faults of measurement out with `--without`.",
+    "Some values lie far from all others. They are more than eight robust standard deviations from the "
+    "median. The inputs do not explain them. They are kept.",
+    "Inspect the record. Leave out faulty values with `--without`.",
 )
 SPIKES_REPLACED = note(
     "spikes-replaced",
     "Single spikes were replaced by interpolation. One sample is more than twelve robust standard "
-    "deviations from a running median, and its neighbours are not. The inputs do not explain it.",
-    "Nothing, if it is a fault of measurement. To cut the record there instead, use `--without`.",
+    "deviations from a running median, unlike its neighbours. The inputs do not explain it.",
+    "Nothing, if it is a measurement fault. To cut the record there instead, use `--without`.",
 )
 SENSOR_SATURATED = note(
     "sensor-saturated",
-    "An output stays at its largest or smallest value. A sensor at the end of its range shows one value "
-    "while the plant moves on. Two per cent of the samples or more, in runs of three or more, are there.",
+    "An output stays at its largest or smallest value. At least two per cent of the samples lie there, in "
+    "runs of three or more. The sensor may be at the end of its range.",
     "Leave these rows out with `--without`, or measure with another range.",
 )
 SENSOR_ROUNDED = note(
     "sensor-rounded",
-    "An output moves in visible steps. All values lie on a grid, whose step is more than a tenth of the "
-    "standard deviation. Rounding acts as noise.",
+    "An output moves in visible steps. All values lie on a grid whose step exceeds a tenth of the standard "
+    "deviation. Rounding acts as noise.",
     "Log with more digits, or excite with larger moves.",
 )
 

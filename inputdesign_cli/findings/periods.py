@@ -26,15 +26,14 @@ MATTERS = 0.5
 
 SILENT_LINES = doubt(
     "silent-lines-answer",
-    "Outputs answer at lines that are not excited. A linear plant does not: a nonlinearity of odd degree "
-    "answers at odd harmonics, one of even degree at even ones. An F test compares their power with the "
-    "noise.",
-    "Look for saturation, dead zones and backlash, and whether the input was applied as recorded.",
+    "Outputs respond at lines that are not excited. A linear plant does not. Odd nonlinearities respond at "
+    "odd harmonics, even ones at even harmonics. An F test compares the power there with the noise.",
+    "Look for saturation, dead zones and backlash. Check that the input was applied as recorded.",
 )
 NONLINEAR = unsure(
     "nonlinear-response",
-    "A nonlinearity changes the measured response. Odd lines that are not excited show by how much. From "
-    "half of what is admitted on, the response is not called met.",
+    "A nonlinearity changes the measured response. Odd lines without excitation show by how much. From half "
+    "of the admissible error on, the response does not count as met.",
     "Measure at a smaller amplitude, or with other phases. More periods do not help.",
     "nonlinearity",
 )
@@ -151,22 +150,22 @@ def nonlinear_response(
 
 SPIKES = unsure(
     "spiked-periods",
-    "A few samples decide how the periods differ. They hold most of the squares by which the periods differ "
-    "from their median. Nothing can be judged then.",
-    "Empty the cells that are faults of measurement, and assess again.",
+    "A few samples dominate the differences between periods. They hold most of the squared deviations from "
+    "the median of the periods. No verdict is possible.",
+    "Empty the faulty cells, and assess again.",
     "spikes",
 )
 DRIFT = unsure(
     "drifting-periods",
-    "Outputs drift from period to period. The means of the periods follow a polynomial in time. A drift "
-    "leaks into every line and changes the response or its scatter.",
-    "Add `--detrend linear`, or subtract its slow course from the column before.",
+    "Outputs drift from period to period. The means of the periods follow a polynomial in time. Drift leaks "
+    "into every line and changes the response or its scatter.",
+    "Add `--detrend linear`, or subtract the slow trend from the column first.",
     "drift",
 )
 CHANCE = unsure(
     "response-within-chance",
-    "The scatter of the periods leaves the verdict open. The true deviation lies between two limits that "
-    "hold for all lines with 95 %. What is admitted lies between them.",
+    "The scatter of the periods leaves the verdict open. The admissible error lies between two limits for "
+    "the true deviation (95 % for all lines together).",
     "Record as many periods as the finding names.",
     "chance",
 )

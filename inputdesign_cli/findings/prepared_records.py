@@ -14,55 +14,55 @@ from inputdesign_cli.outcome.shares import per_cent
 
 TIMES_READ = note(
     "times-read",
-    "Times were made from what the file holds. Columns of dates and of times of day are joined. Times of day "
-    "that fall belong to the next day. Counts since 1970 are known by their size.",
-    "Nothing, if that is right. Otherwise name the column of times: `--columns time=NAME`.",
+    "Times were computed from columns of the file. Columns of dates and of times of day are joined. A "
+    "decreasing time of day begins the next day. Counts since 1970 are recognised by their size.",
+    "Nothing, if the times are right. Otherwise name their column: `--columns time=NAME`.",
 )
 TIMES_ASSUMED = note(
     "times-assumed",
-    "The sample time is not known. Without times in the file or `--sample-time` it is taken for 1.",
+    "The sample time is not known. Without times in the file or `--sample-time` it is set to 1.",
     "Give `--sample-time`, or name the column of times: `--columns time=NAME`.",
 )
 JITTER_EVENED = note(
     "jitter-evened-out",
-    "Times were made even. Outputs are interpolated linearly. Of inputs, which are held, the nearest sample "
+    "Times were made uniform. Outputs are interpolated linearly; inputs are held, so the nearest sample "
     "counts. Steps may differ by 25 % of the sample time, with `--resample` by more.",
-    "Nothing. An estimate from a logger with less jitter is more accurate.",
+    "Nothing. Less jitter would give a more accurate estimate.",
 )
 INPUTS_MOVE_BETWEEN = doubt(
     "inputs-move-between-samples",
-    "Inputs are not held between resampled times. The model takes them as constant from one sample to the "
-    "next, so the estimate is biased.",
+    "Inputs change between resampled times. The model takes them as constant from one sample to the next, "
+    "so the estimate is biased.",
     "Resample to a step over which inputs are held, or estimate at the steps of the file.",
 )
 COLUMNS_JOINED = note(
     "columns-joined",
-    "Columns were written at different times. The times of the output that was written most often count. "
-    "Inputs are held until written again, and their means count. Other outputs are interpolated.",
+    "Columns were written at different times. The times of the most frequent output are used. Inputs are "
+    "held until written again and then averaged. Other outputs are interpolated.",
     "Log all channels in one row, if the logger can.",
 )
 RECORD_CUT = note(
     "record-cut",
-    "The record has segments. One ends at a step longer than 1.5 sample times and at a row that is left out. "
-    "Each has a start and levels of its own. Segments of fewer than ten samples are left out.",
-    "Nothing, if the gaps are known. Otherwise see why the logger lost samples.",
+    "The record has segments. A segment ends at a step longer than 1.5 sample times, or at an omitted row. "
+    "Each has its own initial state and levels. Segments of fewer than ten samples are left out.",
+    "Nothing, if the gaps are known. Otherwise find out why the logger lost samples.",
 )
 ROWS_LEFT_OUT = note(
     "rows-left-out",
-    "Rows of the file are not used. They have an empty cell or an error of a spreadsheet, or `--without` "
+    "Some rows of the file are not used. They have an empty cell or a spreadsheet error, or `--without` "
     "names them.",
     "Fill the cells if the values are known.",
 )
 LINES_PASSED_OVER = note(
     "lines-passed-over",
-    "Lines between the rows hold no samples. Without times a blank line, or a row that is commented out, "
-    "cuts the record.",
-    "Take the lines out of the file if no sample is missing there.",
+    "Lines between the rows hold no samples. In a file without times, a blank or commented-out row cuts the "
+    "record.",
+    "Remove the lines from the file if no sample is missing there.",
 )
 COLUMNS_UNUSED = note(
     "columns-unused",
-    "Columns of channels that the plant does not have. They are called u3 or y2, and the plant has fewer "
-    "channels. The effect of an input that is not modelled counts as noise.",
+    "The plant lacks the channels of some columns. A column is called u3 or y2, for instance, but the plant "
+    "has fewer channels. The effect of an unmodelled input counts as noise.",
     "Add the channels to the plant, or ignore this.",
 )
 UNIT_NOT_CONVERTED = note(
@@ -77,7 +77,7 @@ SHEETS_UNREAD = note(
 )
 TREND_REMOVED = note(
     "trend-removed",
-    "A mean or a line was taken away. With `--detrend` that is done to every signal, segment by segment.",
+    "A mean or a line was subtracted. With `--detrend` this applies to every signal, segment by segment.",
     "Nothing. The level and slope of every output are estimated together with the model.",
 )
 

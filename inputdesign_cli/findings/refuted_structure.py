@@ -84,13 +84,13 @@ def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Plain]]) -> dict[s
 
 PLANT = refuted(
     "plant-structure",
-    "Past inputs explain residuals. A score test says so: the plant has more structure than the model.",
+    "Past inputs explain residuals. By a score test, the plant has more structure than the model.",
     "Raise the orders of the plant or change its delay; the message names the keys.",
 )
 NOISE = refuted(
     "noise-structure",
     "The residuals are not white. Past residuals explain the next ones (score test): the noise has more "
-    "structure than its model. The covariance is then not to be trusted.",
+    "structure than its model. The covariance is then unreliable.",
     "Raise the orders of C and D under `noise`.",
 )
 DRIFT = refuted(
@@ -102,19 +102,19 @@ MISSING = refuted(
     "parameter-missing",
     "The model lacks a parameter. One more parameter of plant or noise explains the data much better than "
     "chance would.",
-    "Estimate it along.",
+    "Estimate this parameter too.",
 )
 CHANGED = refuted(
     "plant-changed",
-    "The plant did not stay the same. Parameters that change with time explain the data much better than "
+    "The plant changed during the record. Time-varying parameters explain the data much better than "
     "constant ones.",
-    "Assess the parts of the record one by one (`--range`), and look for what changed between them.",
+    "Assess the parts of the record one by one (`--range`), and find out what changed between them.",
 )
 NONLINEAR = refuted(
     "plant-nonlinear",
     "The plant is not linear. A nonlinear effect of the inputs explains the data much better than the "
     "linear model alone.",
-    "Use the range of the input that the model is for, or give as u what the actuator really does.",
+    "Use the input range for which the model is meant, or record the true output of the actuator as u.",
 )
 
 # Drift makes other tests fail; an error of G makes tests of the noise fail.

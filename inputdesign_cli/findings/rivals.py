@@ -22,25 +22,25 @@ OTHER_MINIMUM = unsure(
     "other-minimum",
     "Other parameters explain the data nearly as well. The likelihood has another minimum of nearly the "
     "same depth. Its G differs by more than the error bound or the admissible error.",
-    "Excite more frequencies, or hold what is known with `plant.known`.",
+    "Excite more frequencies, or fix known parameters with `plant.known`.",
 )
 RULED_OUT = note(
     "minimum-ruled-out",
-    "A minimum does not count. Other parameters would explain the data nearly as well. They lie far outside "
-    "the region of `uncertainty` for the plant.",
-    "See whether `uncertainty` is right.",
+    "The uncertainty excludes another minimum. Its parameters explain the data nearly as well, but lie far "
+    "outside the region of `uncertainty` for the plant.",
+    "Check whether `uncertainty` is right.",
 )
 FORESEEN = doubt(
     "other-minimum-foreseen",
-    "A record of the design would leave other minima. A simulated record has another minimum of nearly the "
-    "same likelihood with another G. Estimates may end there, and `assess` would call the record undecided.",
-    "Excite more frequencies, or hold the dead time that is known with `plant.known`.",
+    "A record of the design may have other minima. The likelihood of a simulated record has another minimum "
+    "of nearly the same depth, with another G. Estimates may end there, and `assess` would then be "
+    "undecided.",
+    "Excite more frequencies, or fix a known dead time with `plant.known`.",
 )
 NOT_FORESEEN = note(
     "other-minima-not-looked-at",
-    "Other minima were not looked at. A plant with dead times may have some, whole periods away. Whether a "
-    "record of this design has them was not tried, for the reason that the message gives.",
-    "Give it more time, or try `idesign simulate`.",
+    "Other minima were not searched for. A plant with dead times may have some, whole periods away.",
+    "Allow more time, or try `idesign simulate`.",
 )
 
 

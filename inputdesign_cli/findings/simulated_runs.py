@@ -14,32 +14,32 @@ _GAP = 0.03
 
 CONFIDENCE_MISSED = doubt(
     "confidence-missed",
-    "Fewer experiments than asked keep the admissible error. The share of simulated experiments within "
-    "r_adm is below the exact confidence by more than chance.",
+    "Too few experiments keep the admissible error. The share of simulated experiments within r_adm is "
+    "below the exact confidence by more than chance.",
     "Ask for more `runs` in `confidence`, or for more samples.",
 )
 OTHER_LENGTH = note(
     "other-length",
-    "The simulated records have another length than the design. The design counts the samples of a "
-    "spectrum. Records are whole periods, or longer by limits.",
-    "Nothing. The predictions that the runs are compared with are for the simulated length.",
+    "The simulated records and the design differ in length. The design counts the samples of a spectrum. "
+    "Records have whole periods, or are longer because of limits.",
+    "Nothing. The runs are compared with predictions for the simulated length.",
 )
 INITIAL_ESTIMATE = doubt(
     "initial-estimate-off",
-    "The true system is not the design model. Fewer runs stay within r_adm on the true system than where "
-    "the true system is the design model.",
+    "The true system is not the design model. Fewer runs stay within r_adm than if the true system were the "
+    "design model.",
     "Design again at a better estimate, or for several plants (`uncertainty`).",
 )
 ONE_MINIMUM = note(
     "runs-see-one-minimum",
-    "The runs look at one minimum only. Runs of `simulate` begin their estimates at the nominal parameters. "
-    "Records leave other minima, which the search of `identify` may end in.",
-    "Excite more frequencies, or hold what is known (`plant.known`).",
+    "The runs examine one minimum only. Runs of `simulate` start their estimates at the nominal parameters. "
+    "The likelihood has other minima, where the search of `identify` may end.",
+    "Excite more frequencies, or fix known parameters (`plant.known`).",
 )
 UNSTABLE = doubt(
     "unstable-runs",
-    "Controllers of some simulated runs make the loop unstable. Each run designs a controller on its "
-    "estimate. Where the true loop is unstable the loss is infinite, and means are of the other runs.",
+    "Controllers of some simulated runs destabilise the loop. Each run designs a controller from its "
+    "estimate. Means exclude runs with an unstable true loop, whose loss is infinite.",
     "Take more samples or more power, or ask for a slower loop.",
 )
 

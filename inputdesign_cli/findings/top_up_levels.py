@@ -13,14 +13,14 @@ _AWAY = 0.5
 
 ABOUT_LEVELS = note(
     "about-an-operating-point",
-    "The record varies about the operating point. The samples of `signal.csv` include the levels that were "
-    "taken away from the data.",
-    "Apply `signal.csv` as it is.",
+    "The record varies about the operating point. `signal.csv` includes the levels that were subtracted "
+    "from the data.",
+    "Apply `signal.csv` unchanged.",
 )
 ABOUT_ZERO = doubt(
     "record-about-zero",
-    "The data lie about a level, the record about zero. The inputs of the data have a mean far from zero. "
-    "The spec has no `signal.offset`, so that the record of the top-up varies about zero.",
+    "The data vary about a level, the record about zero. The recorded inputs have a mean far from zero, but "
+    "the spec has no `signal.offset` for the top-up.",
     "Write `signal.offset` with these levels and assess again, or add them to `signal.csv`.",
 )
 

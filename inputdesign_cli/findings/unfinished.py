@@ -10,38 +10,37 @@ from inputdesign_cli.outcome.shares import per_cent
 
 DESIGN_UNFINISHED = doubt(
     "design-unfinished",
-    "The time limit ended the design before its proof closed. The design meets everything that is required. "
-    "How much better another could be is proved only as far as the gap says.",
+    "The time limit ended the design before its proof closed. The design meets all requirements. The gap "
+    "bounds how much better another design could be.",
     "Allow more time.",
 )
 OTHER_SPECTRA_LEFT_OUT = note(
     "other-spectra-left-out",
     "There is no bound over every spectrum yet. The design is proved the best of its type of spectrum. "
-    "Other types were not compared, for want of time or because nobody asked for it.",
+    "Other types were not compared (no time, or not requested).",
     "Allow more time, leave out `--fast`, or write `solver.any_spectrum: true`.",
 )
 NO_BOUND_EXISTS = note(
     "no-bound-over-spectra",
-    "There is no bound over every spectrum. Some excitation is not counted by the cost or the limits and "
-    "still gives information. Other spectra come ever nearer to it, without end.",
-    "Give what is not counted a cost or a limit, or leave its frequency out of `limits.band`.",
+    "There is no bound over every spectrum. Some excitation gives information without cost or limit. Ever "
+    "better spectra approach it.",
+    "Give this excitation a cost or a limit, or exclude its frequency by `limits.band`.",
 )
 ONLY_APPROACHED = doubt(
     "optimum-only-approached",
-    "The optimum is only approached. The best spectrum has power ever nearer to a frequency, and none has "
-    "it there. No record has that.",
-    "Give what is not counted a cost or a limit, or leave its frequency out of `limits.band`.",
+    "The optimum is only approached. Better spectra have power ever nearer to a frequency, but none has "
+    "power there. No record reaches this limit.",
+    "Give this excitation a cost or a limit, or exclude its frequency by `limits.band`.",
 )
 NO_RECORD_IN_TIME = doubt(
     "no-record-in-time",
-    "There was no time for a record. The spectrum is that of the design. No record of it was found before "
-    "the time was over.",
+    "There was no time for a record. The spectrum is complete, but no record of it was found.",
     "Allow more time, or try fewer records (`signal.candidates`) or shorter ones (`signal.samples`).",
 )
 ON_GRID = doubt(
     "accuracy-on-grid",
-    "The accuracy holds on a grid of frequencies. `solver.method: lmi` is the program of the papers. It "
-    "requires the accuracy on a grid of frequencies only, and between them it may be missed.",
+    "The accuracy holds only on a grid of frequencies. `solver.method: lmi` is the program of the papers. "
+    "Between the grid points the accuracy may be missed.",
     "Use `solver.method: exchange`, which keeps the accuracy at every frequency.",
 )
 
@@ -112,27 +111,27 @@ def on_grid(lines: int, ratio: float) -> Finding:
 
 FRESH_PLANTS_CUT = note(
     "fresh-plants-cut-short",
-    "The trial on fresh plants was cut short. Fewer plants were tried than `uncertainty.fresh` asks for. "
-    "The 95 % limits count the ones tried.",
+    "The trial on new plants was cut short. It includes fewer plants than `uncertainty.fresh`. The 95 % "
+    "limits hold for these.",
     "Allow more time.",
 )
 DRAWS_UNSTABLE = doubt(
     "draws-unstable",
-    "Most of the draws are no plants that could be in operation. Draws from `uncertainty` that are unstable "
-    "are drawn again. Every statement is about the stable ones.",
-    "State what the plant can be in operation, or check the controller.",
+    "Most draws are unstable plants. They could not be in operation, and are drawn again. Every statement "
+    "concerns stable plants only.",
+    "Restrict `uncertainty` to plants that can be in operation, or check the controller.",
 )
 LOST_PLANTS = doubt(
     "plants-lost",
-    "At some plants no experiment is enough. The controller misses what is asked at these plants even if "
+    "For some plants no experiment is enough. The controller misses the requirement at these plants even if "
     "they are known exactly. Their r_adm is that of `uncertainty.floor`.",
-    "Ask for less, take another controller, or state the plant more tightly.",
+    "Ask for less, take another controller, or narrow `uncertainty`.",
 )
 RAISED_PLANTS = doubt(
     "plants-at-floor",
-    "Some plants are held to less than what is asked. At these plants r_adm is somewhere below "
-    "`uncertainty.floor`, which the design keeps in its place.",
-    "Lower `uncertainty.floor` to hold them to their own r_adm.",
+    "The requirement is weaker for some plants. At these plants r_adm is somewhere below "
+    "`uncertainty.floor`, which replaces it.",
+    "Lower `uncertainty.floor` to keep their own r_adm.",
 )
 
 

@@ -21,33 +21,33 @@ _MOSTLY = 0.5
 
 ANSWERING = refuted(
     "input-answers-output",
-    "An input answers the outputs. Prediction errors help to predict an input. In open loop no input "
-    "answers the noise.",
-    "Mend columns that are late or swapped, or state a loop as `experiment.controller`.",
+    "An input responds to the outputs. Prediction errors help to predict an input. In open loop no input "
+    "responds to the noise.",
+    "Correct late or swapped columns, or state a loop as `experiment.controller`.",
 )
 LATE = refuted(
     "input-logged-late",
-    "An output moves before the input. An output moves some samples before the input that moves it. The "
-    "input was logged late, or the columns are not of one clock.",
-    "See when the plant really gets its input, and write both at the same times.",
+    "An output moves before the input. The input was logged some samples late, or the columns use different "
+    "clocks.",
+    "Find out when the plant really gets its input, and log both together.",
 )
 IDLE = refuted(
     "input-without-effect",
-    "An input explains nothing. G of an input cannot be distinguished from zero, though the plant of the "
-    "spec would answer it clearly.",
-    "See whether the columns are of one experiment. If the plant does not answer, correct the spec.",
+    "An input has no visible effect. Its G cannot be distinguished from zero, though the plant of the spec "
+    "would respond clearly.",
+    "Check that the columns are of one experiment. If the plant does not respond, correct the spec.",
 )
 UNEXPLAINED = doubt(
     "output-unexplained",
-    "The inputs explain nothing of an output. The model, simulated from the inputs alone, is farther from "
-    "the output than the mean of the output. No effect of the inputs can be distinguished from zero.",
-    "See whether the columns are those of the plant, in their order and their units.",
+    "The inputs do not explain an output. Their simulation fits it worse than its mean. No effect can be "
+    "distinguished from zero.",
+    "Check that the columns belong to the plant, in the right order and units.",
 )
 NOISE_PREVAILS = note(
     "noise-prevails",
-    "Noise moves an output more than the inputs. The effect of the inputs on an output is seen, but noise "
-    "and drift move it more.",
-    "Apply more power, or compare models by their prediction instead of their simulation.",
+    "Noise moves an output more than the inputs. The effect of the inputs is visible, but noise and drift "
+    "are larger.",
+    "Apply more power, or compare models by prediction instead of simulation.",
 )
 
 

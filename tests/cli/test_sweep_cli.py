@@ -89,7 +89,7 @@ def test_the_pace_of_a_sweep_counts_what_was_computed_now():
 
 
 def test_completion_knows_codes_and_keys():
-    assert ("sweep-empty", "A sweep that varies nothing") in error_codes("sweep-")
+    assert ("sweep-empty", "The sweep varies nothing") in error_codes("sweep-")
     assert spec_keys("experiment.sa") == ["experiment.samples="]
     assert "accuracy.model_error.relative=" in spec_keys("accuracy.")
     assert spec_keys("spectrum.order=") == []

@@ -7,7 +7,7 @@ import pytest
 from inputdesign_cli import error_codes
 from inputdesign_cli.finding import Finding, Severity, trusted, undecided
 from inputdesign_cli.findings import kinds
-from tests.support.wording import long_sentences
+from tests.support.wording import long_sentences, unclear_words
 
 CODE = re.compile(r"[a-z]+(-[a-z]+)*")
 
@@ -15,11 +15,12 @@ CODE = re.compile(r"[a-z]+(-[a-z]+)*")
 @pytest.mark.parametrize("kind", kinds().values(), ids=kinds())
 def test_a_kind_is_explained(kind):
     assert CODE.fullmatch(kind.code)
-    assert kind.title
+    assert kind.title[0].isupper()
     assert not kind.title.endswith(".")
     assert kind.text.endswith(".")
     assert kind.remedy.endswith(".")
     assert long_sentences(f"{kind.text} {kind.remedy}") == []
+    assert unclear_words(f"{kind.title}. {kind.text} {kind.remedy}") == []
 
 
 def test_no_code_is_that_of_an_error_too():
