@@ -227,6 +227,6 @@ def test_a_gain_behind_a_pole_of_its_expression_is_told_with_where_the_search_en
         estimated(parse_spec(_LAG % (3.0, "1/(p - 1)"), design=False), tmp_path / "log.csv")
     (diagnostic,) = caught.value.diagnostics
     assert diagnostic.code == "not-exciting"
-    assert diagnostic.message.endswith("apart: p")
+    assert diagnostic.message.endswith("parameters: p")
     assert float(diagnostic.hint.partition("p = ")[2].partition(")")[0]) > 1e6
     assert "start elsewhere" in diagnostic.hint
