@@ -92,7 +92,7 @@ def test_parameters_that_the_band_cannot_tell_apart_are_named():
         arrays([[[1.0, 1.0]], [[1.0]]]), arrays([[[1.0, 2.0, 1.0]], [[2.0, 1.0]]]), np.eye(2)
     )
     with pytest.raises(
-        SpecError, match=r"within the band can tell.* b0\[1,1\], a0\[1,1\], a1\[1,1\]$"
+        SpecError, match=r"within the band can distinguish.* b0\[1,1\], a0\[1,1\], a1\[1,1\]$"
     ) as caught:
         Experiment(model, 1, (0.0, 1.0)).whitened(1.0)
     assert caught.value.diagnostics[0].code == "not-identifiable"

@@ -26,6 +26,7 @@ LIMITS = {
 }
 TRIED = [
     ("open", "power of noise", 0.02, 0.05),
+    pytest.param("open", "peaks", 0.05, 0.3, marks=pytest.mark.slow),
     pytest.param("loop", "power of sinusoids", 0.2, 0.5, marks=pytest.mark.slow),
     ("loop", "binary", 0.2, 0.3),
     ("resonant", "power of noise", 0.4, 0.2),
@@ -62,6 +63,8 @@ def test_who_follows_a_hint_succeeds(plant, limit, relative, level):
                 assert result["signal"]["worst_ratio"] <= 1.0 + 1e-6
             followed += 1
     assert followed
+    if told.code == "infeasible":
+        assert "a record can" in told.hint
 
 
 INTEGRATING = """
@@ -138,6 +141,6 @@ def test_what_would_do_is_looked_for_within_seconds(monkeypatch):
     short = refused()
     assert whole.code == short.code == "infeasible"
     assert whole.details == short.details
-    assert "a spectrum can, and" in whole.hint
-    assert "a spectrum can, and" not in short.hint
+    assert "a record can" in whole.hint
+    assert "a record can" not in short.hint
     assert "not looked for further" in short.hint
