@@ -1,7 +1,8 @@
 """The contract of `result.json`: what 04bdf145 wrote for the shipped specs is still there, field by field.
 
 Further fields are welcome; a missing one, another type or another number is a broken promise. Where a number
-was mended since, `results.json` has the new one.
+was mended since, `results.json` has the new one; so it has where another design, of equal cost within the
+proved gap, or another record of it came out.
 """
 
 import json
