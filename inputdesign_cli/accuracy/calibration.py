@@ -73,7 +73,7 @@ class Calibration:
         return Coverage(self.draws, int(np.sum(exact <= within)), int(np.sum(linear <= within)))
 
     def _steps(self, information: Array, *, fresh: bool) -> Array:
-        """(draws, k): theta minus its nominal value, of covariance M^-1."""
+        """Return theta minus its nominal value, of covariance M^-1, (draws, k)."""
         normal = np.random.default_rng([self.seed, fresh]).standard_normal((self.draws, len(information)))
         return np.asarray(normal @ inverse_factor(information))
 
@@ -107,13 +107,13 @@ def largest_error(errors: Sequence[ModelError], estimates: Array) -> Array:
 
 
 def _raw(errors: Sequence[ModelError], steps: Array) -> Array:
-    """(n, k): the parameters at steps in the coordinates of the errors."""
+    """Return the parameters at steps in the coordinates of the errors, (n, k)."""
     experiment = errors[0].experiment
     return np.asarray(experiment.model.theta + experiment.raw_steps(steps))
 
 
 def _to_first_order(errors: Sequence[ModelError], steps: Array) -> Array:
-    """(draws,): the same by the gradient of G."""
+    """Return the same by the gradient of G, (draws,)."""
     w, largest = _frequencies(errors), np.zeros(len(steps))
     for error in errors:
         rows = error.plant_rows(w) / _admissible(error, w)[:, None, None]

@@ -155,7 +155,7 @@ class DeterminantCut:
 
     @property
     def concave(self) -> ConcaveFunction:
-        """(det M)^{1/k} / level."""
+        """Return (det M)^{1/k} / level."""
 
         def at(information: Array, inverse: Array) -> tuple[float, Array]:
             size = len(information)

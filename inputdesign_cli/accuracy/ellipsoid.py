@@ -47,7 +47,7 @@ class EllipsoidError(OnModelError):
         return z, below, part.denominator
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """(n, 4, k): real and imaginary parts of z, then of c, over |c_0|."""
+        """Return real and imaginary parts of z, then of c, over |c_0|, (n, 4, k)."""
         z, c, start = self._forms(w)
         turned = np.conj(start) / np.abs(start) ** 2  # c_0 becomes 1
         return np.concatenate([real_rows(z * turned[:, None]), real_rows(c * turned[:, None])], axis=1)

@@ -58,7 +58,7 @@ class ModelError(OnModelError):
     """The requirement to first order."""
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """(n, q, k): V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T."""
+        """Return V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T, (n, q, k)."""
         return self.plant_rows(w) * (self.alpha / self.admissible.at(w))[:, None, None]
 
     def cut(self, frequency: float | None) -> MatrixCut:

@@ -72,10 +72,10 @@ class OverFrequency(Requirement):
 
     @abstractmethod
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """(n, q, k): T(w)."""
+        """Return T(w), (n, q, k)."""
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
-        """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm unless it is another."""
+        """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1; r_u / r_adm by default."""
         return largest_singular(half)
 
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:

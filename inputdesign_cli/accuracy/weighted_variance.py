@@ -42,7 +42,7 @@ class WeightedVariance(OverFrequency):
         return self.weight.singularities
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """(n, 2, k): |W| / sqrt(max) times the real and imaginary parts of Lambda."""
+        """Return |W| / sqrt(max) times the real and imaginary parts of Lambda, (n, 2, k)."""
         size = np.abs(self.weight.at(w)) / np.sqrt(self.limit)
         if self.relative:
             size = size / self.nominal_size(w)

@@ -53,13 +53,13 @@ class Evaluated:
 
     @cached_property
     def values(self) -> Array:
-        """(K,)."""
+        """Return the values (K,) of the steps."""
         ends = [self._found[place] for place in self._places]
         return np.array([math.nan if end is None else end.value for end in ends])
 
     @cached_property
     def gradients(self) -> Array:
-        """(K, m)."""
+        """Return the gradients (K, m) of the steps."""
         unit, slopes = np.eye(len(self._known)), list[Array | None]()
         # Overflow is seen in the result.
         with np.errstate(all="ignore"):

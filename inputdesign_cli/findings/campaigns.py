@@ -235,24 +235,34 @@ def planned_otherwise(
     """
     found = []
     if why:
-        message = f"there is no design at this estimate ({why}). The next part is white noise at the cost of "
-        message += "the first plan, or of the pilot. The estimate after it decides"
+        message = (
+            f"there is no design at this estimate ({why}). The next part is white noise at the cost of "
+            "the first plan, or of the pilot. The estimate after it decides"
+        )
         found.append(PART_WITHOUT_DESIGN.found(message, where=file, why=why))
     if capped:
-        message = f"{file} misses the accuracy that is asked: campaign.power_cap (default: 10 times the "
-        message += "first plan) or limits allow no more until campaign.max_samples"
+        message = (
+            f"{file} misses the accuracy that is asked: campaign.power_cap (default: 10 times the "
+            "first plan) or limits allow no more until campaign.max_samples"
+        )
         found.append(PLAN_CAPPED.found(message, where=file))
     if share < _NEARLY:
-        message = f"the part has {100 * share:.0f} % of the power of {file}: with all of it, it would cost "
-        message += "more than campaign.power_cap at the estimate or the plant of the spec"
+        message = (
+            f"the part has {100 * share:.0f} % of the power of {file}: with all of it, it would cost "
+            "more than campaign.power_cap at the estimate or the plant of the spec"
+        )
         found.append(PART_SCALED.found(message, where=file, share=share))
     if beyond:
-        message = f"a sample of the next part costs {part_cost:.4g}, more than campaign.power_cap allows, "
-        message += "since earlier parts still move the plant"
+        message = (
+            f"a sample of the next part costs {part_cost:.4g}, more than campaign.power_cap allows, "
+            "since earlier parts still move the plant"
+        )
         found.append(EARLIER_PARTS_COST.found(message, where=file, cost=part_cost))
     if fragile:
-        message = f"{file} is planned for the estimate alone: some plant that the data leave open asks for "
-        message += "more than campaign.power_cap and limits allow"
+        message = (
+            f"{file} is planned for the estimate alone: some plant that the data leave open asks for "
+            "more than campaign.power_cap and limits allow"
+        )
         found.append(PART_NOT_ROBUST.found(message, where=file))
     return found
 

@@ -28,7 +28,7 @@ def remedies_of(model: Model) -> dict[str, str]:
 
 
 def quantities(model: Model) -> NDArray[np.bool_]:
-    """(k,): whether each parameter is a physical quantity, of which no order can be too high."""
+    """Return whether each parameter is a physical quantity, of which no order can be too high, (k,)."""
     plant = blocks_of(model)["plant"]
     named = "parameters" in plant or "gain" in plant.get("continuous", {})
     return np.asarray((model.in_plant & named) | model.dead_times)

@@ -256,7 +256,7 @@ def _trend(records: Records, theta: Array) -> Regressors:
 
 
 def _of_outputs(signals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(p m, N, p): signals (p, N, m), each of its output and zero of the others."""
+    """Return signals (p, N, m), each of its output and zero of the others, (p m, N, p)."""
     p, samples, m = signals.shape
     found = np.zeros((p, m, samples, p))
     for output, own in enumerate(signals):
@@ -265,7 +265,7 @@ def _of_outputs(signals: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
-    """(p lags,): see `White.echoes`, of the residuals of every output at every lag, for every output."""
+    """See `White.echoes`, of the residuals of every output at every lag, for every output: (p lags,)."""
     p = len(white.root)
     starts = white.starts.reshape(white.residuals.size // p, p, -1)[: white.samples]
     here = np.einsum("nqm,qp->nmp", starts, white.root)

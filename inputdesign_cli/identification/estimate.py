@@ -251,7 +251,7 @@ def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
 
 
 def information_of(records: Records, point: Point, noise: Array) -> Array:
-    """(k, k): sum over the samples of psi noise^-1 psi^T."""
+    """Return sum over the samples of psi noise^-1 psi^T, (k, k)."""
     return replace(point.of_errors, weights=_weights(records, noise)).hessian
 
 

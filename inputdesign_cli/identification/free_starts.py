@@ -175,7 +175,7 @@ class FreeStarts:
         return found
 
     def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
-        """(M, p): the unknowns of past noise as errors, of outputs that have fewer zero."""
+        """Return the unknowns of past noise as errors, of outputs that have fewer zero, (M, p)."""
         found = np.zeros((self.past, len(self.starts)))
         for block, own in zip(self._blocks, coefficients, strict=True):
             past = block.rows[len(block.samples) :] - sum(self.lengths)

@@ -113,7 +113,7 @@ def found_period(x: Array) -> int:
 
 
 def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.int64]:
-    """(p, r): samples until the response to a pulse first has a tenth of its largest value; else 0.
+    """Return samples until the response to a pulse first has a tenth of its largest value, (p, r); else 0.
 
     Args:
         samples: of the record; later responses are not looked for.

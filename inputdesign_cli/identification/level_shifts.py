@@ -179,7 +179,7 @@ def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Arr
     rows = slice(begin * outputs, (begin + size) * outputs)
 
     def common(signals: Array) -> Array:
-        """(n, m): products of the response, begun at every sample, with signals (n p, m)."""
+        """Return products of the response, begun at every sample, with signals (n p, m), as (n, m)."""
         own = np.einsum("npm,p->nm", signals.reshape(size, outputs, -1), white.root[:, output])
         return np.asarray(scipy.signal.fftconvolve(own[::-1], response[:, None], axes=0)[:size][::-1])
 

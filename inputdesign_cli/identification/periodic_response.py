@@ -50,7 +50,7 @@ class Periods:
         return np.asarray(np.fft.rfft(self.parts(signal), axis=-2) / self.period)
 
     def means(self, signal: NDArray[np.float64], harmonics: NDArray[np.int_]) -> ComplexArray:
-        """(.., L, channels, blocks): the means over the periods that count."""
+        """Return the means over the periods that count, (.., L, channels, blocks)."""
         found = np.fft.rfft(self.parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
         return np.asarray(np.moveaxis(found, -3, -1))
 

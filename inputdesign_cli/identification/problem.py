@@ -44,12 +44,12 @@ class Point:
 
     @property
     def errors(self) -> Array:
-        """(N, p)."""
+        """Return the prediction errors (N, p)."""
         return self.near.errors
 
     @property
     def psi(self) -> NDArray[np.float64]:
-        """(k, N, p)."""
+        """Return psi, minus the slopes of the prediction errors, (k, N, p)."""
         return self.near.psi
 
     @property

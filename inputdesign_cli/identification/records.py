@@ -69,7 +69,7 @@ class Linearised:
 
     @property
     def all_errors(self) -> Array:
-        """(N + M, p)."""
+        """Return the prediction errors (N + M, p) of all samples."""
         return np.concatenate([self.errors, self.past])
 
     @property
@@ -115,12 +115,12 @@ class Records:
 
     @cached_property
     def u(self) -> Array:
-        """(N, r)."""
+        """Return the inputs (N, r)."""
         return np.concatenate([u for u, _ in self.parts])
 
     @cached_property
     def y(self) -> Array:
-        """(N, p)."""
+        """Return the outputs (N, p)."""
         return np.concatenate([y for _, y in self.parts])
 
     @property

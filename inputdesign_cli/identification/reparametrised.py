@@ -57,7 +57,7 @@ class ReparametrisedKind(Kind):
         return self.model.parametrisation.moves
 
     def own(self) -> Array:
-        """(p,): as many parameters as there are, shared by the outputs as the coefficients are."""
+        """Return as many parameters as there are, shared by the outputs as the coefficients are, (p,)."""
         of_all = self.coefficients.own()
         return of_all * (len(self.names) / max(float(np.sum(of_all)), 1.0))
 

@@ -16,7 +16,7 @@ _EXACT = 1e-12
 
 
 def is_stable(monic: Array) -> NDArray[np.bool_]:
-    """(runs,): whether all roots in z of each polynomial (runs, m + 1) lie inside the unit circle.
+    """Return whether all roots in z of each polynomial (runs, m + 1) lie inside the unit circle, (runs,).
 
     By the step-down recursion: the reflection coefficients are below one in modulus, by more than rounding.
     """
@@ -32,7 +32,7 @@ def is_stable(monic: Array) -> NDArray[np.bool_]:
 
 
 def without_integrators(monic: Array) -> Array:
-    """(m + 1 - n,): a polynomial in q^-1 divided by 1 - q^-1 as often (n times) as it can be."""
+    """Return a polynomial in q^-1 divided by 1 - q^-1 as often (n times) as it can be, (m + 1 - n,)."""
     while monic.size > 1 and abs(np.sum(monic)) <= _EXACT * np.sum(np.abs(monic)):
         monic = np.cumsum(monic)[:-1]
     return monic

@@ -98,7 +98,7 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
 
 
 def each_later(response: Array, count: int) -> NDArray:
-    """(count, N): a response (N,) begun at once, and one sample later than the row before."""
+    """Return a response (N,) begun at once, and one sample later than the row before, (count, N)."""
     padded = np.concatenate([np.zeros(max(count - 1, 0), dtype=response.dtype), response])
     return np.lib.stride_tricks.sliding_window_view(padded, response.size)[:count][::-1]
 

@@ -142,7 +142,7 @@ class StateSpaceKind(Kind):
         return estimated or bool(np.any(self.model.matrices.K))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m): signals (N, m) through the inverse of each output's own noise model."""
+        """Return signals (N, m) through the inverse of each output's own noise model, (p, N, m)."""
         model = self.model.at(theta)
         m = model.matrices
         closed = model.held[0] - m.K @ m.C

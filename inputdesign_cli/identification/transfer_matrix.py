@@ -129,7 +129,7 @@ class TransferKind(Kind):
         return self.between.sample_time if self.between.hold else None
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """(k, N, p): s^k / a through the errors of the output, for the coefficient a_k of an entry.
+        """Return s^k / a through the errors of the output, for the coefficient a_k of an entry, (k, N, p).
 
         That is what regressors made of measured outputs have beyond those made of the model's. The errors are
         interpolated within their band, and no dead time is between them. Entries of an output with a common
@@ -228,7 +228,7 @@ class TransferKind(Kind):
 
 @lru_cache(maxsize=32)
 def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int) -> Array:
-    """(m, N): what states of an entry, and unknown inputs over `late` samples, do to its output."""
+    """Return what states of an entry, and unknown inputs over `late` samples, do to its output, (m, N)."""
     entry = HeldEntry.of(np.ones(1), np.array(denominator), step)
     impulses = np.eye(min(entry.order + late, samples), samples)
     entering = np.concatenate([impulses, np.ones((int(entry.order > 0), samples))])

@@ -154,7 +154,7 @@ def _bent(f: Array, x: Array, lengths: Sequence[int]) -> tuple[Array, float]:
 
 
 def _last_moves(x: Array) -> Array:
-    """(N,): the direction in which x last moved; before it first does, the other one."""
+    """Return the direction in which x last moved, (N,); before it first does, the other one."""
     moves = np.sign(np.diff(x, prepend=x[:1]))
     first = np.flatnonzero(moves)[:1]
     moves[0] = -moves[first[0]] if first.size else 0.0

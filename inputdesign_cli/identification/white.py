@@ -149,7 +149,7 @@ class White:
         return found
 
     def mean_left(self, columns: Array, means: Array) -> Array:
-        """(m,): the means of scores of columns (N p, m) once what parameters explain is taken off."""
+        """Return the means of scores of columns (N p, m) once what parameters explain is taken off, (m,)."""
         if not np.any(means) and not np.any(self.means):
             return np.zeros(columns.shape[1])
         scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
@@ -158,7 +158,7 @@ class White:
 
     @property
     def errors(self) -> Array:
-        """(N, p): the residuals in their own units."""
+        """Return the residuals in their own units, (N, p)."""
         outputs = len(self.root)
         return self.residuals[: self.samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
 

@@ -43,7 +43,7 @@ class Coordinates:
 
     @cached_property
     def prior_information(self) -> Array:
-        """(k, k): `prior` in these coordinates, zero when there is none."""
+        """Return `prior` in these coordinates, zero when there is none, (k, k)."""
         if self.prior is None:
             return np.zeros((self.size, self.size))
         return self.whiten_matrix(self.prior)
@@ -54,7 +54,7 @@ class Coordinates:
 
     @property
     def from_raw(self) -> Array:
-        """(k, k): what takes the gradient with respect to raw parameters to these coordinates."""
+        """Return what takes the gradient with respect to raw parameters to these coordinates, (k, k)."""
         return np.eye(self.size) if self.factor is None else self._inverse_factor
 
     @cached_property

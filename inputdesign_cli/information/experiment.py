@@ -42,7 +42,7 @@ class WeightedProducts:
         )
 
     def at(self, weight: Array) -> ComplexArray:
-        """(n, r, r): sum over outputs of F^* Y F, Y = `weight` (k, k) symmetric."""
+        """Return sum over outputs of F^* Y F, Y = `weight` (k, k) symmetric, (n, r, r)."""
         return np.concatenate([_summed(part, weight) for part in self.parts])
 
 
@@ -132,7 +132,7 @@ class Experiment(Coordinates):
         return self._whiten(np.einsum("pq,nkqr->nkpr", self.noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
+        """Return what white e of covariance I contributes, noise whitened to I, (n, k, p, p)."""
         K = self.noise_whitener
         gradient = self._source.noise_gradient(w)
         if len(K) == 1:
@@ -199,7 +199,7 @@ class Experiment(Coordinates):
         return kind == "output" or (kind in ("input", "moves") and self.loop is not None)
 
     def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
-        """(n, p or r, r): from x to the outputs, the inputs, their moves or x itself."""
+        """Return from x to the outputs, the inputs, their moves or x itself, (n, p or r, r)."""
         if kind == "moves":
             return self._moving(w)[:, None, None] * self.response("input", w)
         if not self.depends_on_plant(kind):
@@ -210,7 +210,7 @@ class Experiment(Coordinates):
         return y if kind == "output" else u
 
     def _moving(self, w: ArrayLike) -> ComplexArray:
-        """(n,): 1 - q^-1, of samples that are held."""
+        """Return 1 - q^-1, of samples that are held, (n,)."""
         return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
     def squeezed(self, density: NDArray) -> NDArray:
@@ -227,7 +227,7 @@ class Experiment(Coordinates):
 
     @property
     def baseline_information(self) -> Array:
-        """(k, k): what is known without any excitation, by the noise and by `prior`."""
+        """Return what is known without any excitation, by the noise and by `prior`, (k, k)."""
         return self.noise_information + self.prior_information
 
     def of_length(self, information: Array, samples: int) -> Array:

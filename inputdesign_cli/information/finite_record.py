@@ -38,7 +38,7 @@ class FiniteRecord:
     step: float = 1.0
 
     def information(self, record: Array) -> Array:
-        """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (n, r), in these coordinates."""
+        """Return M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (n, r), in these coordinates, (k, k)."""
         return self.known + self._excited(record)
 
     def information_of_experiment(self, record: Array) -> Array:
@@ -52,7 +52,7 @@ class FiniteRecord:
         return np.asarray(flat @ flat.T)
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """(n, k, p): psi of the prediction, from rest, in these coordinates, noise whitened to I."""
+        """Return psi of the prediction, from rest, in these coordinates, noise whitened to I, (n, k, p)."""
         return self._answers.gradient(record)
 
     @cached_property
@@ -62,11 +62,11 @@ class FiniteRecord:
         return self.experiment.prior_information + share * self.experiment.noise_information
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """(n, channels): what the samples (n, r) alone cause at inputs or outputs, from rest."""
+        """Return what the samples (n, r) alone cause at inputs or outputs, from rest, (n, channels)."""
         return record if self._is_record(of) else self._answers.signals(of, record)
 
     def mean_squares(self, of: PowerKind, record: Array) -> Array:
-        """(channels,): the powers of these signals."""
+        """Return the powers of these signals (channels,)."""
         return np.mean(self.signals(of, record) ** 2, axis=0)
 
     @property
@@ -80,7 +80,7 @@ class FiniteRecord:
         return np.array([plant.mean_squares(of, record) for plant in plants])
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
-        """(n, r): the transpose of `signals`, applied to weights (n, channels)."""
+        """Return the transpose of `signals`, applied to weights (n, channels), (n, r)."""
         return weights if self._is_record(of) else self._answers.adjoint(of, weights)
 
     def _is_record(self, of: PowerKind) -> bool:
@@ -103,12 +103,12 @@ class FiniteRecords(FiniteRecord):
     others: tuple[Experiment, ...] = ()
 
     def information(self, record: Array) -> NDArray[np.float64]:
-        """(1 + others, k, k): each as in `FiniteRecord`."""
+        """Return each as in `FiniteRecord` (1 + others, k, k)."""
         return np.array([plant.information(record) for plant in self.each])
 
     @cached_property
     def known(self) -> NDArray[np.float64]:
-        """(1 + others, k, k): each as in `FiniteRecord`."""
+        """Return each as in `FiniteRecord` (1 + others, k, k)."""
         return np.array([plant.known for plant in self.each])
 
     @cached_property

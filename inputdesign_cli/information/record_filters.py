@@ -35,12 +35,12 @@ class RecordFilters:
         return cls(experiment, model)
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """(n, 1): what the samples (n, 1) alone cause at the input or the output."""
+        """Return what the samples (n, 1) alone cause at the input or the output, as (n, 1)."""
         numerator, denominator = self._responses[of]
         return filtered(numerator, denominator, record, axis=0)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
-        """(n, 1): the transpose of `signals`; a filter run backwards in time is its own."""
+        """Return the transpose of `signals` (n, 1); a filter run backwards in time is its own."""
         return self.signals(of, weights[::-1])[::-1]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
@@ -69,7 +69,7 @@ class RecordFilters:
         }
 
     def _sources(self, record: Array) -> dict[str, Array]:
-        """(n,) each: the gradient with respect to a coefficient of A, B or F, but for its delay.
+        """Return the gradient with respect to a coefficient of A, B or F, but for its delay, (n,).
 
         Minus the derivatives of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters follow each
         other: in one product of their denominators twice the same pole costs half the digits.

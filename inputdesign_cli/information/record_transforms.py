@@ -35,12 +35,12 @@ class RecordTransforms:
     step: float
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """(n, channels): what the samples (n, r) alone cause at inputs or outputs."""
+        """Return what the samples (n, r) alone cause at inputs or outputs, (n, channels)."""
         answer = np.einsum("ncr,nr->nc", self._responses(of), self._transform(record))
         return self._back(answer)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
-        """(n, r): the transpose of `signals`, applied to weights (n, channels)."""
+        """Return the transpose of `signals`, applied to weights (n, channels), (n, r)."""
         falling = self._weights[:, None]
         transform = np.fft.rfft(weights / falling, self._length, axis=0)
         answer = np.einsum("ncr,nc->nr", self._responses(of).conj(), transform)
@@ -70,7 +70,7 @@ class RecordTransforms:
 
     @cached_property
     def _weights(self) -> Array:
-        """(n,): e^(-rho t)."""
+        """Return e^(-rho t), as (n,)."""
         return np.exp(-self._decay * np.arange(self.samples))
 
     @cached_property

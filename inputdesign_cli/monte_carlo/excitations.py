@@ -80,7 +80,7 @@ class Redrawn:
 
     @cached_property
     def powers(self) -> Array:
-        """(r,): the power of each channel."""
+        """Return the power of each channel (r,)."""
         inputs = self.generator.spectrum.inputs
 
         def of(channel: int) -> float:
@@ -142,6 +142,6 @@ class InPhase:
 
 
 def spectral_information(basis: Basis | TabulatedSpectrum, x: Array, experiment: Experiment) -> Array:
-    """(k, k): M of a spectrum in the coordinates of an experiment."""
+    """Return M of a spectrum in the coordinates of an experiment, (k, k)."""
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     return np.asarray(experiment.baseline_information + np.tensordot(x, maps, axes=1))

@@ -118,7 +118,7 @@ def _noise(plant: MatrixPlant, runs: int, samples: int, rng: np.random.Generator
 
 
 def _largest_root(denominator: Array) -> Array:
-    """(runs,): the largest modulus of the roots in z of each polynomial (runs, m) in q^-1."""
+    """Return the largest modulus of the roots in z of each polynomial (runs, m) in q^-1, (runs,)."""
     order = denominator.shape[1] - 1
     if order == 0:
         return np.zeros(denominator.shape[0])

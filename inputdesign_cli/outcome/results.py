@@ -139,7 +139,7 @@ _SAME_LINE = 1e-3
 
 
 def _room(frequency: Array) -> Array:
-    """(n,): the frequency of each line, or its distance to the next one where that is less."""
+    """Return the frequency of each line, or its distance to the next one where that is less, (n,)."""
     apart = np.abs(frequency[:, None] - frequency)
     np.fill_diagonal(apart, np.inf)
     return np.minimum(frequency, apart.min(axis=1))

@@ -75,7 +75,7 @@ class Coloured(Around, Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): the parameters on which G depends."""
+        """Return the parameters on which G depends, (k,)."""
         return np.concatenate([self.plant.in_plant, np.zeros(len(self.own_parameters), dtype=bool)])
 
     @cached_property
@@ -173,7 +173,7 @@ class Coloured(Around, Parametrised):
         return beside_zero(w, self._nearest)
 
     def shape_at(self, w: ArrayLike) -> ComplexArray:
-        """(n, p): C / (D Delta)."""
+        """Return C / (D Delta), as (n, p)."""
         return 1.0 / self._inverse_at(w)
 
     def _inverse_at(self, w: ArrayLike) -> ComplexArray:

@@ -103,7 +103,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): see `Model`."""
+        """See `Model`: (p, r)."""
         found = np.zeros((self.outputs, self.inputs), dtype=bool)
         for i, j in self.active:
             equal = self.numerator[i][j].size == self.denominator[i][j].size
@@ -202,7 +202,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return max((self.dead_time(i, j) for i, j in self.active), default=0.0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): its dead time."""
+        """Return a mask (k,) of the dead time."""
         place = (output, input)
         return np.array([p.letter == DELAY and place in p.places for p in self.parameters], dtype=bool)
 

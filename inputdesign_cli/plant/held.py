@@ -90,7 +90,7 @@ class HeldEntry:
 
     @cached_property
     def entries(self) -> Array:
-        """(2 order, 2): how u(k - lag) and u(k - lag - 1) enter the states."""
+        """Return how u(k - lag) and u(k - lag - 1) enter the states, (2 order, 2)."""
         n = 2 * self.order
         whole, early = self._held[:n, n], self._after_fraction[:n, n]
         return np.stack([early, whole - early], axis=1)
@@ -123,7 +123,7 @@ class HeldEntry:
 
     @cached_property
     def _pulse(self) -> Array:
-        """(order,): how u(k - d - 1) - u(k - d) enters the derivatives of the first states."""
+        """Return how u(k - d - 1) - u(k - d) enters the derivatives of the first states, (order,)."""
         n = self.order
         return np.asarray(self.unit * self._after_fraction[:n, n - 1])
 
@@ -141,7 +141,7 @@ class HeldEntry:
         return row
 
     def responses(self, z: ComplexArray) -> ComplexArray:
-        """(m, columns): what held samples cause, at points z of the unit circle."""
+        """Return what held samples cause, at points z of the unit circle, (m, columns)."""
         late = z ** -float(self.lag)
         entries = self.entries if self._fraction else self.entries[:, :1]
         driven = entries.T[:1] + entries.T[1:] / z[:, None] if self._fraction else entries.T
@@ -157,7 +157,7 @@ class HeldEntry:
         return np.concatenate(parts, axis=1).astype(complex)
 
     def _through(self, driven: ComplexArray | Array, z: ComplexArray) -> ComplexArray:
-        """(m, 2 order): the states that inputs (m or 1, 2 order) drive, at points z.
+        """Return the states that inputs (m or 1, 2 order) drive, at points z, (m, 2 order).
 
         By back-substitution in a triangular form, for all points at once.
         """
@@ -187,7 +187,7 @@ class HeldEntry:
         return np.triu(basis.conj().T @ self.transition @ basis), basis
 
     def interpolated(self, w: Array | ComplexArray) -> ComplexArray:
-        """(m, columns): what the interpolation of samples causes, at frequencies w, without a hold.
+        """Return what the interpolation of samples causes, at frequencies w, without a hold, (m, columns).
 
         With w - j sigma of samples that are weighted with e^(-sigma t).
         """

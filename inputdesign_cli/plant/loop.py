@@ -202,11 +202,11 @@ class Loop:
         return y, -minus_u
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, r): what r contributes to the gradient of the prediction."""
+        """Return what r contributes to the gradient of the prediction, (n, k, p, r)."""
         return excitation_gradients([self], w)[0]
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, p): what e contributes, through the noise model and around the loop."""
+        """Return what e contributes, through the noise model and around the loop, (n, k, p, p)."""
         return disturbance_gradients([self], w)[0]
 
 
@@ -234,7 +234,7 @@ def _alike(loops: Sequence[Loop]) -> bool:
 
 
 def _lefts_at(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
-    """(S, n, p + r, p + r): the matrices on the left of `Loop`, beside zero."""
+    """Return the matrices on the left of `Loop`, beside zero, (S, n, p + r, p + r)."""
     first, models = loops[0], [loop.model for loop in loops]
     if not _alike(loops):
         return np.concatenate([_lefts_at([loop], w) for loop in loops])

@@ -58,7 +58,7 @@ class Model(Protocol):
 
     @property
     def theta(self) -> Array:
-        """(k,): values of the parameters."""
+        """Return values of the parameters (k,)."""
 
     @property
     def flaw(self) -> str | None:
@@ -66,11 +66,11 @@ class Model(Protocol):
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): the parameters on which G depends."""
+        """Return a mask (k,) in which all parameters act in the plant."""
 
     @property
     def dead_times(self) -> NDArray[np.bool_]:
-        """(k,): the parameters that move a dead time."""
+        """Return the parameters that move a dead time, (k,)."""
 
     @property
     def singularities(self) -> ComplexArray:
@@ -91,7 +91,7 @@ class Model(Protocol):
         """How long, in samples or in time units, signals matter beyond what the poles remember."""
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): the parameters in which numerator and denominator of an entry of G are not affine."""
+        """Return the parameters in which numerator and denominator of an entry of G are not affine, (k,)."""
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
         """Return one entry of G as a `Fraction`, where no free parameter bends it."""
@@ -138,7 +138,7 @@ class SampledPlant(Model, Protocol):
 
     @property
     def noise_gain(self) -> Array:
-        """(states, p): how R H e enters the states besides its way through the outputs."""
+        """Return how R H e enters the states besides its way through the outputs, (states, p)."""
 
     @property
     def predictor_poles(self) -> ComplexArray:
@@ -225,7 +225,7 @@ def tables_at(
 
 @singledispatch
 def input_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """(S, n, k, p, r): `input_gradient` of models of one structure, `model` the first of them.
+    """Return `input_gradient` of models of one structure, `model` the first of them, (S, n, k, p, r).
 
     A kind of plant for which all at once is faster registers its own.
     """
@@ -234,7 +234,7 @@ def input_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> Comp
 
 @singledispatch
 def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
-    """(S, n, k, p, p): `noise_gradient`, in the same way."""
+    """Return `noise_gradient`, in the same way (S, n, k, p, p)."""
     return np.stack([each.noise_gradient(w) for each in models])
 
 
@@ -242,7 +242,7 @@ def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> Comp
 def prediction_gradients(
     model: Model, models: Sequence[Model], w: ArrayLike, y: NDArray, u: NDArray, e: NDArray
 ) -> ComplexArray:
-    """(S, n, k, p, m): `prediction_gradient`, in the same way, for y, u and e (S, n, p or r, m)."""
+    """Return `prediction_gradient`, in the same way, for y, u and e (S, n, p or r, m), (S, n, k, p, m)."""
     each = zip(models, y, u, e, strict=True)
     return np.stack([one.prediction_gradient(w, *signals) for one, *signals in each])
 
@@ -286,7 +286,7 @@ class Parametrised:
 
     @cached_property
     def theta(self) -> Array:
-        """(k,): values of the parameters."""
+        """Return values of the parameters (k,)."""
         return np.array([parameter.value for parameter in self.parameters])
 
     @property
@@ -326,22 +326,22 @@ class WhiteNoise:
 
         @property
         def theta(self) -> Array:
-            """(k,): values of the parameters."""
+            """Return values of the parameters (k,)."""
 
         def plant_gradient(self, w: ArrayLike) -> ComplexArray:
             """dG/dtheta (n, k, p, r)."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): all of them."""
+        """Return a mask (k,) in which all parameters act in the plant."""
         return np.ones(self.theta.size, dtype=bool)
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, r): dG/dtheta."""
+        """Return dG/dtheta (n, k, p, r)."""
         return self.plant_gradient(w)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, p): zero."""
+        """Return zero (n, k, p, p)."""
         return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:

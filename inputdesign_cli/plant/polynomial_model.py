@@ -113,14 +113,14 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def first(self) -> tuple[tuple[int, ...], ...]:
-        """(p, r): `delays`, also where zeros of B say them."""
+        """Return `delays`, also where zeros of B say them, (p, r)."""
         if self.delays is not None:
             return self.delays
         return tuple(tuple(b.size - np.trim_zeros(b, "f").size for b in row) for row in self.B)
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): see `Model`."""
+        """See `Model`: (p, r)."""
         return np.array(
             [[(i, j) in self.active and not d for j, d in enumerate(row)] for i, row in enumerate(self.first)]
         )
@@ -133,7 +133,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): the parameters on which G depends."""
+        """Return the parameters on which G depends, (k,)."""
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
 
     @cached_property
@@ -238,7 +238,7 @@ class PolynomialModel(Parametrised):
         return Fraction(B, A * F, above, below)
 
     def _entry(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
-        """(3, n): A_i, B_ij and F_ij."""
+        """Return A_i, B_ij and F_ij (3, n)."""
         return evaluate(stack([[self.row(self.A, i), self.B[i][j], self.F[i][j]]])[0], q)
 
     def _shifts(self, q: ComplexArray) -> list[ComplexArray]:
@@ -291,7 +291,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def _fractions(self) -> Array:
-        """(p, 1 + r, l): R_i = A_i prod_j F_ij of each output, and the numerators N_ij of R G."""
+        """Return R_i = A_i prod_j F_ij of each output, and the numerators N_ij of R G, (p, 1 + r, l)."""
         rows = [
             [product_of([a, *f]).tolist()]
             + [product_of([b, *f[:j], *f[j + 1 :]]).tolist() for j, b in enumerate(self.B[i])]

@@ -47,12 +47,12 @@ class Parametrisation:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """(k,): labels of the free ones."""
+        """Return labels of the free ones (k,)."""
         return tuple(label for label, free in zip(self.labels, self.free, strict=True) if free)
 
     @property
     def theta(self) -> Array:
-        """(k,): values of the free ones."""
+        """Return the values (k,) of the parameters."""
         return self.values[self.free]
 
     @property
@@ -79,7 +79,7 @@ class Parametrisation:
 
     @cached_property
     def coefficients(self) -> Array:
-        """(K,): not a number where a term is not defined."""
+        """Return NaN where a term is not defined, (K,)."""
         return self._image.values
 
     @cached_property
@@ -138,12 +138,12 @@ class Reparametrised(Around):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """(k,): what the free parameters are called."""
+        """Return what the free parameters are called, (k,)."""
         return self.parametrisation.names
 
     @property
     def theta(self) -> Array:
-        """(k,): their values."""
+        """Return the values (k,) of the parameters."""
         return self.parametrisation.theta
 
     @property
@@ -154,16 +154,16 @@ class Reparametrised(Around):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): the parameters on which G depends."""
+        """Return the parameters on which G depends, (k,)."""
         return np.any(self.parametrisation.moves[self.coefficients.in_plant], axis=0)
 
     @cached_property
     def dead_times(self) -> NDArray[np.bool_]:
-        """(k,): the parameters that move a dead time."""
+        """Return the parameters that move a dead time, (k,)."""
         return np.any(self.parametrisation.moves[self.coefficients.dead_times], axis=0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): what the coefficients of `bends` follow from; all, unless these are affine."""
+        """Return what the coefficients of `bends` follow from, (k,); all, unless these are affine."""
         if not self.parametrisation.affine:
             return np.ones(len(self.names), dtype=bool)
         return np.any(self.parametrisation.moves[self.coefficients.bends(output, input)], axis=0)

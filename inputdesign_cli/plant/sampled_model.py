@@ -41,12 +41,12 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @property
     def covariance(self) -> Array:
-        """(p, p) of e."""
+        """Return the covariance (p, p) of e."""
         return self.continuous_plant.covariance
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): see `Model`."""
+        """See `Model`: (p, r)."""
         found = np.zeros((self.outputs, self.inputs), dtype=bool)
         for place, entry in self._entries.items():
             found[place] = entry.biproper and not entry.direct_lag

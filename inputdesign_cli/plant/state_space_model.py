@@ -95,7 +95,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def at_once(self) -> NDArray[np.bool_]:
-        """(p, r): see `Model`."""
+        """See `Model`: (p, r)."""
         found = self.matrices.D != 0.0
         for letter, i, j in self.entries:
             if letter == "D":
@@ -109,7 +109,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): all but entries of K."""
+        """Return all but entries of K (k,)."""
         return np.array([letter != "K" for letter, _, _ in self.entries], dtype=bool)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> StateSpaceModel:
@@ -241,7 +241,7 @@ class StateSpaceModel(Parametrised):
         return e
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:
-        """(k,): all."""
+        """Return a mask (k,) of all parameters."""
         return np.ones(len(self.entries), dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
@@ -259,7 +259,7 @@ class StateSpaceModel(Parametrised):
         return np.linalg.inv(z[:, None, None] * np.eye(self.order) - A).astype(complex)
 
     def _entering(self, z: ComplexArray, early: Array, late: Array) -> ComplexArray:
-        """(m, n, r): how u enters the states."""
+        """Return how u enters the states (m, n, r)."""
         delayed = z[:, None, None] ** -float(self.lag)
         return np.asarray(delayed * (early + late / z[:, None, None]), dtype=complex)
 

@@ -81,7 +81,7 @@ class SignalGenerator:
         return Lines.of_period(powers, block)
 
     def values(self, rng: np.random.Generator) -> Array:
-        """(samples // hold, r): one record, faded in and out, before each value is held."""
+        """Return one record, faded in and out, before each value is held, (samples // hold, r)."""
         settings = self.settings
         if self.factor is not None and self.method == "filtered_noise" and settings.periods == 1:
             whole = self.factor.filtered(self.samples, rng)[:: settings.hold, None]
@@ -96,7 +96,7 @@ class SignalGenerator:
         return Draft(self.lines, self.period, self.settings, (lo, hi), self.limited)
 
     def _hold_gain(self, block: int) -> Array:
-        """(block // 2 + 1,): what holding each value k times does to the powers of the harmonics.
+        """Return what holding each value k times does to the powers of the harmonics, (block // 2 + 1,).
 
         |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; what lies above is lost.
         """

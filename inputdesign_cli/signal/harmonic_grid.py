@@ -57,7 +57,7 @@ def thinned(candidates: Harmonics, group: int, rng: np.random.Generator) -> Harm
 
 
 def nearest_harmonics(period: int, frequencies: Array, *, odd: bool) -> Harmonics:
-    """(L,): the harmonics next to frequencies in rad/sample, within (0, pi)."""
+    """Return the harmonics next to frequencies in rad/sample, within (0, pi), as (L,)."""
     step = 2 if odd else 1
     highest = _highest(period, odd)
     nearest = np.rint((frequencies * period / (2.0 * np.pi) - 1.0) / step).astype(int) * step + 1

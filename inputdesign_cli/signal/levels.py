@@ -113,7 +113,7 @@ def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> Comp
 
 
 def _unitary(matrices: ComplexArray) -> ComplexArray:
-    """(L, r, r): the unitary factors of their polar decompositions."""
+    """Return the unitary factors of their polar decompositions, (L, r, r)."""
     if matrices.shape[-1] == 1:
         return np.exp(1j * np.angle(matrices))
     left, _, right = np.linalg.svd(matrices)

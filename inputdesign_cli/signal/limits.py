@@ -100,7 +100,7 @@ class Limiter:
 
     @cached_property
     def reach(self) -> Array:
-        """(r,): the largest modulus, by the bound and by the range of the converter."""
+        """Return the largest modulus, by the bound and by the range of the converter, (r,)."""
         converters = np.array([one.reach() for one in self.quantisers] or [np.inf])
         return np.minimum(self.amplitude, converters)
 
@@ -113,7 +113,7 @@ class Limiter:
         )
 
     def record(self, values: Array, level: float) -> Array:
-        """(n, r): `level` times the `values` as far as the limits allow, which hold exactly."""
+        """Return `level` times the `values` as far as the limits allow, which hold exactly, (n, r)."""
         goal = level * values
         if self.plain:
             return self._held(goal)
@@ -162,7 +162,7 @@ class Limiter:
 
     @cached_property
     def _most(self) -> Array:
-        """(r,): the reach, of whole steps of the converter."""
+        """Return the reach, of whole steps of the converter, (r,)."""
         return self._whole(self.reach, self.reach)
 
     @cached_property

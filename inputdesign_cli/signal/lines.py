@@ -38,22 +38,22 @@ class Lines:
 
     @property
     def mean_squares(self) -> Array:
-        """(r,): the powers of the inputs."""
+        """Return the powers of the inputs (r,)."""
         return np.asarray(np.einsum("naa->a", self.powers).real)
 
     @property
     def totals(self) -> Array:
-        """(L,): the power of each line in all inputs together."""
+        """Return the power of each line in all inputs together, (L,)."""
         return np.asarray(np.einsum("naa->n", self.powers).real)
 
     @cached_property
     def real(self) -> NDArray[np.bool_]:
-        """(L,): the lines at 0 and pi, where a sinusoid has no phase, only a sign."""
+        """Return the lines at 0 and pi, where a sinusoid has no phase, only a sign, (L,)."""
         return (self.frequencies < _END) | (self.frequencies > np.pi - _END)
 
     @cached_property
     def roots(self) -> ComplexArray:
-        """(L, r, r): Hermitian square roots of the powers, real ones at 0 and pi."""
+        """Return Hermitian square roots of the powers, real ones at 0 and pi, (L, r, r)."""
         powers = np.where(self.real[:, None, None], self.powers.real, self.powers)
         if self.inputs == 1:
             return np.asarray(np.sqrt(np.maximum(powers.real, 0.0)), dtype=complex)

@@ -22,7 +22,7 @@ def rank(R: Array) -> int:
 
 
 def free_regressors(R: Array, samples: int, period: int) -> NDArray[np.float64]:
-    """(samples, n): Phi of the given period with Phi^T Phi = R to rounding.
+    """Return phi of the given period with Phi^T Phi = R to rounding, (samples, n).
 
     Phi = C Lambda^{1/2} Q^T with R = Q Lambda Q^T and orthonormal columns C, cosines of the period (the
     first of them constant).

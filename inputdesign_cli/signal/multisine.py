@@ -60,7 +60,7 @@ def blocks_of(vectors: LineVectors, inputs: int) -> int:
 def multisine_record(
     lines: Lines, samples: int, rng: np.random.Generator, vectors: LineVectors, *, angles: Array | None = None
 ) -> Array:
-    """(samples, r): one block after the other, each with the same random phase a line.
+    """Return one block after the other, each with the same random phase a line, (samples, r).
 
     Args:
         vectors: `orthogonal`: r blocks, line vectors root(P) e^{j psi} q_b with q_b the columns of an
@@ -91,7 +91,7 @@ def multisine_record(
 
 
 def gaussian_record(lines: Lines, rng: np.random.Generator) -> Array:
-    """(period, r): Gaussian noise that is periodic, with random amplitudes at all of its harmonics."""
+    """Return Gaussian noise that is periodic, with random amplitudes at all of its harmonics, (period, r)."""
     assert lines.period is not None
     random = rng.standard_normal((2, len(lines.powers), lines.inputs))
     mix = np.where(lines.real[:, None], random[0], (random[0] + 1j * random[1]) / np.sqrt(2.0))
@@ -99,7 +99,7 @@ def gaussian_record(lines: Lines, rng: np.random.Generator) -> Array:
 
 
 def in_phase_record(frequencies: Array, amplitudes: Array, samples: int, rng: np.random.Generator) -> Array:
-    """(samples, r): sinusoids of these amplitudes (L, r), each of one random phase in all channels.
+    """Return sinusoids of these amplitudes (L, r), each of one random phase in all channels, (samples, r).
 
     At 0 and pi a sinusoid is a constant or alternates; its sign is random.
     """

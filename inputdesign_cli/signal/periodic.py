@@ -10,7 +10,7 @@ from inputdesign_cli.signal.lines import Lines
 
 
 def harmonics(samples: int) -> Array:
-    """(samples // 2 + 1,): the frequencies that fit into a record, in rad/sample."""
+    """Return the frequencies that fit into a record, in rad/sample, (samples // 2 + 1,)."""
     return 2 * np.pi * np.arange(samples // 2 + 1) / samples
 
 
@@ -29,7 +29,7 @@ def dense_roots(lines: Lines, samples: int) -> ComplexArray:
 
 
 def even_multisine(lines: Lines, samples: int, rng: np.random.Generator, *, periods: int) -> Array:
-    """(samples, r): blocks of samples / periods, each line of a block of rank one, with random phases.
+    """Return blocks of samples / periods, each line of a block of rank one, with random phases, (samples, r).
 
     With as many periods as inputs the vectors of the blocks are orthogonal, and the blocks together have
     the spectrum exactly. In contrast to `multisine_record` every column of the roots has phases of its own:
@@ -60,7 +60,7 @@ def noise_drive(inputs: int, samples: int, runs: int, rng: np.random.Generator) 
 
 
 def shaped_noise(roots: ComplexArray, drive: ComplexArray, samples: int) -> Array:
-    """(runs, samples, r): the drive with the spectrum of `roots`, see `dense_roots`."""
+    """Return the drive with the spectrum of `roots`, see `dense_roots`, (runs, samples, r)."""
     inputs = drive.shape[-1]
     out = np.empty((inputs, len(drive), samples))
     for i in range(inputs):

@@ -30,7 +30,7 @@ def optimise_phases(
     powers: Sequence[int] = POWERS,
     steps: int = STEPS,
 ) -> Array:
-    """(L,): phases from `start` (L,) on that keep the largest of all samples low.
+    """Return phases from `start` (L,) on that keep the largest of all samples low, as (L,).
 
     [guillaume-1991]: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak.
 
@@ -96,7 +96,7 @@ def _power_before_last(values: Array, p: int) -> Array:
 
 
 def schroeder_phases(lines: Lines, samples: int) -> Array:
-    """(L,): the phases of [schroeder-1970] for the total power, common to all inputs and periods."""
+    """Return the phases of [schroeder-1970] for the total power, common to all inputs and periods, (L,)."""
     return _common(lines, samples, lines.totals).schroeder_phases()
 
 
@@ -109,7 +109,7 @@ def low_peak_phases(
     powers: Sequence[int] = POWERS,
     steps: int = STEPS,
 ) -> Array:
-    """(L,): the common phases of the lines for which the joint peak over signals and periods is low.
+    """Return the common phases of the lines for which the joint peak over signals and periods is low, (L,).
 
     Args:
         samples: of the whole record, in as many periods as there are inputs.

@@ -43,7 +43,7 @@ def register_length(samples: int) -> int:
 
 
 def shifted_sequences(bits: int, samples: int, inputs: int, rng: np.random.Generator) -> Array:
-    """(samples, inputs): one sequence, for each input shifted by an equal part of its length.
+    """Return one sequence, for each input shifted by an equal part of its length, (samples, inputs).
 
     Over a whole sequence the inputs are correlated by -1 over its length, but for lags at the shifts.
     """

@@ -41,7 +41,7 @@ class RationalFilter:
         return float(np.abs(np.linalg.eigvals(self.A)).max(initial=0.0))
 
     def at(self, w: Array) -> ComplexArray:
-        """(K, n, n): the frequency response."""
+        """Return the frequency response (K, n, n)."""
         z = 1 / unit_circle(w)
         states = np.linalg.solve(
             z[:, None, None] * np.eye(self.order) - self.A, np.broadcast_to(self.B, (w.size, *self.B.shape))
@@ -49,12 +49,12 @@ class RationalFilter:
         return np.asarray(self.C @ states + self.D)
 
     def spectrum(self, w: Array) -> ComplexArray:
-        """(K, n, n): response times its conjugate transpose."""
+        """Return response times its conjugate transpose (K, n, n)."""
         response = self.at(w)
         return np.asarray(response @ np.conj(np.swapaxes(response, 1, 2)))
 
     def power(self) -> Array:
-        """(n,): the exact mean squares of its outputs."""
+        """Return the exact mean squares of its outputs, (n,)."""
         covariance = scipy.linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T)
         return np.diag(self.C @ covariance @ self.C.T + self.D @ self.D.T)
 
@@ -63,7 +63,7 @@ class RationalFilter:
         return RationalFilter(self.A, self.B, factor * self.C, factor * self.D)
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
-        """(samples, n): stationary noise, started from the stationary distribution of the state."""
+        """Return stationary noise, started from the stationary distribution of the state, (samples, n)."""
         import scipy.signal  # only now: see `plant.filtering`
 
         covariance = scipy.linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T)

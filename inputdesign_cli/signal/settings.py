@@ -100,7 +100,7 @@ class SignalSettings:
         return samples // self.block
 
     def taper(self, values: int) -> Array:
-        """(values,): the fade in and out, half a cosine each."""
+        """Return the fade in and out, half a cosine each, (values,)."""
         length = min(-(-self.ramp // self.hold), values // 2)
         edge = 0.5 - 0.5 * np.cos(np.pi * (np.arange(length) + 1.0) / (length + 1.0))
         return np.concatenate([edge, np.ones(values - 2 * length), edge[::-1]])

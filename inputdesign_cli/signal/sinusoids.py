@@ -36,26 +36,26 @@ class Sinusoids:
 
     @cached_property
     def real(self) -> NDArray[np.bool_]:
-        """(L,) bool: sinusoids at 0 and pi, which have a sign but no phase."""
+        """Return sinusoids at 0 and pi, which have a sign but no phase, (L,)."""
         return (self.frequencies < 1e-12) | (self.frequencies > np.pi - 1e-12)
 
     @cached_property
     def amplitudes(self) -> Array:
-        """(L,): amplitudes A with mean square A^2 / 2, at 0 and pi A^2."""
+        """Return amplitudes A with mean square A^2 / 2, at 0 and pi A^2, (L,)."""
         return np.where(self.real, 1.0, np.sqrt(2.0)) * np.sqrt(np.maximum(self.powers, 0.0))
 
     @cached_property
     def _table(self) -> ComplexArray:
-        """(samples, L): e^{j w t}, for lines off the grid."""
+        """Return e^{j w t}, for lines off the grid, (samples, L)."""
         return np.exp(1j * np.outer(np.arange(self.samples), self.frequencies))
 
     def random_phases(self, rng: np.random.Generator) -> Array:
-        """(L,): uniform on the circle; 0 or pi where only a sign is free."""
+        """Return phases, uniform on the circle, (L,); 0 or pi where only a sign is free."""
         phases = 2.0 * np.pi * rng.random(self.frequencies.size)
         return np.where(self.real, np.where(phases < np.pi, 0.0, np.pi), phases)
 
     def schroeder_phases(self) -> Array:
-        """(L,): phases whose group delay follows the share of power below each line.
+        """Return phases whose group delay follows the share of power below each line, (L,).
 
         [schroeder-1970]: phi_n = phi_1 - 2 pi sum_{l<n} (n - l) p_l with the relative powers p_l. It presumes
         equally spaced lines; for others the phase is the integral of that group delay over frequency, which
@@ -87,7 +87,7 @@ class Sinusoids:
         return np.where(self.real, 0.0, -(self._vectors(phases, gains) * transform).imag)
 
     def _vectors(self, phases: Array, gains: ComplexArray | None) -> ComplexArray:
-        """(.., L): complex amplitudes behind the filters."""
+        """Return complex amplitudes behind the filters (.., L)."""
         vector = self.amplitudes * np.exp(1j * phases)
         return vector if gains is None else vector * gains
 

@@ -27,7 +27,7 @@ class SpectralFactor:
     residual: float
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
-        """(samples,): stationary Gaussian noise, white noise of variance one through the taps."""
+        """Return stationary Gaussian noise, white noise of variance one through the taps, (samples,)."""
         noise = rng.standard_normal(samples + self.taps.size - 1)
         return np.convolve(noise, self.taps, "valid")
 
@@ -88,7 +88,7 @@ class MatrixFactor:
     floor: float
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
-        """(samples, n): stationary noise through the taps."""
+        """Return stationary noise through the taps (samples, n)."""
         import scipy.signal  # only now: see `plant.filtering`
 
         n = self.taps.shape[1]

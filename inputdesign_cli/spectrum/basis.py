@@ -149,7 +149,7 @@ class Basis(Protocol):
         """c_0 .. c_m of one input, where a moving average has this spectrum; else None."""
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
+        """Return v^* Phi v at one frequency, v the `direction` (r,), as a functional, (size,)."""
 
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
@@ -200,7 +200,7 @@ class DensityFamily:
 
     @property
     def even(self) -> Array:
-        """(size,): total power one, even over the channels."""
+        """Return total power one, even over the channels, (size,)."""
         return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:

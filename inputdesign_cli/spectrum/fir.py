@@ -41,7 +41,7 @@ class FirBasis(GramBasis):
         return _OF_ONE_INPUT if self.inputs == 1 else super().sizes
 
     def spread(self, powers: Array) -> Array:
-        """(size,): white excitation with these powers (r,) of the channels, uncorrelated."""
+        """Return white excitation with these powers (r,) of the channels, uncorrelated, (size,)."""
         rows, columns, _ = svec_layout(self.inputs)
         flat = np.zeros(self.size)
         flat[: rows.size] = np.where(rows == columns, powers[rows], 0.0)
@@ -72,7 +72,7 @@ class FirBasis(GramBasis):
         return np.asarray(c[0] + later + later.conj().swapaxes(1, 2), dtype=complex)
 
     def _turn(self, w: Array) -> NDArray:
-        """(n, m + 1): e^{-jwt}, or its real part for one input, whose densities are even."""
+        """Return e^{-jwt}, or its real part for one input, whose densities are even, (n, m + 1)."""
         angles = np.outer(w, np.arange(self.order + 1))
         return np.cos(angles) if self.inputs == 1 else np.exp(-1j * angles)
 
@@ -89,7 +89,7 @@ class FirBasis(GramBasis):
         return integrate(source, sums, singularities, highest_lag=self.order, several=self.inputs > 1)
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
+        """Return v^* Phi v at one frequency, v the `direction` (r,), as a functional, (size,)."""
         turn = self._turn(np.array([frequency]))[0]
         return self._functional((turn[:, None, None] * np.outer(direction, direction.conj())).real)
 

@@ -26,7 +26,7 @@ class FlatBasis(DensityFamily):
     degree = 0
 
     def spread(self, powers: Array) -> Array:
-        """(1,): their sum; what a channel has alone is not of this family."""
+        """Return their sum (1,); what a channel has alone is not of this family."""
         return np.array([np.sum(powers)])
 
     def moving_average(self, x: Array) -> Array | None:
@@ -52,7 +52,7 @@ class FlatBasis(DensityFamily):
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(1, ...): level times (1 / 2 pi) integral of the trace of the density."""
+        """Return level times (1 / 2 pi) integral of the trace of the density, (1, ...)."""
         source, summed = integrand(density, factor, self.inputs)
 
         def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:

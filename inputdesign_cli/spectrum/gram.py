@@ -70,7 +70,7 @@ class GramBasis(DensityFamily, ABC):
 
     @abstractmethod
     def spread(self, powers: Array) -> Array:
-        """(size,): flat excitation with these powers (r,) of the channels, uncorrelated."""
+        """Return flat excitation with these powers (r,) of the channels, uncorrelated, (size,)."""
 
     @abstractmethod
     def products(self, generators: NDArray) -> Array:
@@ -138,7 +138,7 @@ class GramBasis(DensityFamily, ABC):
 
 
 def _units(metric: NDArray) -> Array:
-    """(n,): roots of the diagonal, so that nothing depends on the units of the channels."""
+    """Return roots of the diagonal, so that nothing depends on the units of the channels, (n,)."""
     diagonal = np.diag(metric).real
     return np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
 

@@ -101,7 +101,7 @@ class LinesBasis:
 
     @property
     def even(self) -> Array:
-        """(L,): power one, spread evenly over the lines and channels."""
+        """Return power one, spread evenly over the lines and channels, (L,)."""
         return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def coarser(self) -> list[LinesBasis]:
@@ -109,14 +109,14 @@ class LinesBasis:
         return []
 
     def spread(self, powers: Array) -> Array:
-        """(L,): these powers (r,) of the channels, uncorrelated, each spread evenly over the lines."""
+        """Return these powers (r,) of the channels, uncorrelated, each spread evenly over the lines, (L,)."""
         axes = (np.abs(self.directions) > 1.0 - _SAME).astype(float)
         return axes @ (powers / np.sum(axes, axis=0))
 
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """(L, ...): v^* D(w) v, what an atom of power one picks up."""
+        """Return v^* D(w) v, what an atom of power one picks up, (L, ...)."""
         if factor is not None and self.inputs > 1:
             return self._products(factor)
         values = density(self.frequencies)
@@ -125,7 +125,7 @@ class LinesBasis:
         return np.einsum("na,n...ab,nb->n...", self.directions.conj(), values, self.directions).real
 
     def _products(self, factor: Factor) -> NDArray[np.float64]:
-        """(L, k, k): Re (F v) (F v)^*, a part of the atoms at a time."""
+        """Return Re (F v) (F v)^*, a part of the atoms at a time, (L, k, k)."""
         found = []
         for start in range(0, self.size, _ATOMS_AT_ONCE):
             part = slice(start, start + _ATOMS_AT_ONCE)
@@ -224,7 +224,7 @@ class LinesBasis:
         return int(same[0]) if same.size else None
 
     def _alike(self, directions: ComplexArray, direction: ComplexArray) -> Array:
-        """(n,): squared cosines between directions, in the units of the channels."""
+        """Return squared cosines between directions, in the units of the channels, (n,)."""
         one, other = directions / self.units, direction / self.units
         size = np.linalg.norm(one, axis=1) * np.linalg.norm(other)
         return np.abs(one.conj() @ other / size) ** 2

@@ -102,7 +102,7 @@ class PolynomialBasis(GramBasis):
         return integrate_band(source, sums, singularities, self.band, highest_lag=2 * self.order)
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
-        """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
+        """Return v^* Phi v at one frequency, v the `direction` (r,), as a functional, (size,)."""
         z = np.kron(self.functions(np.array([frequency]))[0], direction)
         outer = np.asarray(0.5 * np.outer(z, z.conj()), dtype=complex)
         return hvec(outer) if self.hermitian else svec(outer.real)

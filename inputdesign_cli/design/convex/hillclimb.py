@@ -55,7 +55,7 @@ class QuadraticDesign:
         )
 
     def information(self, H: Array) -> Array:
-        """(k, k): M for a real factor H (n, c)."""
+        """Return M for a real factor H (n, c), as (k, k)."""
         return self.baseline + np.einsum("lmab,ac,bc->lm", self.maps, H, H, optimize=True)
 
     def value(self, information: Array) -> float:

@@ -144,7 +144,7 @@ class Problem:
 
     @cached_property
     def information_maps(self) -> NDArray[np.float64]:
-        """(size, S, k, k): M_si, the information of each basis function at each scenario."""
+        """Return M_si, the information of each basis function at each scenario, (size, S, k, k)."""
         experiments = [scenario.experiment for scenario in self.scenarios]
         return self._along(
             lambda problem: problem.information_maps,
@@ -158,7 +158,7 @@ class Problem:
 
     @cached_property
     def baselines(self) -> NDArray[np.float64]:
-        """(S, k, k): M0_s, what is known of each scenario without excitation."""
+        """Return M0_s, what is known of each scenario without excitation, (S, k, k)."""
         return self.demands.noise_informations + self._priors
 
     @property
@@ -167,24 +167,24 @@ class Problem:
 
     @property
     def baseline_information(self) -> Array:
-        """(k, k): M0 of the nominal plant."""
+        """Return M0 of the nominal plant (k, k)."""
         return self.baselines[0]
 
     def informations(self, x: Array) -> NDArray[np.float64]:
-        """(S, k, k): M_s(x)."""
+        """Return the information matrices M_s(x), (S, k, k)."""
         return self.baselines + self.excited(x)
 
     def information(self, x: Array) -> Array:
-        """(k, k): M(x) of the nominal plant."""
+        """Return M(x) of the nominal plant (k, k)."""
         return self.baseline_information + np.tensordot(x, self.information_map, axes=1)
 
     def excited(self, x: Array) -> NDArray[np.float64]:
-        """(S, k, k): sum_i x_i M_si."""
+        """Return sum_i x_i M_si (S, k, k)."""
         return np.tensordot(x, self.information_maps, axes=1)
 
     @cached_property
     def fixed_information(self) -> NDArray[np.float64]:
-        """(S, k, k): the part of M' that neither x nor s scales."""
+        """Return the part of M' that neither x nor s scales, (S, k, k)."""
         if self.goal == "cost":
             return self.baselines
         if self.goal == "samples":
@@ -193,7 +193,7 @@ class Problem:
 
     @cached_property
     def scaled_information(self) -> NDArray[np.float64]:
-        """(S, k, k): the part of M' in proportion to s."""
+        """Return the part of M' in proportion to s, (S, k, k)."""
         if self.goal == "cost":
             return np.zeros_like(self.baselines)
         if self.goal == "samples":

@@ -65,7 +65,7 @@ class ResponseLines:
     def deviations(
         self, powers: NDArray[np.float64], samples: float, noise: Array | None = None
     ) -> NDArray[np.float64]:
-        """(L, p, r): standard deviations, roots of E|G_hat - G|^2, by powers (L, r).
+        """Return standard deviations, roots of E|G_hat - G|^2, by powers (L, r), as (L, p, r).
 
         Args:
             noise: (L, p) in place of Phi_v.

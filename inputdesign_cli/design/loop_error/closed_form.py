@@ -33,7 +33,7 @@ def best_spectrum(A: ComplexArray, M: ComplexArray) -> ComplexArray:
 
 
 def error_of(A: ComplexArray, Phi: ComplexArray) -> Array:
-    """(K,): tr(A Phi^-1), zero where A is, infinite where A acts on the null space of Phi."""
+    """Return tr(A Phi^-1), zero where A is, infinite where A acts on the null space of Phi, (K,)."""
     values, vectors = eigen(Phi)
     share = np.einsum("kai,kab,kbi->ki", np.conj(vectors), A, vectors).real
     negligible = share <= 1e-14 * np.abs(share).max(initial=0.0)

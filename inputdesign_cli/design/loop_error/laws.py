@@ -77,7 +77,7 @@ class ControlLaw(Protocol):
 
 
 def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-    """(K, n^2, n^2): d vec(S G Delta C S) / d vec G, what an error of the model does to the loop.
+    """Return d vec(S G Delta C S) / d vec G, what an error of the model does to the loop, (K, n^2, n^2).
 
     Equal to (S^T (x) S G) (d vec C / d vec G), but finite where S has a zero and C a pole.
     """

@@ -99,7 +99,7 @@ class LoopErrorProblem:
 
     @cached_property
     def most(self) -> Array:
-        """(p,): the limits."""
+        """Return the limits on the powers, (p,)."""
         return np.array([limit.most for limit in self.limits])
 
     @cached_property

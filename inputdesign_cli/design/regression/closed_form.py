@@ -32,7 +32,7 @@ def least_energy(regression: Regression, target: float) -> Array:
 
 
 def least_error(regression: Regression, energy: float) -> Array:
-    """(n, n): the R of trace `energy` with the least worst mean-squared error.
+    """Return the R of trace `energy` with the least worst mean-squared error, (n, n).
 
     By [eckhard-mse], Lemma 1, the error of R along v = [L1; L2 + delta] is
     alpha^2 |delta|^2 + sigma^2 |v|^2 / energy, a quadratic in delta with its minimum at

@@ -40,7 +40,7 @@ class Box:
 
     @property
     def centre(self) -> Array:
-        """(m - 1,)."""
+        """Return the centre (m - 1,) of the box."""
         return 0.5 * (self.lower + self.upper)
 
     def halves(self, coordinate: int, at: float) -> tuple[Box, Box]:
@@ -93,7 +93,7 @@ class Lift:
 
     @cached_property
     def _unknowns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(t, m + 1, m + 1, n): Y_ij by lag. (t, biases, biases): B."""
+        """Return Y_ij by lag (t, m + 1, m + 1, n). (t, biases, biases): B."""
         n, size = self.problem.n, self.problem.m + 1
         first, second = np.triu_indices(size)
         rows, columns, scale = svec_layout(self.biases)
@@ -116,7 +116,7 @@ class Lift:
 
     @cached_property
     def _multiplied(self) -> NDArray[np.float64]:
-        """(t, m + 1, m + 1, n, m): E[(1, w)_i (1, w)_j P_ra] for the first m columns of P."""
+        """Return E[(1, w)_i (1, w)_j P_ra] for the first m columns of P, (t, m + 1, m + 1, n, m)."""
         return np.einsum("tijk,kra->tijra", self._unknowns[0], self.problem.lags[:, :, : self.problem.m])
 
     def _errors(self, scaling: Scaling) -> NDArray[np.float64]:

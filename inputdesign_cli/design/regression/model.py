@@ -58,7 +58,7 @@ class Regression:
         return self.estimated.size + self.neglected.size
 
     def bias(self, R: Array) -> Array:
-        """(n - m,): R12^T R11^+ L1 - L2; times theta_2 it is the bias of the estimate."""
+        """Return R12^T R11^+ L1 - L2 (n - m,); times theta_2 it is the bias of the estimate."""
         return R[self.m :, : self.m] @ self._weights(R) - self.neglected
 
     def error(self, R: Array) -> ErrorSplit:

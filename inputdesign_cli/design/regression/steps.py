@@ -29,7 +29,7 @@ class Region:
 
     @property
     def affine(self) -> NDArray[np.float64]:
-        """(n, 1 + size): origin and span side by side."""
+        """Return origin and span side by side, (n, 1 + size)."""
         return np.column_stack([self.origin, self.span])
 
 

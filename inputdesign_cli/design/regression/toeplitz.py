@@ -73,7 +73,7 @@ class ToeplitzProblem:
 
     @cached_property
     def lags(self) -> NDArray[np.float64]:
-        """(n, n, n): lags[k] has ones where |i - j| = k."""
+        """Return lags[k] has ones where |i - j| = k, (n, n, n)."""
         i = np.arange(self.n)
         distance = np.abs(i[:, None] - i[None, :])
         return (distance[None] == i[:, None, None]).astype(float)
@@ -107,7 +107,7 @@ class ToeplitzProblem:
         return Autocorrelations(rho, P[self.m :, : self.m] @ u - self.second, float(self.first @ u))
 
     def weights(self, P: Array) -> Array | None:
-        """(m,): u with P11 u = L1, of least norm; None if there is none, to rounding."""
+        """Return u with P11 u = L1, of least norm, (m,); None if there is none, to rounding."""
         values, vectors = np.linalg.eigh(P[: self.m, : self.m])
         parts = vectors.T @ self.first
         kept = values > _RANK * values[-1]

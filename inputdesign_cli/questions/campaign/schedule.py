@@ -173,7 +173,7 @@ class Planned:
 
     @property
     def applied(self) -> Array:
-        """(take, r): the samples of the next part."""
+        """Return the samples of the next part, (take, r)."""
         return self.record[: self.take]
 
     def cut(self, take: int) -> Planned:

@@ -75,7 +75,7 @@ class SimulatedEstimates:
         return replace(coverage, runs=self.runs, kept=int(np.sum(largest <= within)))
 
     def _estimates(self, seed: int) -> Array:
-        """(runs, k): NaN where the search did not settle."""
+        """Return NaN where the search did not settle, (runs, k)."""
         seconds_left()
         study = Study(self.nominal, self.nominal, self.runs, seed, self.step)
         each = _EACH if self.nominal.samples >= _LONG else 1

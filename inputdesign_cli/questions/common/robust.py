@@ -82,16 +82,16 @@ class Region(Knowledge):
     at: Callable[[Array], Alternative | None]
 
     def theta(self, z: Array) -> Array:
-        """(k,): the parameters at z (m,)."""
+        """Return the parameters at z (m,), as (k,)."""
         return np.asarray(self.centre + self.columns @ z)
 
     def nearest(self, theta: Array) -> Array:
-        """(m,): a point of the region near these parameters."""
+        """Return a point of the region near these parameters, (m,)."""
         z = self.coordinates(theta)
         return np.clip(z, -1.0, 1.0) if self.box else z / max(float(np.linalg.norm(z)), 1.0)
 
     def farthest(self, gradient: Array) -> Array:
-        """(m,): the point of the region that is farthest in this direction."""
+        """Return the point of the region that is farthest in this direction, (m,)."""
         return np.sign(gradient) if self.box else gradient / max(float(np.linalg.norm(gradient)), 1e-300)
 
 

@@ -120,7 +120,7 @@ def predicted_output(
 
 
 def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
-    """(n, p): standard deviations of the noise at the outputs, in the loop where there is one.
+    """Return standard deviations of the noise at the outputs, in the loop where there is one, (n, p).
 
     From the response to an impulse of e, whose squares add up. Noise that settles within the record has been
     there before; one that drifts grows from the start on.
@@ -172,7 +172,7 @@ def _largest_moves(u: Array) -> Array:
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
-    """(n, r): the samples shifted to the operating points; a record that was given is left as it is.
+    """Return the samples shifted to the operating points, (n, r); a record that was given is left as it is.
 
     Raises:
         SpecError: `out-of-range` when so much is added that the samples lose their digits.
