@@ -155,7 +155,7 @@ def inverse_of(heights: Array) -> float:
 
 
 def first_directions(units: Array) -> ComplexArray:
-    """Return directions (number, r) along each channel, and along pairs of channels in phase and counterphase.
+    """Return directions (number, r) along each channel, and along pairs in phase and in counterphase.
 
     Of a pair each takes part in proportion to its unit (r,); directions have length one.
     """
