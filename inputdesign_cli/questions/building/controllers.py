@@ -14,15 +14,16 @@ import numpy as np
 from inputdesign_cli.plant import Model, Rational, TransferMatrix, delayed, discretised, pid
 from inputdesign_cli.questions.building.weights import rational
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.controller import (
+from inputdesign_cli.specification.models.loop import (
     ContinuousController,
     Controller,
+    LoopMargin,
     LoopsController,
     Pid,
     PidController,
     SingleController,
+    Tuning,
 )
-from inputdesign_cli.specification.models.loop import LoopMargin, Tuning
 from inputdesign_cli.specification.models.transfer import DiscreteMatrix
 
 

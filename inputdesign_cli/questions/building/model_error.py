@@ -32,7 +32,7 @@ from inputdesign_cli.questions.building.tables import bad_table, has_column, rea
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
-from inputdesign_cli.specification.models.controller import Controller
+from inputdesign_cli.specification.models.loop import Controller
 
 _KEY = "accuracy.model_error"
 _LOOP = "accuracy.loop"

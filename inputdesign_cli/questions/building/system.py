@@ -32,9 +32,9 @@ from inputdesign_cli.questions.building.parameters import degrees_of, delays_of,
 from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
 from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import depth
+from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from inputdesign_cli.specification.checks.plant import SAMPLED
-from inputdesign_cli.specification.models.controller import Controller
+from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.section import PathDiagnostic
-from inputdesign_cli.specification.models.shapes import size_of
 from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.transfer import size_of
 from inputdesign_cli.specification.models.wording import count
 
 _SENSITIVITY = ("accuracy", "model_error", "sensitivity")

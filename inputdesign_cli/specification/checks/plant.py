@@ -9,8 +9,8 @@ from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import check_no_growth
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.section import PathDiagnostic
-from inputdesign_cli.specification.models.shapes import check_each, check_per_output
 from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.transfer import check_each, check_per_output
 from inputdesign_cli.specification.models.wording import count
 
 

@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
     AtLeastTwo,
@@ -28,11 +27,10 @@ from inputdesign_cli.specification.models.fields import (
     SemidefiniteMatrix,
     SymmetricMatrix,
 )
-from inputdesign_cli.specification.models.loop import ClosedLoopError, LoopMargin
+from inputdesign_cli.specification.models.loop import ClosedLoopError, Controller, LoopMargin
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, Wording, optional
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
-from inputdesign_cli.specification.models.units import FRACTION
 
 DEFAULT_CONFIDENCE = 0.95
 # The least number of draws on the rarer side of a probability.
@@ -50,7 +48,7 @@ Deviations = Annotated[
 _NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_error")
 
 
-class Sensitivity(Section):
+class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
     """An admissible error that keeps |W S| <= 1, or |S| below a peak, for the sensitivity S of a loop."""
 
     numerator: Numerator | None = optional("Numerator of W in q^-1.")
@@ -61,8 +59,7 @@ class Sensitivity(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """W is given once, and whole."""
-        yield from self.exactly_one("numerator", "max_db")
+        """W is given as a whole."""
         if self.denominator is not None and self.numerator is None:
             message = "{key} stands without a numerator"
             yield PathDiagnostic("missing-key", message, 'add "numerator: [..]"', ("denominator",))
@@ -75,7 +72,7 @@ class Sensitivity(Section):
         return DiscreteTransfer(numerator=self.numerator, denominator=self.denominator or (1.0,))
 
 
-class Confidence(Section):
+class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     """The probability that fixes r_u: of an ellipsoid of parameters, or of the error itself."""
 
     ellipsoid: Fraction | None = optional("Probability that fixes alpha by the chi-squared distribution.")
@@ -91,8 +88,7 @@ class Confidence(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """One probability is given, with enough draws and runs to estimate it."""
-        yield from self.exactly_one("ellipsoid", "exact")
+        """There are enough draws and runs to estimate the probability."""
         rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
         least = math.ceil(_LEAST_TELLING / rare - 1e-9)
         for key, count, none in (("draws", self.draws, ""), ("runs", self.runs, ", or 0 for none")):
@@ -101,10 +97,12 @@ class Confidence(Section):
                 yield PathDiagnostic("out-of-range", message, f"write {least} or more{none}", (key,))
 
 
-class ModelError(Section):
+class ModelError(
+    Section, one_of=(("relative", "absolute", "table", "sensitivity"),), not_both=(("confidence", "alpha"),)
+):
     """r_u(w) <= r_adm(w) at every frequency of the band."""
 
-    relative: Annotated[Positive, FRACTION] | None = optional("r_adm = this fraction of |G|.")
+    relative: Positive | None = optional("r_adm = this fraction of |G|.")
     absolute: Positive | None = optional("r_adm = this value at every frequency.")
     table: FileName | None = optional("CSV file with columns frequency and r_adm.")
     sensitivity: Sensitivity | None = optional("r_adm from a bound on a sensitivity.")
@@ -124,9 +122,7 @@ class ModelError(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """r_adm and the size of the confidence region are given once."""
-        yield from self.exactly_one("relative", "absolute", "table", "sensitivity")
-        yield from self.at_most_one("confidence", "alpha")
+        """Norm and region go with the bound and its probability."""
         if self.sensitivity is not None and self.norm == "entry":
             message = "{key} is entry, but a sensitivity depends on all entries of the error together"
             yield PathDiagnostic("conflicting-keys", message, "remove norm, or write frobenius", ("norm",))
@@ -199,10 +195,10 @@ class MeanSquaredError(Section):
     )
 
 
-class FrequencyResponse(Section):
+class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("frequencies", "band"))):
     """The standard deviation of a nonparametric frequency response, line by line, for periodic excitation."""
 
-    relative: Annotated[Positive, FRACTION] | None = optional("r_adm = this fraction of |G|.")
+    relative: Positive | None = optional("r_adm = this fraction of |G|.")
     absolute: Positive | None = optional("r_adm = this value at every line.")
     table: FileName | None = optional("CSV file with columns frequency and r_adm.")
     frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
@@ -227,9 +223,7 @@ class FrequencyResponse(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """r_adm and the lines are given once."""
-        yield from self.exactly_one("relative", "absolute", "table")
-        yield from self.exactly_one("frequencies", "band")
+        """A number of lines has a band."""
         if self.lines is not None and self.band is None:
             message = "{key} is the number of lines in a band, and there is none"
             yield PathDiagnostic(
@@ -237,7 +231,7 @@ class FrequencyResponse(Section):
             )
 
 
-class Accuracy(Section):
+class Accuracy(Section, not_both=(("model_error", "loop"),)):
     """Requirements on the model; several may stand together. A criterion asks for the best instead."""
 
     model_error: ModelError | None = optional("Bound on the model error over frequency.")
@@ -264,10 +258,6 @@ class Accuracy(Section):
         "Error of the loop with the controller designed on the model."
     )
     mean_squared_error: MeanSquaredError | None = optional("Mean-squared error with neglected regressors.")
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """A loop is kept by a bound on the model error, so that only one of them is stated."""
-        yield from self.at_most_one("model_error", "loop")
 
     @property
     def error(self) -> ModelError | None:

@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, Strict
 
-from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
     CovarianceMatrix,
@@ -24,11 +23,11 @@ from inputdesign_cli.specification.models.fields import (
     SemidefiniteMatrix,
     Several,
     StablePerOutput,
-    Time,
     Variance,
     check_delay_stable,
     depth,
 )
+from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -39,9 +38,8 @@ from inputdesign_cli.specification.models.section import (
     optional,
     tag,
 )
-from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.units import FRACTION
+from inputdesign_cli.specification.models.transfer import with_paths
 from inputdesign_cli.specification.models.wording import count
 
 # This factor moves roots on the unit circle inside, whatever the rounding of decimals.
@@ -119,17 +117,10 @@ class Noise(NoiseShape):
     variance: Variance = Field(description="Variance of e, or its covariance matrix (outputs x outputs).")
 
 
-class SimulationNoise(NoiseShape):
+class SimulationNoise(NoiseShape, one_of=(("variance", "relative_std"),)):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
-    relative_std: Annotated[Positive, FRACTION] | None = optional(
-        "Standard deviation as a fraction of the smallest output rms."
-    )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """Its size is given once."""
-        yield from super().check()
-        yield from self.exactly_one("variance", "relative_std")
+    relative_std: Positive | None = optional("Standard deviation as a fraction of the smallest output rms.")
 
 
 class Prior(Section):
@@ -185,7 +176,9 @@ class Experiment(Section):
     """How the data will be collected."""
 
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
-    duration: Time | None = optional("In place of samples: how long it lasts, in time_unit.", examples=[3600])
+    duration: Positive | None = optional(
+        "In place of samples: how long it lasts, in time_unit.", examples=[3600]
+    )
     controller: Controller | None = optional(
         "C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
         "closed loop. With several channels: loops, or numerator and denominator as rows of columns."
@@ -265,7 +258,7 @@ class Pilot(Section):
     )
 
 
-class Campaign(Section):
+class Campaign(Section, not_both=(("stages", "block"), ("stages", "pilot"))):
     """An experiment in parts, planned anew after each of them until the data say stop."""
 
     block: Samples | None = optional("Samples of each part (default: a tenth of the experiment).")
@@ -294,8 +287,3 @@ class Campaign(Section):
         default="data",
         description="data: as soon as the data meet the accuracy (default); never: at experiment.samples.",
     )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """The parts are stated once."""
-        yield from self.at_most_one("stages", "block")
-        yield from self.at_most_one("stages", "pilot")

@@ -49,15 +49,14 @@ from inputdesign_cli.specification.models.section import (
     optional,
     pick,
 )
-from inputdesign_cli.specification.models.shapes import (
+from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.transfer import (
     as_matrix,
     check_gain,
     check_per_output,
     shape_words,
     size_of,
 )
-from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
@@ -79,8 +78,8 @@ class NamedPlant(Section):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _worth(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Validate the values of the expressions, and keep the section as it was written."""
+    def _checked(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Validate the values of the expressions, keep the section as it was written, and check both."""
         if not isinstance(data, dict):
             return handler(data)
         numbers = dict(data)
@@ -97,13 +96,9 @@ class NamedPlant(Section):
                 raise carry(*found)
         made = handler(numbers)
         made._written = dict(data)
-        if wrong := tuple(made.check_written()):
+        if wrong := tuple(made.check()):
             raise carry(*wrong)
         return made
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """Return what is wrong with the coefficients, whatever the values of the parameters."""
-        return iter(())
 
     @property
     def written(self) -> dict[str, Plain]:
@@ -158,7 +153,7 @@ class StateSpace(Section):
         "Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
         "noise is added to the outputs)."
     )
-    delay: Annotated[NonNegative, EXPRESSIONS, TIME] = Field(
+    delay: Annotated[NonNegative, EXPRESSIONS] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
     )
     time: Literal["continuous", "discrete"] = Field(
@@ -205,14 +200,11 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A and F have the shape of B."""
+        """A and F have the shape of B, of which some coefficient is present."""
         yield from check_per_output(self.A, self.outputs, "A")
         if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
             message = "{key} must have the shape of B: " + shape_words(self.B)
             yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """Some coefficient of B is present."""
         yield from check_gain(matrix(expressed(self.written["B"])), "B")
 
     @property
@@ -276,7 +268,7 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
             return self.continuous.own_parameters()
         return super().named_parameters
 
-    def check_written(self) -> Iterator[PathDiagnostic]:
+    def check(self) -> Iterator[PathDiagnostic]:
         """Some coefficient of a numerator is present, and every entry is proper."""
         yield from self.continuous.check_present(self.stated_terms)
 
@@ -306,7 +298,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some parameter is named, and matrices in continuous time are sampled."""
+        """Some parameter is named, and sampling and dead time are those of the time of the matrices."""
         if self.parameters is None:
             message = "{key} needs parameters: numbers in its matrices are not estimated"
             hint = "write parameters: {k: 2.0}, and k in the matrices"
@@ -318,18 +310,15 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         elif not continuous and self.sample is not None:
             message = "{key} is for matrices in continuous time, and time is discrete here"
             yield PathDiagnostic("unsuitable-key", message, "remove it", ("sample",), at_key=True)
+        if not continuous and self.term("delay", 0, 0).present:
+            message = "{key} is in continuous time, but time is discrete here"
+            path = ("state_space", "delay")
+            yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
 
     @property
     def shape(self) -> tuple[int, int]:
         """The numbers of outputs and inputs."""
         return len(self.state_space.C), len(self.state_space.B[0])
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """Matrices in discrete time have no dead time, whatever its value."""
-        if self.state_space.time == "discrete" and self.term("delay", 0, 0).present:
-            message = "{key} is in continuous time, but time is discrete here"
-            path = ("state_space", "delay")
-            yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
 
     def term(self, letter: str, row: int, column: int) -> Expression:
         """An entry of a matrix, or the dead time, as an expression in the named parameters."""

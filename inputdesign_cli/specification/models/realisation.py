@@ -26,7 +26,6 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail, optional
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
 
 Samples = Annotated[Count, SIZES["signal.samples"]]
 _GROUP = "idesign.signals"
@@ -67,7 +66,7 @@ class Quantisation(Section):
     """The digital-to-analogue converter that applies the signal."""
 
     bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
-    range: PerChannel[Annotated[Positive, SIGNAL]] = Field(
+    range: PerChannel[Positive] = Field(
         description="They span [-range, range), in the unit of u, the offset included; a number or one per "
         "input.",
         examples=[10.0],
@@ -88,12 +87,10 @@ class Signal(Section):
     lines: Annotated[Harmonics, SIZES["signal.lines"]] | None = optional(
         "Harmonics of a period that are used: their number, odd, or a list."
     )
-    amplitudes: PerChannel[Annotated[Positive, SIGNAL]] | None = optional(
+    amplitudes: PerChannel[Positive] | None = optional(
         "Amplitude (level) to scale to, whatever it buys; a number or one per input."
     )
-    offset: PerChannel[Annotated[Number, SIGNAL]] | None = optional(
-        "Operating point added; a number or one per input."
-    )
+    offset: PerChannel[Number] | None = optional("Operating point added; a number or one per input.")
     ramp: Annotated[Index, SIZES["signal.samples"]] | None = optional(
         "Samples over which the signal fades in and out."
     )
@@ -142,9 +139,7 @@ class Solver(Section):
         default=1e-4,
         description="Relative gap of the bound over every spectrum (default 1e-4; no less than tolerance).",
     )
-    time_limit: Annotated[Positive, SECONDS_ONLY] = Field(
-        default=600.0, description="Seconds that a design may take (default 600)."
-    )
+    time_limit: Positive = Field(default=600.0, description="Seconds that a design may take (default 600).")
     grid: Annotated[Count, SIZES["solver.grid"]] = Field(
         default=1000, description="Number of frequencies of the lmi method (default 1000)."
     )

@@ -52,7 +52,9 @@ class FirSpectrum(Section, family="spectrum", phrase="type: fir"):
     )
 
 
-class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
+class MultisineSpectrum(
+    Section, family="spectrum", phrase="type: multisine", one_of=(("lines", "frequencies"),)
+):
     """Lines, either evenly spaced or at given frequencies."""
 
     type: Literal["multisine"] = Field(description="Sinusoids.")
@@ -62,10 +64,6 @@ class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
     frequencies: Annotated[Frequencies, SIZES["spectrum.frequencies"]] | None = optional(
         "The candidate frequencies, increasing."
     )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """The lines are given once."""
-        yield from self.exactly_one("lines", "frequencies")
 
 
 class FreeSpectrum(Section, family="spectrum", phrase="type: free"):

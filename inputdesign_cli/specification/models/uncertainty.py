@@ -54,7 +54,7 @@ Scenarios = Annotated[
 ]
 
 
-class Uncertainty(Section):
+class Uncertainty(Section, not_both=(SOURCES,)):
     """How well the plant is known, and how the design takes this into account."""
 
     covariance: FileOr[CovarianceMatrix] | None = optional(
@@ -116,7 +116,6 @@ class Uncertainty(Section):
             hint = "add one of them, or list the plants: scenarios: [{b1: 3.2}, {b1: 4.0}]"
             keys = (*SOURCES, "scenarios")
             yield PathDiagnostic("missing-key", "{key} does not say how the plant may vary", hint, keys=keys)
-        yield from self.at_most_one(*SOURCES)
         if not listed:
             yield from self.at_most_one("scenarios", "risk")
         for other in self.stated("worst_case", "risk") if self.discard else ():
