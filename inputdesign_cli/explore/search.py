@@ -264,7 +264,7 @@ class _Records:
         found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
         point, white = found.point, White.of(records, found.point)
         tests = score_tests(records, point.theta, white, feedback=self.feedback, robust=None)
-        noise = noise_of(point, kind.own())
+        noise = noise_of(records, point)
         factor = factor_at(records, point, noise)
         half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
         failing = tuple(test.name for test in failed(tests))

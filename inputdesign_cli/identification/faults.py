@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.noise_first import Whitening
 from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.levels import level
 
 # The median of the absolute value of a normal variable, in standard deviations.

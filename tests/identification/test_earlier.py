@@ -7,8 +7,7 @@ import scipy.stats
 from inputdesign_cli.identification import Earlier, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
 from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
 from tests.support.records import shifted, simulated
 
