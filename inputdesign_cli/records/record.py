@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -15,23 +15,14 @@ from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
 from inputdesign_cli.findings.places import Recorded, Samples
-from inputdesign_cli.findings.prepared_records import columns_against_spec, times_assumed, times_disagree
+from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, TIMES_READ, columns_against_spec
 from inputdesign_cli.identification import resolution_of
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.records.columns import (
-    called,
-    count_of,
-    reference_columns,
-    rising,
-    with_channels,
-    with_headers,
-    with_names_of,
-    without_times,
-)
+from inputdesign_cli.records.columns import called, channels_of_log, channels_of_plant, rising, without_times
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.reading import read_sheet
-from inputdesign_cli.records.segments import EVEN, SHORTEST, Segment, joined_rows, segments_of
-from inputdesign_cli.records.signals import Signals, signals_of, typical_step
+from inputdesign_cli.records.segments import EVEN, segments_of
+from inputdesign_cli.records.signals import SHORTEST, Signals, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
 # The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
@@ -112,15 +103,11 @@ def read_log(path: Path, preparation: Preparation) -> Record:
         DataError: the file cannot be read, or does not show its inputs and outputs.
     """
     sheet = read_sheet(path, preparation=preparation)
-    columns = with_headers(sheet, with_channels(sheet, preparation.columns))
-    inputs, outputs = (count_of(letter, sheet, columns) for letter in "uy")
-    references = reference_columns(inputs, sheet, columns, clean=True)
-    given = replace(preparation, columns=columns)
-    signals = joined_rows(signals_of(sheet, inputs, outputs, given, references), resample=given.resample)
-    step, found = _step_of(signals, given)
-    record = _record(signals, step, signals.unit or "s", given, inputs, found)
-    named = {channel: column for channel, column in columns.items() if channel != "time" or signals.name}
-    return replace(record, names=named)
+    roles = channels_of_log(sheet, preparation.columns)
+    signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
+    step, found = _step_of(signals, preparation)
+    record = _record(signals, step, signals.unit or "s", preparation, roles, found)
+    return replace(record, names=roles)
 
 
 def read_logs(paths: Sequence[Path], preparation: Preparation) -> Record:
@@ -168,13 +155,11 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
 def _read(path: Path, units: Units, preparation: Preparation) -> Record:
     """Read one file for a plant."""
     sheet = read_sheet(path, preparation=preparation)
-    columns = with_names_of(units, sheet, with_headers(sheet, preparation.columns))
-    given = replace(preparation, columns=columns)
-    references = reference_columns(units.inputs, sheet, columns, clean=False) if units.closed_loop else {}
-    signals = signals_of(sheet, units.inputs, units.outputs, given, references)
-    signals = _in_step(joined_rows(signals, resample=given.resample), units, preparation)
-    found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, columns)
-    return _record(signals, units.sample_time, units.time_unit, given, units.inputs, found)
+    roles = channels_of_plant(sheet, preparation.columns, units)
+    signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
+    found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
+    in_step = _in_step(signals, units, preparation)
+    return _record(in_step, units.sample_time, units.time_unit, preparation, roles, found)
 
 
 def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
@@ -183,11 +168,7 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
     labels = [path.name if counts[path.name] == 1 else str(path) for path in paths]
     recorded = [one.recorded for one in records if one.recorded is not None]
     references = [one.r for one in records if one.r is not None]
-    findings = [
-        (path.name, found) for path, one in zip(paths, records, strict=True) for found in one.findings
-    ]
-    if len(paths) > 1:
-        findings = [(name, replace(found, message=f"{name}: {found.message}")) for name, found in findings]
+    begin = [f"{path.name}: " if len(paths) > 1 else "" for path in paths]
     return replace(
         records[0],
         u=np.concatenate([one.u for one in records]),
@@ -196,7 +177,11 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
         time=np.concatenate([one.time for one in records]),
         lengths=tuple(length for one in records for length in one.lengths),
         files=tuple((label, len(one.y)) for label, one in zip(labels, records, strict=True)),
-        findings=tuple(found for _, found in findings),
+        findings=tuple(
+            replace(found, message=f"{name}{found.message}")
+            for name, one in zip(begin, records, strict=True)
+            for found in one.findings
+        ),
         means=np.average([one.means for one in records], axis=0, weights=[len(one.u) for one in records]),
         recorded=Recorded(
             np.concatenate([one.values for one in recorded]),
@@ -210,19 +195,38 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
 
 
 def _record(
-    signals: Signals, step: float, unit: str, preparation: Preparation, r: int, found: Iterable[Finding]
+    signals: Signals,
+    step: float,
+    unit: str,
+    preparation: Preparation,
+    roles: Mapping[str, str],
+    found: Iterable[Finding],
 ) -> Record:
-    """The record in the signals of one file, of which the first `r` are inputs."""
+    """The record in the signals of one file, whose references follow the inputs."""
+    r = sum(role.startswith("u") for role in roles)
     segments, done = segments_of(signals, step, unit, preparation)
-    inputs = np.concatenate([part.u for part in segments])
+    u, y, times = (np.concatenate(part) for part in zip(*((s.u, s.y, s.time) for s in segments), strict=True))
+    lengths = tuple(len(part.y) for part in segments)
+    # The signals of the file at the samples of the segments.
+    stamped = np.flatnonzero(~np.isnan(signals.time))
+    stamps = signals.time[stamped] * (1.0 if signals.name else step)
+    at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
+    logged = signals.y[at]
+    held = np.concatenate([np.zeros_like(logged[:1], dtype=bool), logged[1:] == logged[:-1]])
+    held[np.cumsum([0, *lengths])[:-1]] = False
     return Record(
-        inputs[:, :r],
-        np.concatenate([part.y for part in segments]),
-        inputs[:, r:] if inputs.shape[1] > r else None,
-        np.concatenate([part.time for part in segments]),
-        tuple(len(part.y) for part in segments),
-        ((signals.sheet.path.name, len(inputs)),),
-        _recorded(signals, step, segments, r),
+        u[:, :r],
+        y,
+        u[:, r:] if u.shape[1] > r else None,
+        times,
+        lengths,
+        ((signals.sheet.path.name, len(u)),),
+        Recorded(
+            np.column_stack([signals.u[at, :r], logged]),
+            signals.sheet.lines[at],
+            held,
+            resolution_of(signals.y),
+        ),
         step=step,
         time_unit=unit,
         findings=(*signals.findings, *done, *found),
@@ -230,19 +234,6 @@ def _record(
         means=np.nanmean(signals.u[:, :r], axis=0),
         lined=any(part.lined for part in segments),
     )
-
-
-def _recorded(signals: Signals, step: float, segments: Sequence[Segment], r: int) -> Recorded:
-    """The signals of the file at the samples of the segments, `step` apart."""
-    stamped = np.flatnonzero(~np.isnan(signals.time))
-    stamps = signals.time[stamped] * (1.0 if signals.name else step)
-    times = np.concatenate([part.time for part in segments])
-    at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
-    values = np.column_stack([signals.u[:, :r], signals.y])[at]
-    y, begins = values[:, r:], np.cumsum([0, *(len(part.time) for part in segments)])[:-1]
-    held = np.concatenate([np.zeros_like(y[:1], dtype=bool), y[1:] == y[:-1]])
-    held[begins] = False
-    return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
 
 
 def _step_of(signals: Signals, preparation: Preparation) -> tuple[float, list[Finding]]:
@@ -253,18 +244,19 @@ def _step_of(signals: Signals, preparation: Preparation) -> tuple[float, list[Fi
         if not np.isfinite(step):
             message, hint = f"{sheet.path.name} has one time only", "give the sample time: --sample-time 0.5"
             raise sheet.error("data-not-uniform", message, hint, 0)
-        if stated is not None and abs(step - stated) > _ROUND * stated:
-            return step, [times_disagree(stated, step)]
-        return step, []
+        differs = stated is not None and abs(step - stated) > _ROUND * stated
+        fact = f"they advance by {step:g}, and the file states the sample time {stated}"
+        return step, TIMES_READ.when(differs, fact, stated=stated, step=step)
     if stated:
         _check_stated(signals, stated, resample=preparation.resample)
         return stated, []
-    if without_times(sheet, preparation.columns):
-        return 1.0, [times_assumed("No times are read", [])]
+    named = without_times(sheet, preparation.columns)
     taken = {column.strip().lower() for column in preparation.columns.values()}
     likely = [i for i, one in enumerate(sheet.columns) if one.dated or i in rising(sheet)]
     names = [called(sheet, i) for i in likely if taken.isdisjoint((sheet.name_of(i).lower(), str(i + 1)))]
-    return 1.0, [times_assumed("No column is called as times are", names)]
+    listed = [] if named else names
+    fact = f"perhaps times stand in {', '.join(listed)}" if listed else ""
+    return 1.0, [TIMES_ASSUMED.found(fact, columns=listed)]
 
 
 def _check_stated(signals: Signals, step: float, *, resample: bool) -> None:
