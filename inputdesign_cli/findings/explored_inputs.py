@@ -57,7 +57,7 @@ def _inverses(kind: FindingKind, found: Found, moving: Parts) -> list[Finding]:
         for k, j in enumerate(found.moving)
         if not candidate.orders.delays[k] and like_answers(moving, i, k)
     ]
-    return [kind.found(f"{y} responds to {u} in the same sample", where=y) for y, u in pairs]
+    return [kind.found(f"{y} responds to {u} in the same sample, as -1/C does", where=y) for y, u in pairs]
 
 
 @finding(

@@ -132,7 +132,7 @@ def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
 def of_first_part(distance: Distance) -> list[Finding]:
     """Return a note if the first of several parts finds a plant far from the spec's, as it may."""
     found = distance.nominal
-    sign = " and G has the opposite sign at low frequency: check the signs of the record"
+    sign = ", and G has the opposite sign at low frequency: check the signs of the record"
     fact = f"{found.deviations:.3g} standard deviations{sign if found.opposite_sign else ''}"
     return FAR.when(
         found.probability <= level("far from nominal"),

@@ -97,7 +97,7 @@ def loop_faults(kind: FindingKind, controller: TransferMatrix | None, data: Samp
         name = f"{one.letter}{one.channel + 1}" if several else one.letter
         count = abs(one.lag)
         fact = (
-            f"{name} by {count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}. u = r - C y "
+            f"{name} is {count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}. u = r - C y "
             f"leaves {100 * one.left:.3g} % of u unexplained, and {100 * one.then:.2g} % with {name} shifted"
         )
         found[fact] = kind.found(fact, where=name, lag=one.lag, left=one.left, then=one.then)
@@ -176,4 +176,4 @@ def _described(
         )
         runs.append((file_of(record.files, at), int(rows[first]), int(rows[last])))
     probability = chance(chance_of_shifts(shifts)[0])
-    return f"{' and '.join(events)} without an input (probability {probability} by chance)", runs
+    return f"{' and '.join(events)}, which no input explains (probability {probability} by chance)", runs

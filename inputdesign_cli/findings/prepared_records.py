@@ -21,8 +21,8 @@ TIMES_ASSUMED = note(
 JITTER_EVENED = note(
     "jitter-evened-out",
     "Times were made uniform. Outputs are interpolated linearly; inputs are held, so the nearest sample "
-    "counts. Steps may differ by 25 % of the sample time, with `--resample` by more. A step of 1.5 sample "
-    "times is a gap.",
+    "counts. Steps may differ by 25 % of the sample time, with `--resample` by more. A step beyond 1.5 "
+    "sample times (3 with `--resample`) is a gap.",
     "Nothing. Less jitter would give a more accurate estimate.",
 )
 INPUTS_MOVE_BETWEEN = doubt(

@@ -172,60 +172,56 @@ def column_named(sheet: Sheet, name: str) -> Column:
 
 
 def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
-    """Return the columns that are named and, of inputs or outputs if none is named, those called u, y1, .."""
-    found = {}
+    """Return the columns that are named and, of inputs or outputs if none is named, those called u, y1, ..
+
+    Raises:
+        DataError: `data-missing-column`, several may be the same one.
+    """
+    found: dict[str, str] = {}
     for letter, pattern in _CHANNELS.items():
+        every: dict[str, list[str]] = {}
         for name in sheet.header:
             matched = pattern.fullmatch(name)
             if matched and not any(other.startswith(letter) for other in named):
-                found[f"{letter}{matched[2] or 1}"] = name
+                every.setdefault(f"{letter}{matched[2] or 1}", []).append(name)
+        for role, names in every.items():
+            exact = [name for name in names if name in (role, letter)] or names
+            if len(exact) > 1:
+                message = f"{sheet.path.name} has several columns that may be {role}: {', '.join(exact)}"
+                hint = f"say which one counts: --columns {role}={exact[0]}"
+                raise sheet.error("data-missing-column", message, hint)
+            found[role] = exact[0]
     return {**found, **named}
 
 
-def channels_of_log(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
-    """Return role -> column of a file without a spec: what is named, or else called u, y1, time, ..
+def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None) -> dict[str, str]:
+    """Return role -> column: of the channels of a plant, or of what a log calls u, y1, r, time, ..
+
+    Args:
+        named: the columns that the user names, by role.
 
     Raises:
-        DataError: `data-missing-column`, inputs, outputs, references or times are not clear.
+        DataError: `data-missing-column`, it is not clear which column has a role.
     """
-    columns = _whole(sheet, with_channels(sheet, named))
-    counts = [_count(letter, sheet, columns) for letter in "uy"]
-    found = {role: columns[role] for letter, n in zip("uy", counts, strict=True) for role in _of(letter, n)}
-    references = _references(sheet, columns, counts[0])
-    own = [] if references.keys() & columns.keys() else [column_named(sheet, x) for x in references.values()]
-    usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
-    return found | (references if usable else {}) | _time(sheet, columns)
-
-
-def channels_of_plant(sheet: Sheet, named: Mapping[str, str], units: Units) -> dict[str, str]:
-    """Return role -> column of the channels of a plant: u1, u2, ..; u or u1 for a single one; or as named.
-
-    Raises:
-        DataError: `data-missing-column`, references or times are not clear, or u may be either of two.
-    """
-    columns = _whole(sheet, named)
-    for channel, (name, _) in units.channels.items():
+    channels = {} if units is None else units.channels
+    for channel, (name, _) in channels.items():
         same = [header for header in sheet.names if name_and_unit(header)[0].lower() == name.lower()]
         taken = any(re.match(rf"{channel[0]}\d*(?![a-z0-9])", header) for header in sheet.header)
         if name and len(same) == 1 and not taken:
-            columns = {channel: same[0], **columns}
-    found = {}
-    for letter, count in (("u", units.inputs), ("y", units.outputs)):
-        found |= {role: columns.get(role, role) for role in _of(letter, count)}
-        if count == 1 and f"{letter}1" not in columns:
-            plain, numbered = (
-                [header for header in sheet.header if re.match(rf"{start}(?![a-z0-9])", header)]
-                for start in (letter, f"{letter}1")
-            )
-            if plain and numbered:
-                listed = ", ".join([*plain, *numbered])
-                message = f"{sheet.path.name} has several columns that may be {letter}1: {listed}"
-                hint = f"say which one counts: --columns {letter}1={plain[0]}"
-                raise sheet.error("data-missing-column", message, hint)
-            if not any(header.startswith(f"{letter}1") for header in sheet.header):
-                found[f"{letter}1"] = letter
-    references = _references(sheet, columns, units.inputs) if units.closed_loop else {}
-    return found | references | _time(sheet, columns)
+            named = {channel: same[0], **named}
+    columns = _whole(sheet, with_channels(sheet, named))
+    counts = (
+        [_count(letter, sheet, columns) for letter in "uy"]
+        if units is None
+        else [units.inputs, units.outputs]
+    )
+    wanted = [role for letter, n in zip("uy", counts, strict=True) for role in _of(letter, n)]
+    found = {role: columns.get(role, role) for role in wanted}
+    references = _references(sheet, columns, counts[0]) if units is None or units.closed_loop else {}
+    unasked = units is None and not references.keys() & columns.keys()
+    own = [column_named(sheet, name) for name in references.values()] if unasked else []
+    usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
+    return found | (references if usable else {}) | _time(sheet, columns)
 
 
 def _of(letter: str, count: int) -> list[str]:

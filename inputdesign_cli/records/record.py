@@ -15,10 +15,10 @@ from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
 from inputdesign_cli.findings.places import Recorded, Samples
-from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, TIMES_READ, columns_against_spec
+from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_against_spec
 from inputdesign_cli.identification import resolution_of
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.records.columns import called, channels_of_log, channels_of_plant, rising, without_times
+from inputdesign_cli.records.columns import called, rising, roles_of, without_times
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
@@ -103,10 +103,11 @@ def read_log(path: Path, preparation: Preparation) -> Record:
         DataError: the file cannot be read, or does not show its inputs and outputs.
     """
     sheet = read_sheet(path, preparation=preparation)
-    roles = channels_of_log(sheet, preparation.columns)
+    roles = roles_of(sheet, preparation.columns)
     signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
-    step, found = _step_of(signals, preparation)
-    record = _record(signals, step, signals.unit or "s", preparation, roles, found)
+    step = _step_of(signals, preparation.sample_time, resample=preparation.resample)
+    found = [_assumed(signals, preparation)] if step is None else []
+    record = _record(signals, step or 1.0, signals.unit or "s", preparation, roles, found)
     return replace(record, names=roles)
 
 
@@ -155,7 +156,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
 def _read(path: Path, units: Units, preparation: Preparation) -> Record:
     """Read one file for a plant."""
     sheet = read_sheet(path, preparation=preparation)
-    roles = channels_of_plant(sheet, preparation.columns, units)
+    roles = roles_of(sheet, preparation.columns, units)
     signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
     found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
     in_step = _in_step(signals, units, preparation)
@@ -236,42 +237,48 @@ def _record(
     )
 
 
-def _step_of(signals: Signals, preparation: Preparation) -> tuple[float, list[Finding]]:
-    """The sample time by the times, the option or the file; 1 if nothing says it."""
-    sheet, stated = signals.sheet, preparation.sample_time or signals.sheet.sample_time
-    if signals.name and not preparation.sample_time:
-        step = typical_step(signals.time)
-        if not np.isfinite(step):
-            message, hint = f"{sheet.path.name} has one time only", "give the sample time: --sample-time 0.5"
-            raise sheet.error("data-not-uniform", message, hint, 0)
-        differs = stated is not None and abs(step - stated) > _ROUND * stated
-        fact = f"they advance by {step:g}, and the file states the sample time {stated}"
-        return step, TIMES_READ.when(differs, fact, stated=stated, step=step)
-    if stated:
-        _check_stated(signals, stated, resample=preparation.resample)
-        return stated, []
-    named = without_times(sheet, preparation.columns)
+def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float | None:
+    """The sample time by the option, the times or the file; None if nothing says it.
+
+    Raises:
+        DataError: `data-not-uniform`, times advance by something else than the user states.
+    """
+    apart = typical_step(signals.time) if signals.name else np.nan
+    if stated is None:
+        return apart if np.isfinite(apart) else signals.sheet.sample_time
+    if abs(apart - stated) > _ALIKE * stated and not (resample and apart - stated <= _LONGER * stated):
+        message = (
+            f"times in column {signals.name} advance by {apart:.6g}, and --sample-time says {stated:.6g}"
+        )
+        hint = "leave --sample-time out; or mind --time-unit; or, if that column does not count, time=none"
+        raise signals.sheet.error("data-not-uniform", message, hint, 0)
+    return stated
+
+
+def _assumed(signals: Signals, preparation: Preparation) -> Finding:
+    """Return the finding that the sample time is taken for 1, and which columns may hold times.
+
+    Raises:
+        DataError: `data-not-uniform`, there is one time only.
+    """
+    sheet = signals.sheet
+    if signals.name:
+        hint = "give the sample time: --sample-time 0.5"
+        raise sheet.error("data-not-uniform", f"{sheet.path.name} has one time only", hint, 0)
     taken = {column.strip().lower() for column in preparation.columns.values()}
     likely = [i for i, one in enumerate(sheet.columns) if one.dated or i in rising(sheet)]
     names = [called(sheet, i) for i in likely if taken.isdisjoint((sheet.name_of(i).lower(), str(i + 1)))]
-    listed = [] if named else names
+    listed = [] if without_times(sheet, preparation.columns) else names
     fact = f"perhaps times stand in {', '.join(listed)}" if listed else ""
-    return 1.0, [TIMES_ASSUMED.found(fact, columns=listed)]
-
-
-def _check_stated(signals: Signals, step: float, *, resample: bool) -> None:
-    """Raise `DataError` (`data-not-uniform`) where times advance by something else than the user states."""
-    apart = typical_step(signals.time) if signals.name else step
-    if (apart - step > _ALIKE * step or step - apart > _ALIKE * step) and not (
-        resample and apart - step <= _LONGER * step
-    ):
-        message = f"times in column {signals.name} advance by {apart:.6g}, and --sample-time says {step:.6g}"
-        hint = "leave --sample-time out; or mind --time-unit; or, if that column does not count, time=none"
-        raise signals.sheet.error("data-not-uniform", message, hint, 0)
+    return TIMES_ASSUMED.found(fact, columns=listed)
 
 
 def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signals:
-    """The signals with times in the unit of the spec."""
+    """The signals with times in the unit of the spec.
+
+    Raises:
+        DataError: `data-wrong-unit`; `data-not-uniform`, the sample time is another one.
+    """
     sheet, stated, scale = signals.sheet, preparation.sample_time, 1.0
     if signals.unit and (signals.name or preparation.time_unit):
         scale = SECONDS[signals.unit] / SECONDS[units.time_unit]
@@ -281,18 +288,15 @@ def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signal
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     signals = replace(signals, time=signals.time * scale) if signals.name else signals
-    steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
-    stated = stated or (None if steps.size else sheet.sample_time)
-    if stated is not None:
-        stated *= scale if preparation.time_unit else 1.0
-        _check_stated(signals, stated, resample=preparation.resample)
-    typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
-    if abs(typical - units.sample_time) <= (EVEN if stated else _ALIKE) * units.sample_time:
+    stated = stated or (None if signals.name else sheet.sample_time)
+    stated = stated and stated * (scale if preparation.time_unit else 1.0)
+    step = _step_of(signals, stated, resample=preparation.resample) or units.sample_time
+    if abs(step - units.sample_time) <= (EVEN if stated else _ALIKE) * units.sample_time:
         return signals
     default = " (as it is where none is stated)" if units.sample_time == 1.0 else ""
-    said = f"the data are sampled every {typical:.6g} {units.time_unit}, but sample_time is "
+    said = f"the data are sampled every {step:.6g} {units.time_unit}, but sample_time is "
     message = f"{said}{units.sample_time:g} {units.time_unit}{default}"
-    hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
+    hint = f"if that is right, set sample_time: {step:.6g} and design anew"
     place = Location(str(sheet.path), int(sheet.lines[min(1, len(sheet.lines) - 1)]), 1)
-    details = {"data_sample_time": typical}
+    details = {"data_sample_time": step}
     raise DataError(Diagnostic("data-not-uniform", message, hint, "sample_time", place, details))

@@ -72,7 +72,7 @@ def segments_of(
         if off > MOST_JITTER and not preparation.resample:
             row = int(np.nanargmax(np.abs(np.diff(signals.time) - step))) + 1
             hint = f"add --resample to even out more than {MOST_JITTER:.0%}; or give the right --sample-time"
-            raise sheet.error("data-not-uniform", f"{fact} of it, and not by a gap", hint, row)
+            raise sheet.error("data-not-uniform", f"{fact}, and gaps begin at {_GAP} steps", hint, row)
         evened = [JITTER_EVENED.found(fact, step=step, largest=off)]
         moved = sum(_moves_between(part, step) for part in parts)
         evened += INPUTS_MOVE_BETWEEN.when(moved, f"between {moved} of the even times", instants=moved)
