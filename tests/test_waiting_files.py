@@ -37,7 +37,7 @@ OPENED = {
     "wizard/questions.py": (1, "a file of the package"),
 }
 # Functions of ours with one of these names read by `read_regular`.
-OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.records.text"}
+OURS = {"inputdesign_cli.specification.yaml.files"}
 
 
 def opened(path: Path) -> int:

@@ -69,7 +69,7 @@ def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole
     size, deviation = pole["moves"], (pole["may_move"] - pole["moves"]) / 1.96
     moves = Moves(*(np.array([x]) for x in (size, deviation, 1.0 / 2.4477)))
     assert moves.odds(pole["probability"]) == pytest.approx(of_the_pole, abs=0.02)
-    assert ("estimate it along" in told) == (of_the_pole > 0.7)
+    assert ("Estimate this parameter too" in told) == (of_the_pole > 0.7)
 
 
 def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):

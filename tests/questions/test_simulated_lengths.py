@@ -34,7 +34,8 @@ def test_a_criterion_per_sample_is_compared_like_one_of_the_record():
     for kind in ("covariance", "white"):
         one, other = (getattr(each[2], kind) for each in (found, expected))
         np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-12)
-    assert [" 400 " in note for note in per_sample.result["notes"]] == [True]
+    (only,) = per_sample.result["findings"]
+    assert (only["code"], only["figures"]) == ("other-length", {"counted": 1, "simulated": 400})
     assert "notes" not in of_length.result
 
 

@@ -107,7 +107,8 @@ def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_
     result = json.loads((out / "result.json").read_text())
     assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
     assert result["signal"]["operating_point"] == [40.0]
-    assert any("varies about the operating point, u1 = 40" in note for note in result["notes"])
+    (levels,) = [one for one in result["findings"] if one["code"] == "about-an-operating-point"]
+    assert levels["figures"] == {"levels": [40.0]}
     u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
     assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
     assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
@@ -157,7 +158,6 @@ def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, 
     )
     assert by_prior == pytest.approx(ratio, rel=0.05)
     assert ratio < 0.9 * single
-    assert any("experiment.prior counts" in note for note in known["notes"])
     copied = tmp_path / "copied.csv"
     copied.write_bytes(first.read_bytes())
     for given in (first, copied):

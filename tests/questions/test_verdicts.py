@@ -36,7 +36,7 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
     assert result["identification"]["tests"]["recent_inputs"]["lag"] in (7, 8, 9)
     listed = {one["code"]: one for one in result["findings"]}
     assert listed["plant-structure"]["severity"] == "refuted"
-    assert "raise the orders of B and F" in listed["plant-structure"]["message"]
+    assert "Raise the orders of B and F" in listed["plant-structure"]["message"]
     assert "signal" not in found.results.tables
     assert result["assessment"]["verdict"] == "undecided"
     assert result["assessment"]["causes"] == ["contradicted"]
