@@ -116,10 +116,9 @@ def test_a_pipe_in_a_run_is_not_waited_for(tmp_path, name):
                 use()
 
 
-def test_a_pipe_in_a_folder_of_work_is_not_waited_for(tmp_path):
+def test_a_pipe_for_the_lock_of_a_run_is_not_waited_for(tmp_path):
     write_run(a_run(), tmp_path / "a")
-    (tmp_path / "a" / ".run.partial").mkdir()
-    piped(tmp_path / "a" / ".run.partial" / "lock")
+    piped(tmp_path / "a" / ".run.lock")
     with in_time():
         write_run(a_run(), tmp_path / "a")
     assert read_run(tmp_path / "a")["title"] == "one"

@@ -1,7 +1,7 @@
 """What a question returns: typed results, and their form as JSON."""
 
 from inputdesign_cli.outcome.campaign import Campaign
-from inputdesign_cli.outcome.codec import OutcomeError, read_plain, write_plain
+from inputdesign_cli.outcome.codec import OutcomeError, plain, read_plain
 from inputdesign_cli.outcome.design import (
     Baseline,
     ClosedLoopError,
@@ -62,6 +62,6 @@ __all__ = [
     "Spectrum",
     "Validation",
     "White",
+    "plain",
     "read_plain",
-    "write_plain",
 ]

@@ -24,11 +24,11 @@ from pathlib import Path
 from typing import Any
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome.locks import locked
+from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.origin import digest
 from inputdesign_cli.outcome.record import PAGE, RESULT, SPEC as RUN_SPEC, is_page, is_plain, unreadable
+from inputdesign_cli.outcome.replacing import locked
 from inputdesign_cli.outcome.run_directory import output_errors, read_run, replace_text
-from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.regular_file import read_regular
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"

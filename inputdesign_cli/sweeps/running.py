@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import STANDARD_STREAM, DataError, Diagnostic, IdesignError, OutputError
+from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.origin import Origin
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
-from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification.yaml.plain import to_yaml
 from inputdesign_cli.sweeps.grid import Settings
