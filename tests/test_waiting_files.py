@@ -13,10 +13,10 @@ from inputdesign_cli.errors import DataError, IdesignError, OutputError
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from inputdesign_cli.sweeps.layout import at_work
-from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.campaigns import SPEC
 from tests.support.commands import caller
 from tests.support.outcomes import typed
+from tests.support.sweep_files import run_sweep
 from tests.test_architecture import FILES, ROOT, tree_of
 
 OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loadtxt", "genfromtxt", "cmp"}
