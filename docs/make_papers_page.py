@@ -15,7 +15,7 @@ from pathlib import Path
 
 from inputdesign_cli.outcome.golden import Golden, Row, compare, load_golden
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.questions.verbs import run_verb
+from inputdesign_cli.questions import run_verb
 from inputdesign_cli.specification import load_spec
 from inputdesign_cli.sweeps.notebook import sweep
 

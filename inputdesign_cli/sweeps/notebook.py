@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.sweep_table import read_sweep
-from inputdesign_cli.questions.verbs import Verb
+from inputdesign_cli.questions import Verb
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.sweeps.grid import Settings
 from inputdesign_cli.sweeps.plan import build_plan

@@ -13,7 +13,7 @@ from typing import get_args
 from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError, bad_spec
 from inputdesign_cli.outcome.origin import digest
 from inputdesign_cli.outcome.record import environment
-from inputdesign_cli.questions.verbs import Verb
+from inputdesign_cli.questions import Verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.specification.yaml.plain import to_yaml

@@ -20,7 +20,7 @@ from inputdesign_cli.errors import (
     SpecError,
 )
 from inputdesign_cli.outcome.record import environment
-from inputdesign_cli.questions.verbs import Verb, run_verb
+from inputdesign_cli.questions import Verb, run_verb
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweeps.layout import Layout, at_work
 
