@@ -13,10 +13,9 @@ from inputdesign_cli import load_spec, simulate
 from inputdesign_cli.compute.cluster import Cluster
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.text_formats import json_text
-from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.outcome.codec import json_text
 from tests.support import jobs
-from tests.support.sweep_files import SPEC, timeless_files, timeless_rows
+from tests.support.sweep_files import SPEC, run_sweep, timeless_files, timeless_rows
 
 pytest.importorskip("distributed")
 # Dask's own warnings are not ours to mend.

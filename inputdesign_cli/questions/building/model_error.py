@@ -23,7 +23,7 @@ from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
+from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.plant import Model, Rational, ScalarTransfer
 from inputdesign_cli.questions.building.controllers import loop_controller
 from inputdesign_cli.questions.building.header import build_units

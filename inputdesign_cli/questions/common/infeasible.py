@@ -17,7 +17,7 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
-from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
+from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.spectrum import LinesBasis
 

@@ -8,7 +8,7 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.response_lines import UnreachableError
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.rounding import rounded_up
+from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.infeasible import contradictory, named
 from inputdesign_cli.questions.common.record import RecordRequest

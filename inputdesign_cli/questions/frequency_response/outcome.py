@@ -24,7 +24,7 @@ from inputdesign_cli.outcome import (
     White,
 )
 from inputdesign_cli.outcome.curves import Curves, DeviationCurves, SpectrumCurves
-from inputdesign_cli.outcome.response import DetectionLines
+from inputdesign_cli.outcome.estimate import DetectionLines
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
 from inputdesign_cli.questions.common.delivery import proof_status, results_of, with_record

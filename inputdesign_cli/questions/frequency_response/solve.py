@@ -23,7 +23,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.rounding import rounded_up
+from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.delivery import timing, with_study
 from inputdesign_cli.questions.common.no_record import no_record, too_long, unreachable
