@@ -114,8 +114,9 @@ def _explains_little(found: Found) -> Iterator[Finding]:
             yield EXPLAINS_LITTLE.found(
                 f"the simulation explains {fit:.1f} % of {output} in {unseen} samples"
                 f"{'' if found.split == 'none' else ' that it has not seen'}, and of noise alone it may "
-                f"explain {luck:.1f} %: the inputs hardly act on it, or by more than {chosen.most} samples "
-                "later, or the record is too short or too noisy; move the inputs more, or record for longer",
+                f"explain {luck:.1f} %: the inputs hardly act on it, or by more than "
+                f"{chosen.swept.most} samples later, or the record is too short or too noisy; move the "
+                "inputs more, or record for longer",
                 where=output,
                 fit_percent=fit,
                 chance_percent=luck,
