@@ -71,7 +71,7 @@ def _explains_little(kind: FindingKind, found: Found) -> list[Finding]:
         little = not found.helped[i] > 0.0 if found.wanders[i] else fit < max(LEAST_FIT, luck)
         fact = (
             f"{fit:.1f} % of {output} in {unseen} samples, and {luck:.1f} % of noise alone. The inputs "
-            f"hardly act, or by more than {chosen.most} samples later"
+            f"hardly act, or by more than {chosen.swept.most} samples later"
         )
         doubtful += kind.when(little, fact, where=output, fit_percent=fit, chance_percent=luck)
     return doubtful

@@ -146,8 +146,8 @@ def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion():
     assert every == (plain, rich, vague, edge, weak)
     assert good == every[:4]
     # In a loop prediction errors alone rank what is steady and certain.
-    looped = [replace(c, by_prediction=True) for c in (weak, plain, rich)]
-    assert [c.criterion for c in ranked(looped)[0]] == [-3.0, -1.0, -0.9]
+    looped = ranked([weak, plain, rich], by_prediction=True)
+    assert [c.criterion for c in looped[0]] == [-3.0, -1.0, -0.9]
 
 
 def looped(rng, samples, noise):
