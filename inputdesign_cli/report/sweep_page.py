@@ -17,7 +17,7 @@ from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
 from inputdesign_cli.outcome.run_directory import read_outcome
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, chart
-from inputdesign_cli.report.numbers import provenance
+from inputdesign_cli.report.facts import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
 from inputdesign_cli.sweeps.layout import checked_run

@@ -62,9 +62,9 @@ def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole
     true = scipy.signal.freqz([0, 0, 0, 0, 0.02], np.convolve([1, -0.95], [1, -0.5]), w)[1]
     assert np.max(np.abs(true - model) / np.abs(model)) / 0.1 > assessment["requirements"][0]["worst_ratio"]
     told = said(found.results)
-    assert f"after both the error is {assessment['left']:.4g} of what is admitted if the structure" in told
+    assert f"after both the error is {assessment['left']:.4g} of the admissible error if the" in told
     worst = max(assessment["neglected"], key=lambda entry: entry["may_move"])
-    assert f"one more parameter ({worst['parameter']}), which these data do not rule out" in told
+    assert f"another parameter ({worst['parameter']}), which these data do not rule out" in told
     pole = assessment["neglected"][0]
     size, deviation = pole["moves"], (pole["may_move"] - pole["moves"]) / 1.96
     moves = Moves(*(np.array([x]) for x in (size, deviation, 1.0 / 2.4477)))
