@@ -78,6 +78,7 @@ class Terminal:
         os.write(self.end, text.encode())
 
 
+@pytest.mark.slow
 def test_in_a_terminal_a_bad_answer_is_asked_again(tmp_path):
     with Terminal(tmp_path, sys.executable, "-m", "inputdesign_cli", "wizard") as terminal:
         for part, text in TYPED:
@@ -89,6 +90,7 @@ def test_in_a_terminal_a_bad_answer_is_asked_again(tmp_path):
     assert (written["limits"]["duration"], written["signal"]["offset"]) == (1200, 40)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("key", ["\x03", "\x04"])
 def test_control_c_and_d_end_the_questions(key, tmp_path):
     with Terminal(tmp_path, sys.executable, "-m", "inputdesign_cli", "wizard") as terminal:

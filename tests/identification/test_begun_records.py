@@ -242,6 +242,7 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
         assert 0.0 <= one.theta[2] < 5.0 * np.sqrt(one.covariance[2, 2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.

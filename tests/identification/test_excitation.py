@@ -17,6 +17,7 @@ SLOW = PolynomialModel.single(
 DECADES = st.integers(-6, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_collinear_gradients_are_no_lack_of_excitation(seed):
     u, y = simulated(SLOW, 400, np.random.default_rng(seed))

@@ -203,6 +203,7 @@ def test_lines_on_the_pole_are_refused():
     assert refused(Plant(1).text("D", "limits: {input_power: 1}"), spectrum) == "needs-limits"
 
 
+@pytest.mark.slow
 def test_where_digits_end_on_the_way_to_what_is_only_approached_a_remedy_is_told():
     """Power ever nearer to frequency zero is free of charge; a band that leaves it out has an optimum."""
     text = """

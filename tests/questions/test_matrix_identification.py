@@ -114,6 +114,7 @@ def test_plants_in_s_are_assessed(relative, enough, write):
         assert found.results.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_held_input_taken_for_its_interpolation_is_told(write):
     spec = parse_spec(IN_S.replace("DENOMINATOR", EACH))
     data = write(recorded_in_s(spec, 1500, True, np.random.default_rng(1)))

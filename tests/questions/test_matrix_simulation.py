@@ -128,6 +128,7 @@ def test_a_loop_keeps_its_promise():
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
 
 
+@pytest.mark.slow
 def test_a_loop_around_a_held_plant_keeps_its_promise():
     """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
     true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
@@ -159,7 +160,7 @@ IN_S += "0.69314718]}, sample: zoh"
 COLOURED = "noise: {C: [1, 0.8], variance: 0.5}"
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("nominal", [IN_Q, IN_S])
 @pytest.mark.parametrize("loop", ["", ", controller: {numerator: [[[0.1], [0]], [[0], [0.1]]]}"])
 def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
@@ -240,6 +241,7 @@ def test_the_result_does_not_depend_on_where_it_is_computed(spec, overrides):
     assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("hold", [True, False])
 def test_plants_in_s_keep_their_promise(hold):
     overrides = ["plant.sample=zoh"] if hold else []
@@ -261,6 +263,7 @@ def test_the_design_reaches_the_cramer_rao_bound():
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_run_that_tells_too_little_is_counted_not_fatal():
     """Poles so fast, and noise so strong, that some runs see a plant that answers at once."""
     spec = parse_spec(

@@ -65,6 +65,7 @@ def test_a_spectrum_of_order_zero_is_white_in_time():
     assert costs[0] < costs[1] < costs[2]
 
 
+@pytest.mark.slow
 def test_free_spectra_of_unequal_limits_are_proved():
     """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
     spec = changed(

@@ -281,6 +281,7 @@ signal: {periods: 5, phases: optimised}
 """
 
 
+@pytest.mark.slow
 def test_of_optimised_phases_the_change_is_told_as_large_as_it_is(write):
     spec = parse_spec(OPTIMISED)
     question, u = build_measurement(spec), np.tile(solve(spec).signal[:1002], (16, 1))

@@ -71,6 +71,7 @@ def test_a_record_of_another_spectrum_is_delivered_where_that_of_the_cheapest_do
     assert again["worst_ratio"] <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_a_kind_of_signal_that_is_asked_for_is_not_replaced():
     stated = DEAR_OUTPUT + "signal: {type: ternary, candidates: 8}\n"
     with pytest.raises(InfeasibleError) as caught:

@@ -92,6 +92,7 @@ def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
     assert found["cost"] > 1.05 * solved(FIRST)["cost"]
 
 
+@pytest.mark.slow
 def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
     """Cost worst: beside the accuracy the cost is promised, at the plants drawn and to most of the others."""
     prior = "covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 30, fresh: 60"
@@ -142,6 +143,7 @@ def test_leaving_out_the_dearest_plants_makes_it_cheaper():
     assert whole.result["robust"]["active"][0]["scenario"] in gone
 
 
+@pytest.mark.slow
 def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
     """The sensitivity of the scenario's own loop misses what is asked: without a floor nothing would do."""
     text = LOOP.replace("relative: 0.1", "sensitivity: {max_db: 9}")
@@ -181,6 +183,7 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     assert by_estimate.frequency == pytest.approx(0.390, abs=2e-3)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("asked", [(), ("limits={input_power: 1}", "objective=best_accuracy")])
 def test_the_record_serves_every_plant_by_its_own_samples(asked):
     prior = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 20, fresh: 5}}"
@@ -272,6 +275,7 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
     assert cut.findings[0].figures == {"tried": first, "asked": 120}
 
 
+@pytest.mark.slow
 def test_what_data_will_tell_of_the_worst_plant_is_foreseen():
     """One gain b: r_u is the same everywhere, r_adm a share of |b|, and the estimate is normal."""
     deviation, worst = 0.1, 0.8

@@ -280,7 +280,7 @@ objective: shortest_experiment
     assert least <= found["samples"] <= least + 1
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
 def test_what_is_known_already_needs_a_short_record_only(share):
     """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""

@@ -83,6 +83,7 @@ def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path
         solve(load_spec(spec))
 
 
+@pytest.mark.slow
 def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(
     heater_record, tmp_path
 ):

@@ -32,6 +32,7 @@ def test_climbs_and_stays_below_the_optimum(real, criterion):
     assert abs(bound - found.value) <= 5e-3 * abs(bound)
 
 
+@pytest.mark.slow
 def test_what_it_reports_is_what_the_factor_attains(real):
     problem = design(real, "D")
     found = hill_climb(problem, 2, starts=1, rng=np.random.default_rng(1))
