@@ -70,6 +70,7 @@ LINES = np.column_stack([RNG.uniform(0.2, 3.1, 60), 10.0 ** RNG.uniform(-4, 0, 6
 FAMILIES = ["{type: fir, order: 4}", "{type: white}", "{type: multisine, lines: 12}"]
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize(("seed", "criterion"), [(1, "D"), (2, "A"), (3, "E"), (1, "T")])
 @pytest.mark.parametrize("spectrum", FAMILIES)
 def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spectrum):

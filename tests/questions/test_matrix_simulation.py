@@ -53,6 +53,10 @@ def within_wishart(simulation):
 
 def test_covariances_lie_in_the_range_of_the_wishart_distribution(studied):
     within_wishart(studied.result["simulation"])
+
+
+@pytest.mark.slow
+def test_of_box_jenkins_plants_they_do_as_well():
     within_wishart(simulate(parse_spec(JENKINS)).result["simulation"])
 
 
@@ -199,8 +203,9 @@ def test_a_given_table_is_tried(tmp_path):
     np.testing.assert_allclose(simulation["inputs"]["design"]["power"]["input"], [9.0, 4.0], rtol=0.01)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("signal", [{}, {"offset": [5.0, -3.0], "quantisation": {"bits": 5, "range": 100}}])
-@pytest.mark.parametrize("spec", [SPEC, "specs/first_order.yaml"])
+@pytest.mark.parametrize("spec", ["specs/first_order.yaml", SPEC])
 def test_the_delivered_record_is_tried_about_its_operating_point(spec, signal):
     overrides = ["simulation={runs: 20, excitation: record}", "spectrum.order=3"]
     if signal and "first" in spec:
@@ -223,7 +228,7 @@ class Elsewhere:
             yield Finished(task, pickle.loads(pickle.dumps(there(task))))
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("spec", "overrides"),
     [

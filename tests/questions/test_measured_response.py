@@ -230,6 +230,7 @@ def clipping(share):
     return lambda x: np.clip(x, -share * np.abs(x).max(), share * np.abs(x).max())
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize(
     ("where", "curve"),
     [

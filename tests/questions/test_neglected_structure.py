@@ -37,6 +37,7 @@ def narrow(tmp_path_factory):
     return written
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow):
     found = assess(parse_spec(NARROW), narrow(seed, 0.5))

@@ -54,7 +54,7 @@ def designed(plant):
     return found.result, np.array(bound.columns["r_u"] if hasattr(bound, "columns") else bound["r_u"])
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [WORDS, SECOND, IN_Q], ids=["first order", "second order", "in q"])
 def test_reparametrisation_changes_neither_cost_nor_error(words):
     first, *others = (designed(plant) for plant in words.values())

@@ -81,6 +81,7 @@ def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
     assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
 
 
+@pytest.mark.slow
 def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
     found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
     robust = found["robust"]
@@ -131,13 +132,13 @@ def test_plants_that_get_less_and_plants_that_cost_more_are_told_apart():
 
 
 def test_leaving_out_the_dearest_plants_makes_it_cheaper():
-    prior = f"covariance: {COVARIANCE}, scenarios: 30, fresh: 10"
+    prior = f"covariance: {COVARIANCE}, scenarios: 15, fresh: 1"
     whole = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}}}"]))
-    fewer = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, discard: 0.1}}"]))
+    fewer = solve(parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, discard: 0.2}}"]))
     assert fewer.result["robust"]["discarded"] == 3
     assert fewer.result["cost"] < 0.99 * whole.result["cost"]
     assert "risk" not in fewer.result["robust"]
-    assert len(fewer.tables["scenarios"].columns["scenario"]) == 27
+    assert len(fewer.tables["scenarios"].columns["scenario"]) == 12
     before, after = (found.tables["scenarios"].columns["scenario"] for found in (whole, fewer))
     gone = set(before) - set(after)
     assert whole.result["robust"]["active"][0]["scenario"] in gone
