@@ -124,7 +124,8 @@ def test_answers_make_a_spec_that_is_accepted(run, tmp_path):
     assert (code, "bad-answer" in err, "How much time" in err) == (2, True, True)
 
 
-def test_a_trade_is_a_sweep_with_a_table(run, tmp_path):
+def test_a_trade_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})  # no other processes
     spec = (
         "plant: {B: [0, 1], F: [1, -0.8]}\nnoise: {variance: 1}\nexperiment: {samples: 40}\n"
         "accuracy: {standard_deviation: {b1: 0.5}}\nlimits: {amplitude: 2}\n"
