@@ -57,6 +57,7 @@ def test_of_a_finite_response_it_is_that_of_a_plain_simulation():
     assert alpha < np.sqrt(scipy.stats.chi2(3).ppf(0.9))  # G is linear in theta: the ellipsoid is enough
 
 
+@pytest.mark.slow
 def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
     usual, exact = solve(spec(FIR, "0.95")).result, solve(spec(FIR)).result
     share = (exact["model_error"]["alpha"] / usual["model_error"]["alpha"]) ** 2
@@ -119,6 +120,7 @@ spectrum: {type: white}
 """
 
 
+@pytest.mark.slow
 def test_estimates_that_are_normal_at_every_length_need_no_correction():
     """A gain and a signal of two levels: least squares is normal with variance 1 / (N p) whatever N."""
     told = solve(spec(GAIN, "{exact: 0.95, draws: 1000, runs: 1000}", "spectrum={type: white}")).result
@@ -156,6 +158,7 @@ def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
     assert share == pytest.approx(found["model_error"]["alpha"] / plain["model_error"]["alpha"], rel=0.15)
 
 
+@pytest.mark.slow
 def test_an_analysis_calibrates_as_the_design_does():
     runs = "{exact: 0.9, draws: 1000, runs: 500}"
     design = solve(spec(POLE, runs)).result

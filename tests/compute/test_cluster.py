@@ -119,6 +119,7 @@ def test_data_files_travel_with_the_points(loopback, tmp_path):
     assert {row["status"] for row in timeless_rows(tmp_path / "there")} == {"optimal"}
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_says_so_and_is_given_up(tmp_path):
     cluster = Loopback(tmp_path)
     worker = cluster.add_worker()
@@ -174,7 +175,7 @@ def test_no_cluster_is_a_complaint():
 SPECS = Path(__file__).parents[2] / "specs"
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [

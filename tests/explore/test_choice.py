@@ -83,6 +83,7 @@ def test_a_second_order_is_not_taken_for_a_first():
     np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], truth, rtol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("hold", "delay"), [(1, 0), pytest.param(8, 2, marks=pytest.mark.slow)])
 def test_a_static_gain_has_no_pole(delay, hold):
     rng = np.random.default_rng(1)
@@ -93,6 +94,7 @@ def test_a_static_gain_has_no_pole(delay, hold):
     assert found.model.theta == pytest.approx([3.0], abs=4.0 * 0.2 / np.sqrt(1000))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("only", "names"),
     [
@@ -124,6 +126,7 @@ def test_an_integrator_is_taken_where_no_time_constant_follows():
     assert found.estimate.theta[0] == pytest.approx(0.02, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
     """Gain 1.7, pole 0.98, dead time of six samples, one line, noise that fades in twelve samples."""
     found = explore_records(drifting(2, 1e-3))
@@ -162,6 +165,7 @@ def looped(rng, samples, noise):
     return column(u, y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["arx", pytest.param("oe", marks=pytest.mark.slow)])
 def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
     found = explore_records([looped(np.random.default_rng(1), 1000, noise)], feedback=True)
@@ -216,6 +220,7 @@ def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
     assert corner == pytest.approx(abs(0.1 / (1 - 0.9 * np.exp(-0.1j))), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_a_dead_time_of_a_quarter_of_the_record_is_found(seed):
     rng = np.random.default_rng(seed)

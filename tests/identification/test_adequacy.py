@@ -190,6 +190,7 @@ def test_a_dead_time_at_zero_hides_nothing():
     assert by_name(found)["recent_inputs"].probability < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pole", [1.2, *(pytest.param(p, marks=pytest.mark.slow) for p in (1.0, 1.05))])
 def test_the_right_model_of_a_plant_that_only_its_loop_holds_is_not_refuted(pole):
     """A proportional controller without noise: the tests err seldom, and see a lag that lacks."""

@@ -181,6 +181,7 @@ def test_one_channel_has_the_estimate_of_a_plain_optimiser():
     np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(plain.jac.T @ plain.jac), rtol=1e-4)
 
 
+@pytest.mark.first(1)
 @HOLDS
 def test_the_covariance_is_that_of_the_records_information(hold):
     rng = np.random.default_rng(8)

@@ -19,6 +19,7 @@ def log(path, slope, seed=4, samples=400):
     return path
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("detrend", ["linear", "auto"])
 def test_a_line_that_is_taken_away_does_not_move_the_estimate(tmp_path, detrend):
     """The plant makes a line of that of the input, which is not that through the output."""

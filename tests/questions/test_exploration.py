@@ -121,6 +121,7 @@ def integrating(tmp_path):
     return log
 
 
+@pytest.mark.slow
 def test_an_integrator_earns_no_trust_until_somebody_says_that_it_is_one(integrating):
     """Only the slope follows from the record: a long time constant would explain it as well."""
     prepared = Preparation(sample_time=1.0)

@@ -16,7 +16,7 @@ def saved(path, rows):
     return path
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("digits", "options"), [(12, {}), (0, {"preparation": Preparation(detrend="linear")})]
 )

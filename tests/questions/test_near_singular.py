@@ -114,6 +114,7 @@ signal: {{samples: 100}}
 """
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize(
     "dynamics",
     [

@@ -37,6 +37,7 @@ def narrow(tmp_path_factory):
     return written
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow):
     found = assess(parse_spec(NARROW), narrow(seed, 0.5))
@@ -48,6 +49,7 @@ def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow
     assert "(f2)" in " ".join(outcome.notes)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(("seed", "of_the_pole"), [(1, 0.05), (3, 0.84)])
 def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole, narrow):
     """No test sees the missing pole; the true error is beyond what the top-up would leave, as is told.

@@ -56,6 +56,7 @@ def test_what_is_known_before_does_not_grow_with_the_record(region):
     assert np.interp(1.0, bound.frequency, bound.r_u) > 1.5 * np.interp(1.0, *found[1])
 
 
+@pytest.mark.slow
 def test_the_shipped_plant_in_s():
     """r_u of the figure is that of bound.csv for one sample over the root of the length of the record."""
     found = simulate(load_spec("specs/two_by_two.yaml", ["signal.samples=1024", "simulation.runs=2"]))

@@ -95,6 +95,7 @@ def test_one_estimated_parameter_against_cvxpy(seed):
     assert 0.0 <= gap(found, found.split.total) <= 1.1e-6
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_two_estimated_parameters_are_proved(seed):
     rng = np.random.default_rng(seed)
@@ -119,6 +120,7 @@ def test_three_and_four_estimated_parameters(n, seed):
     assert found.split.total <= general_search(*case, rng, energy=found.energy) * (1 + 1e-8)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(("m", "n"), [(1, 3), (2, 4), (2, 5), (3, 5)])
 def test_no_shape_in_a_box_beats_its_bound(m, n):
     """The certificate itself: random shapes in random boxes, wide and narrow, never fall below the bound."""
@@ -196,6 +198,7 @@ def test_the_alternation_is_enough_for_one_parameter():
     assert found.split.total == pytest.approx(0.525796, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_infeasible_targets_of_two_parameters():
     with pytest.raises(OutOfReachError) as error:
         design(regression([1, -0.3], [1, 4], 1.0), target=1.0)
