@@ -19,7 +19,7 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.common.reach import Reach
+from inputdesign_cli.questions.common.infeasible import Reach
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import matrices
 
