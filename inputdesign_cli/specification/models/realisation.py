@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from inputdesign_cli.plugins import names
+from inputdesign_cli.plugins import names, own
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.fields import (
     Count,
@@ -26,31 +26,30 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail, optional
 from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.wording import unknown_word
 
 Samples = Annotated[Count, SIZES["signal.samples"]]
 _GROUP = "idesign.signals"
 
 
-class _Added:
-    """Lets names of kinds that other packages add stand in a spec and its schema as well."""
+class _Registered:
+    """Admits the names of a group of `plugins`, as text and in the schema."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        def known(value: object, inner: core_schema.ValidatorFunctionWrapHandler) -> object:
-            return value if isinstance(value, str) and value in names(_GROUP) else inner(value)
+        def known(value: str) -> str:
+            if value not in (words := [*own(_GROUP), *sorted(names(_GROUP))]):
+                raise fail("unknown-word", *unknown_word(value, words))
+            return value
 
-        return core_schema.no_info_wrap_validator_function(known, handler(source))
+        return core_schema.no_info_before_validator_function(known, handler(source))
 
     def __get_pydantic_json_schema__(
         self, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, object]:
-        found = handler(core)
-        return {**found, "enum": [*found["enum"], *sorted(names(_GROUP))]}
+        return {**handler(core), "enum": [*own(_GROUP), *sorted(names(_GROUP))]}
 
 
-SignalType = Annotated[
-    Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white", "chirp", "steps"],
-    _Added(),
-]
+SignalType = Annotated[str, _Registered()]
 
 # Settings that mean something for some types of signal only.
 _ONLY_FOR = {
