@@ -26,11 +26,7 @@ _GENEROUS = 10  # hard plants take this many times as long as the first rounds
 
 
 def check_model(spec: Spec, model: Model) -> None:
-    """Refuse models whose gradients do not fit into memory.
-
-    Raises:
-        SpecError: `too-large`.
-    """
+    """Refuse models whose gradients do not fit into memory. It raises `SpecError` (`too-large`)."""
     channels = model.outputs * model.inputs
     room = _MOST_BYTES // (16 * _NODES * channels)
     if len(model.names) > room:
