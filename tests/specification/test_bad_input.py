@@ -59,7 +59,7 @@ ROWS: list[Row] = [
     ("not-a-number", "sample_time", 'the text "yes"', {"sample_time": "§yes"}),
     ("not-a-number", "sample_time", "a list", {"sample_time": "§[1]"}),
     ("not-a-number", "sample_time", "write 10", {"sample_time": "§010"}),
-    ("not-a-number", "sample_time", "decimal: 16", {"sample_time": "§0x10"}),
+    ("not-a-number", "sample_time", "decimal number", {"sample_time": "§0x10"}),
     ("not-a-number", "sample_time", "underscores: 1000", {"sample_time": "§1_000"}),
     ("not-a-number", "sample_time", "1:30", {"sample_time": "§1:30"}),
     ("not-a-number", "sample_time", "2001-01-01", {"sample_time": "§2001-01-01"}),

@@ -8,25 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.experiment import check_names
-from inputdesign_cli.specification.models.fields import (
-    AtLeastTwo,
-    Band,
-    Count,
-    Denominator,
-    FileName,
-    Flag,
-    Fraction,
-    Frequencies,
-    Index,
-    Names,
-    NonNegative,
-    Numbers,
-    Numerator,
-    Positive,
-    SemidefiniteMatrix,
-    SymmetricMatrix,
-)
 from inputdesign_cli.specification.models.loop import ClosedLoopError, Controller, LoopMargin
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, Wording, optional
 from inputdesign_cli.specification.models.sizes import SIZES
@@ -39,7 +22,7 @@ _PROBABILITY = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 _NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
 
 Deviations = Annotated[
-    Mapping[str, Positive],
+    Mapping[str, fields.Positive],
     Field(min_length=1),
     Wording("a mapping", "write parameter names and numbers: {b1: 0.01}"),
 ]
@@ -51,9 +34,9 @@ _NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_err
 class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
     """An admissible error that keeps |W S| <= 1, or |S| below a peak, for the sensitivity S of a loop."""
 
-    numerator: Numerator | None = optional("Numerator of W in q^-1.")
-    denominator: Denominator | None = optional("Denominator of W (default 1), or its factors.")
-    max_db: Positive | None = optional("Largest |S| in dB; stands for a constant W.")
+    numerator: fields.Numerator | None = optional("Numerator of W in q^-1.")
+    denominator: fields.Denominator | None = optional("Denominator of W (default 1), or its factors.")
+    max_db: fields.Positive | None = optional("Largest |S| in dB; stands for a constant W.")
     controller: Controller | None = optional(
         "C of the loop to be kept (default: the controller of the experiment)."
     )
@@ -75,13 +58,15 @@ class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
 class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     """The probability that fixes r_u: of an ellipsoid of parameters, or of the error itself."""
 
-    ellipsoid: Fraction | None = optional("Probability that fixes alpha by the chi-squared distribution.")
-    exact: Fraction | None = optional("Probability that |G(theta) - G| <= r_adm at all frequencies.")
-    draws: Annotated[Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
+    ellipsoid: fields.Fraction | None = optional(
+        "Probability that fixes alpha by the chi-squared distribution."
+    )
+    exact: fields.Fraction | None = optional("Probability that |G(theta) - G| <= r_adm at all frequencies.")
+    draws: Annotated[fields.Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
         default=4000,
         description="Estimates drawn by asymptotic theory that fix alpha for exact, and as many that check.",
     )
-    runs: Annotated[Index, SIZES["accuracy.model_error.confidence.runs"]] = Field(
+    runs: Annotated[fields.Index, SIZES["accuracy.model_error.confidence.runs"]] = Field(
         default=4000,
         description="Simulated experiments that correct alpha for records this short, and as many that check "
         "(0: none, asymptotic theory alone).",
@@ -102,16 +87,16 @@ class ModelError(
 ):
     """r_u(w) <= r_adm(w) at every frequency of the band."""
 
-    relative: Positive | None = optional("r_adm = this fraction of |G|.")
-    absolute: Positive | None = optional("r_adm = this value at every frequency.")
-    table: FileName | None = optional("CSV file with columns frequency and r_adm.")
+    relative: fields.Positive | None = optional("r_adm = this fraction of |G|.")
+    absolute: fields.Positive | None = optional("r_adm = this value at every frequency.")
+    table: fields.FileName | None = optional("CSV file with columns frequency and r_adm.")
     sensitivity: Sensitivity | None = optional("r_adm from a bound on a sensitivity.")
     confidence: Annotated[Confidence, Shorthand("ellipsoid", _PROBABILITY)] | None = optional(
         "Probability that fixes alpha by the chi-squared distribution (default 0.95), or "
         "{exact: 0.95}: alpha calibrated by simulated estimates."
     )
-    alpha: Positive | None = optional("Size of the confidence region, in place of confidence.")
-    band: Band | None = optional("Frequencies [low, high] (default: all).")
+    alpha: fields.Positive | None = optional("Size of the confidence region, in place of confidence.")
+    band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
     weight: Transfer | None = optional("Weight on the model error (default 1).")
     norm: Literal["entry", "frobenius"] | None = optional(
         "Of several channels: entry, each entry of G for itself (default), or frobenius, the "
@@ -150,8 +135,8 @@ class ModelError(
 class InformationTarget(Section):
     """The information matrix must exceed this one."""
 
-    matrix: SymmetricMatrix = Field(description="Symmetric matrix, a row per parameter.")
-    parameters: Names | None = optional("Names that order its rows (default: of the model).")
+    matrix: fields.SymmetricMatrix = Field(description="Symmetric matrix, a row per parameter.")
+    parameters: fields.Names | None = optional("Names that order its rows (default: of the model).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row has a name."""
@@ -161,10 +146,14 @@ class InformationTarget(Section):
 class Application(Section):
     """Application-oriented accuracy: M >= (chi2 gamma / 2) V'', V the degradation of the application."""
 
-    parameters: Names = Field(description="Names of the parameters, in the order of the hessian's rows.")
-    hessian: SemidefiniteMatrix = Field(description="V'' of the application cost at the nominal parameters.")
-    gamma: Positive = Field(description="Accuracy: V may reach 1/gamma.")
-    confidence: Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
+    parameters: fields.Names = Field(
+        description="Names of the parameters, in the order of the hessian's rows."
+    )
+    hessian: fields.SemidefiniteMatrix = Field(
+        description="V'' of the application cost at the nominal parameters."
+    )
+    gamma: fields.Positive = Field(description="Accuracy: V may reach 1/gamma.")
+    confidence: fields.Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row has a name."""
@@ -175,9 +164,9 @@ class WeightedVariance(Section):
     """|W|^2 Lambda^* P Lambda <= max at every frequency of the band."""
 
     weight: Transfer | None = optional("The weight W (default 1).")
-    max: Positive = Field(description="Largest admissible weighted variance.")
-    band: Band | None = optional("Frequencies [low, high] (default: all).")
-    relative: Flag = Field(
+    max: fields.Positive = Field(description="Largest admissible weighted variance.")
+    band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
+    relative: fields.Flag = Field(
         default=False, description="Whether the variance is of G relative to its nominal value."
     )
 
@@ -185,12 +174,14 @@ class WeightedVariance(Section):
 class MeanSquaredError(Section):
     """Mean-squared error of an estimated quantity when some regressors are neglected."""
 
-    estimated: Numbers = Field(description="Weights of the estimated parameters in the quantity of interest.")
-    neglected: Numbers | None = optional("Weights of the neglected ones (default 0).")
+    estimated: fields.Numbers = Field(
+        description="Weights of the estimated parameters in the quantity of interest."
+    )
+    neglected: fields.Numbers | None = optional("Weights of the neglected ones (default 0).")
     neglected_norm: Annotated[
-        NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
+        fields.NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
     ] = Field(description="Bound on the norm of the neglected parameters.")
-    target: Annotated[Positive, Wording("a number", _NO_TARGET)] | None = optional(
+    target: Annotated[fields.Positive, Wording("a number", _NO_TARGET)] | None = optional(
         "Largest admissible error; absent: the least that limits.energy allows."
     )
 
@@ -198,27 +189,29 @@ class MeanSquaredError(Section):
 class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("frequencies", "band"))):
     """The standard deviation of a nonparametric frequency response, line by line, for periodic excitation."""
 
-    relative: Positive | None = optional("r_adm = this fraction of |G|.")
-    absolute: Positive | None = optional("r_adm = this value at every line.")
-    table: FileName | None = optional("CSV file with columns frequency and r_adm.")
-    frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+    relative: fields.Positive | None = optional("r_adm = this fraction of |G|.")
+    absolute: fields.Positive | None = optional("r_adm = this value at every line.")
+    table: fields.FileName | None = optional("CSV file with columns frequency and r_adm.")
+    frequencies: Annotated[fields.Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "The lines, increasing; each moves to the nearest harmonic of the period."
     )
-    band: Band | None = optional("In place of frequencies: lines in [low, high], even in the logarithm.")
-    lines: Annotated[Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+    band: fields.Band | None = optional(
+        "In place of frequencies: lines in [low, high], even in the logarithm."
+    )
+    lines: Annotated[fields.Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "Number of lines in the band (default: every harmonic of the period)."
     )
-    period: Annotated[Count, SIZES["signal.samples"]] | None = optional(
+    period: Annotated[fields.Count, SIZES["signal.samples"]] | None = optional(
         "Samples of a period (default: the record in signal.periods equal ones, or in five)."
     )
-    transient: Annotated[Index, SIZES["signal.samples"]] = Field(
+    transient: Annotated[fields.Index, SIZES["signal.samples"]] = Field(
         default=1, description="Periods that are left to the transient and not counted (default 1)."
     )
-    detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+    detection: Annotated[fields.AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "Only odd harmonics are excited, and in a band one of each group of this size is "
         "left out at random: power at the others shows nonlinearity."
     )
-    noise: FileName | None = optional(
+    noise: fields.FileName | None = optional(
         "CSV file with columns frequency and noise_spectrum (of explore) in place of the model."
     )
 

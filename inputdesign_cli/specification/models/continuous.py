@@ -9,16 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from inputdesign_cli.expressions import Expression, product_of
-from inputdesign_cli.specification.models.fields import (
-    ContinuousDenominator,
-    GainMatrix,
-    NonNegativeGrid,
-    NumberGrid,
-    PolynomialMatrix,
-    PositiveGrid,
-    check_no_growth_in_s,
-    depth,
-)
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTerms,
@@ -53,17 +44,17 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     common: ClassVar[bool] = False
     common_delay: ClassVar[bool] = False
 
-    gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[PositiveGrid, EXPRESSIONS] | None = optional(
+    gain: Annotated[fields.NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
+    time_constant: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = optional(
+    damping: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Damping ratio of a plant of second order."
     )
-    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS] | None = optional(
+    natural_frequency: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS] | None = optional(
+    dead_time: Annotated[fields.NonNegativeGrid, EXPRESSIONS] | None = optional(
         "Dead time, in time_unit; 0 where there is none."
     )
 
@@ -94,12 +85,12 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         return value if isinstance(value, tuple) else ((float(str(value)),),)
 
     @property
-    def numerator_matrix(self) -> PolynomialMatrix:
+    def numerator_matrix(self) -> fields.PolynomialMatrix:
         """The numerators as rows of columns, descending in s."""
         return self._numbers("numerator")
 
     @property
-    def denominator_matrix(self) -> PolynomialMatrix:
+    def denominator_matrix(self) -> fields.PolynomialMatrix:
         """The denominators in the same form."""
         return self._numbers("denominator")
 
@@ -110,7 +101,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
 
     def own_parameters(self) -> tuple[NamedParameter, ...]:
         """Return the quantities, entry by entry, without entries of gain zero and dead times of zero."""
-        single = depth(self.gain) == 0
+        single = fields.depth(self.gain) == 0
         found = []
         for name in self.stated(*QUANTITIES):
             for (i, j), value in np.ndenumerate(self.grid(name)):
@@ -153,7 +144,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         above, below, delays = (tuple(tuple(one[k] for one in row) for row in rows) for k in range(3))
         return CoefficientTerms(above, below, delays)
 
-    def _numbers(self, part: Literal["numerator", "denominator"]) -> PolynomialMatrix:
+    def _numbers(self, part: Literal["numerator", "denominator"]) -> fields.PolynomialMatrix:
         """The numerators or the denominators at the values of the quantities."""
         terms = self._composed(lambda name, i, j: Expression(repr(self.grid(name)[i][j])))
         rows = getattr(terms, part)
@@ -167,20 +158,20 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
 
     kind: ClassVar[Literal["rational"]] = "rational"
 
-    numerator: Annotated[GainMatrix, EXPRESSIONS] = Field(
+    numerator: Annotated[fields.GainMatrix, EXPRESSIONS] = Field(
         description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
     )
-    denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
+    denominator: Annotated[fields.ContinuousDenominator, EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS] | None = optional(
+    delay: Annotated[fields.NonNegativeGrid, EXPRESSIONS] | None = optional(
         "Dead time in time_unit: a number, common to all entries, or rows of columns.", examples=[25]
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
         yield from check_shapes(self.numerator, self.denominator)
-        yield from check_each(self.denominator, check_no_growth_in_s, "denominator")
+        yield from check_each(self.denominator, fields.check_no_growth_in_s, "denominator")
         sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
         if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
@@ -190,12 +181,14 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
         """Some coefficient of the numerators is present, and every entry is proper."""
         path = ("continuous", "numerator")
         yield from check_gain(terms.numerator, *path)
-        yield from check_each_proper(terms.numerator, self.denominator_matrix, depth(self.numerator), *path)
+        yield from check_each_proper(
+            terms.numerator, self.denominator_matrix, fields.depth(self.numerator), *path
+        )
 
     @property
     def common(self) -> bool:
         """Whether all entries share one denominator."""
-        return depth(self.denominator) != 3
+        return fields.depth(self.denominator) != 3
 
     @property
     def common_delay(self) -> bool:
@@ -216,10 +209,10 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
         )
         rows = matrix(above)
         denominators: TermMatrix
-        if depth(below) == 3:
+        if fields.depth(below) == 3:
             denominators = matrix(below)
         else:
-            common = product_of(below if depth(below) == 2 else [below])
+            common = product_of(below if fields.depth(below) == 2 else [below])
             denominators = tuple(tuple(common for _ in row) for row in rows)
         delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
         return CoefficientTerms(rows, denominators, delays)

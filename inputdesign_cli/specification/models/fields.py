@@ -77,18 +77,10 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
         where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
         place = f"radius {where} at {abs(float(np.angle(worst))):.4g} rad/sample"
         message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
-        hint = "check the signs, and that the coefficients ascend in q^-1 and begin with 1"
-        return PathDiagnostic("unstable-polynomial", message, hint + _decimal_comma(polynomial))
+        hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
+        return PathDiagnostic("unstable-polynomial", message, hint)
 
     return _check_roots(polynomial, np.abs, refuse)
-
-
-def _decimal_comma(polynomial: Polynomial) -> str:
-    """Return the hint on 0,7 in place of 0.7, for whole numbers with a zero before another."""
-    whole = all(float(c).is_integer() for c in polynomial)
-    if whole and 0.0 in polynomial[1:-1]:
-        return "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
-    return ""
 
 
 def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:

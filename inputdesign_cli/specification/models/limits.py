@@ -8,15 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import (
-    Band,
-    Cap,
-    Count,
-    FileName,
-    NonNegative,
-    PerChannel,
-    Positive,
-)
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -34,8 +26,10 @@ _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 class PowerLimit(Section, some_of=(("max", "min"),)):
     """Bounds on a power: of the sum over the channels, or with a list of each channel."""
 
-    max: PerChannel[Cap] | None = optional("Largest power; a number or one per channel.")
-    min: PerChannel[NonNegative] | None = optional("Smallest power; a number or one per channel.")
+    max: fields.PerChannel[fields.Cap] | None = optional("Largest power; a number or one per channel.")
+    min: fields.PerChannel[fields.NonNegative] | None = optional(
+        "Smallest power; a number or one per channel."
+    )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The lower bound is below the upper one."""
@@ -48,7 +42,7 @@ class TableFile(Section, family="curve", phrase="table"):
 
     kind: ClassVar[Literal["table"]] = "table"
 
-    table: FileName = Field(description="CSV file with frequency and value.")
+    table: fields.FileName = Field(description="CSV file with frequency and value.")
 
 
 def _kind(value: dict[str, Plain]) -> str:
@@ -57,10 +51,10 @@ def _kind(value: dict[str, Plain]) -> str:
 
 _PICK = pick(_kind, plain="number")
 Curve = Annotated[
-    Annotated[NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
+    Annotated[fields.NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
 ]
 UpperCurve = Annotated[
-    Annotated[Cap, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
+    Annotated[fields.Cap, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
 ]
 """A level, a tabulated curve, or |numerator/denominator|^2."""
 
@@ -83,8 +77,8 @@ Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 class AmplitudeLimit(Section, some_of=(("input", "output"),)):
     """Bounds on single samples, about the operating point and without noise."""
 
-    input: PerChannel[Cap] | None = optional("Largest |u|; a number or one per input.")
-    output: PerChannel[Cap] | None = optional(
+    input: fields.PerChannel[fields.Cap] | None = optional("Largest |u|; a number or one per input.")
+    output: fields.PerChannel[fields.Cap] | None = optional(
         "Largest |y| of the simulated output; a number or one per output."
     )
 
@@ -95,16 +89,16 @@ class Limits(Section):
     input_power: Power | None = optional("Power of u that r causes: number, list, {min, max}.")
     output_power: Power | None = optional("Power of y that r causes: number, list, {min, max}.")
     excitation_power: Power | None = optional("Power of r: number, list, {min, max}.")
-    samples: Count | None = optional("Largest number of samples.")
-    duration: Positive | None = optional("In place of samples: the longest experiment, in time_unit.")
+    samples: fields.Count | None = optional("Largest number of samples.")
+    duration: fields.Positive | None = optional("In place of samples: the longest experiment, in time_unit.")
     amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = optional(
         "Largest |u|: a number or one per input; or {input, output}."
     )
-    rate: PerChannel[Cap] | None = optional(
+    rate: fields.PerChannel[fields.Cap] | None = optional(
         "Largest change of u from one sample to the next; a number or one per input."
     )
-    energy: Cap | None = optional("Power summed over the samples (trace R).")
-    band: Band | None = optional("The excitation vanishes outside these frequencies.")
+    energy: fields.Cap | None = optional("Power summed over the samples (trace R).")
+    band: fields.Band | None = optional("The excitation vanishes outside these frequencies.")
     spectrum: Annotated[SpectrumLimit, Shorthand("max", {"type": "number", "exclusiveMinimum": 0})] | None = (
         optional("Bounds on the density at every frequency: a number, or {max, min}.")
     )

@@ -8,18 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import (
-    Band,
-    Count,
-    Fraction,
-    Index,
-    NonNegative,
-    Number,
-    PerChannel,
-    Positive,
-    Several,
-    depth,
-)
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import (
@@ -33,8 +22,8 @@ from inputdesign_cli.specification.models.transfer import (
 
 Rule = Literal["tustin", "backward", "zoh"]
 _RULE = "How s becomes q^-1: tustin (trapezoids), backward (backward differences) or zoh (a hold on y)."
-_Delay = Annotated[Index, SIZES["controller.delay"]]
-_Channel = Annotated[Count, SIZES["inputs or outputs"]]
+_Delay = Annotated[fields.Index, SIZES["controller.delay"]]
+_Channel = Annotated[fields.Count, SIZES["inputs or outputs"]]
 _DELAY = "Samples that computing takes: u(t) answers y(t - delay)."
 
 
@@ -43,10 +32,14 @@ class Pid(Section):
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {"Ki": "write Ti: Kp / Ki", "Kd": "write Td: Kd / Kp"}
 
-    Kp: Number = Field(description="Gain; negative where more input means less output.", examples=[2.0])
-    Ti: Positive | None = optional("Integral time; absent: no integral action.")
-    Td: NonNegative = Field(default=0.0, description="Derivative time (default 0).")
-    Tf: NonNegative | None = optional("Time constant of the filter of the derivative (default Td / 10).")
+    Kp: fields.Number = Field(
+        description="Gain; negative where more input means less output.", examples=[2.0]
+    )
+    Ti: fields.Positive | None = optional("Integral time; absent: no integral action.")
+    Td: fields.NonNegative = Field(default=0.0, description="Derivative time (default 0).")
+    Tf: fields.NonNegative | None = optional(
+        "Time constant of the filter of the derivative (default Td / 10)."
+    )
     sample: Rule = Field(default="tustin", description=_RULE)
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -114,7 +107,7 @@ class LoopsController(Section, family="controller", phrase="a list of single loo
 
     kind: ClassVar[Literal["loops"]] = "loops"
 
-    loops: Several[SingleLoop] = Field(description="One controller for each loop.")
+    loops: fields.Several[SingleLoop] = Field(description="One controller for each loop.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """No loop is listed twice."""
@@ -128,7 +121,7 @@ class LoopsController(Section, family="controller", phrase="a list of single loo
 def _kind(value: dict[str, object]) -> str:
     if "loops" in value:
         return LoopsController.phrase
-    return DiscreteMatrix.phrase if depth(value.get("numerator")) > 1 else _single(value)
+    return DiscreteMatrix.phrase if fields.depth(value.get("numerator")) > 1 else _single(value)
 
 
 Controller = Annotated[
@@ -162,7 +155,9 @@ class Control(Section):
 class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
-    variance: PerChannel[Positive] = Field(default=1.0, description="Variance; a number or one per output.")
+    variance: fields.PerChannel[fields.Positive] = Field(
+        default=1.0, description="Variance; a number or one per output."
+    )
     filter: Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -191,7 +186,7 @@ MOST_DECIBELS = 100.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: Positive | None = optional(
+    tau_c: fields.Positive | None = optional(
         "Time constant of the closed loop, in time_unit (default: the dead time)."
     )
 
@@ -211,13 +206,15 @@ class Tuning(Section, one_of=(("simc", "amigo"),)):
 
 
 _Peak = Annotated[
-    Positive, Field(le=MOST_DECIBELS), Wording("a number", "beyond it no margin is left; write 6, say")
+    fields.Positive, Field(le=MOST_DECIBELS), Wording("a number", "beyond it no margin is left; write 6, say")
 ]
 # A phase margin of 60 degrees takes a peak of |S| of one, and every peak is above.
 _Degrees = Annotated[
-    Positive, Field(lt=60.0), Wording("a number", "write degrees between 0 and 60: 45, for example")
+    fields.Positive, Field(lt=60.0), Wording("a number", "write degrees between 0 and 60: 45, for example")
 ]
-_Factor = Annotated[Positive, Field(gt=1.0), Wording("a number", "write a factor above 1: 2, for example")]
+_Factor = Annotated[
+    fields.Positive, Field(gt=1.0), Wording("a number", "write a factor above 1: 2, for example")
+]
 
 
 class LoopMargin(
@@ -236,8 +233,10 @@ class LoopMargin(
     gain_margin: _Factor | None = optional(
         "Least gain margin, a factor above 1, kept by the peak of |S| for it."
     )
-    confidence: Fraction | None = optional("Probability that fixes alpha by chi-squared (default 0.95).")
-    band: Band | None = optional("Frequencies [low, high] (default: all).")
+    confidence: fields.Fraction | None = optional(
+        "Probability that fixes alpha by chi-squared (default 0.95)."
+    )
+    band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
 
     @property
     def peak(self) -> float:
