@@ -78,17 +78,13 @@ def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spike
     Medians of the periods, and over them, so that neither a spike nor a level that drifts counts elsewhere.
 
     Args:
-        repeats: how many records of equal length with the same input follow each other.
+        repeats: see `Periods.parts`.
     """
-
-    def parts(signal: Array) -> NDArray[np.float64]:
-        return np.concatenate([periods.parts(one) for one in np.split(signal, repeats)], axis=1)
-
-    each = parts(y)
+    each = periods.parts(y, repeats)
     apart = each - np.median(each, axis=1, keepdims=True)
     levelled = each - np.median(apart, axis=2, keepdims=True)
     errors = levelled - np.median(levelled, axis=1, keepdims=True)
-    at = parts(np.arange(float(len(y)))[:, None]).ravel().astype(np.int64)
+    at = periods.parts(np.arange(float(len(y)))[:, None], repeats).ravel().astype(np.int64)
     found = spikes(errors.reshape(-1, y.shape[1]))
     return [replace(one, samples=tuple(sorted(at[list(one.samples)].tolist()))) for one in found]
 

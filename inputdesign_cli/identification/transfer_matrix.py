@@ -24,7 +24,7 @@ from inputdesign_cli.plant.model import DELAY
 
 # Of the starts made from the data, as many are followed to the end: the likeliest after so many steps, fewer
 # if ten of these gain less -2 log likelihood, that are not within so many squared standard deviations.
-_FOLLOWED, _QUICK, _IDLE, _APART = 3, 12, 0.1, 25.0
+_FOLLOWED, _QUICK, _IDLE, _APART = 4, 12, 0.1, 25.0
 # A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
@@ -124,8 +124,18 @@ class TransferKind(Kind):
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """The likeliest after a few steps from rest of those made from the parts, and the `given` one."""
         about = Records(self, tuple(parts))
-        made = [starting_points(self.model, self.between, self.held, u, y) for u, y in parts]
-        begun = np.concatenate(made)
+        above = np.array([parameter.letter == "b" for parameter in self.model.parameters])
+        made = []
+        for u, y in parts:
+            for theta in starting_points(self.model, self.between, self.held, u, y):
+                begun = self.stabilised(theta, len(y))
+                # The errors are linear in the numerators, which are zero so far.
+                errors, psi = self.errors_and_gradient(begun, u, y)
+                columns = psi[above].reshape(-1, y.size).T
+                scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+                begun[above] = np.linalg.lstsq(columns / scale, errors.ravel(), rcond=1e-10)[0] / scale
+                made.append(begun)
+        begun = np.array(made)
         tell(Counted("starting points tried", 0, len(begun)))
         found = minimise(RecordProblem((about,) * len(begun)), begun, most=_QUICK, idle=_IDLE)
         chosen: list[Array] = []
