@@ -10,7 +10,7 @@ from inputdesign_cli.outcome.shares import per_cent
 
 DESIGN_UNFINISHED = doubt(
     "design-unfinished",
-    "The time limit ended the design before its proof closed. The design meets all requirements. The gap "
+    "The design ended before its proof closed. It meets all requirements. The gap "
     "bounds how much better another design could be.",
     "Allow more time.",
 )
@@ -49,7 +49,7 @@ RAISED_PLANTS = doubt(
 def ended_early(status: str, objective: Objective) -> list[Finding]:
     """Return what the end of the time left open: the proof, or the bound over every spectrum."""
     if status == "gap_open":
-        fact = f"by {what_ended()}, {_how_far(objective)}"
+        fact = f"{what_ended()} ended the design, {_how_far(objective)}"
         remedy, gap = f"To close the gap, {more_time()}.", objective.relative_gap
         return [DESIGN_UNFINISHED.found(fact, where="solver", remedy=remedy, relative_gap=gap)]
     remedy = f"To have it, {more_time()}, or write solver.any_spectrum_tolerance: 0.01."

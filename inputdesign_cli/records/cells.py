@@ -238,15 +238,8 @@ def _of_dates(column: Column) -> bool:
     return column.dated and not column.of_day and bool(np.all(np.abs(days - np.round(days)) < 1e-6))
 
 
-def form_of_digits(x: Array) -> tuple[str, str]:
-    """Return form and kind of dates or times of day in digits, as 20240312 or 105959; else nothing."""
+def is_date_in_digits(x: Array) -> bool:
+    """Return whether most numbers (n,) are dates in digits, as 20240312 or 20240312105959."""
     near = x[(x >= 1.97e7) & (x < 2.1e16)]
     found = [_DIGITS.fullmatch(f"{value:.0f}") for value in np.floor(near)]
-    if sum(one is not None for one in found) > _MOSTLY * x.size:
-        return "%Y%m%d%H%M%S", "date"
-    low, mid, high, steps = x % 100, x // 100 % 100, x // 10_000, np.diff(x)
-    if x.size < 3 or x.min() < 0 or x.max() < 100 or np.any((low >= 60) | (mid >= 60) | (high >= 24)):
-        return "", ""
-    sixties = 3600 * high + 60 * mid + low  # of a clock steps are even only so
-    even = np.ptp(np.diff(sixties)) < 0.1 * abs(np.median(steps)) <= 0.1 * np.ptp(steps)
-    return ("%H%M%S", "time of day") if even else ("", "")
+    return sum(one is not None for one in found) > _MOSTLY * x.size

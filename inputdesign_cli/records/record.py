@@ -206,7 +206,7 @@ def _record(
     """The record in the signals of one file, whose references follow the inputs."""
     r = sum(role.startswith("u") for role in roles)
     segments, done = segments_of(signals, step, unit, preparation)
-    u, y, times = (np.concatenate(part) for part in zip(*((s.u, s.y, s.time) for s in segments), strict=True))
+    times, u, y = (np.concatenate(part) for part in zip(*segments, strict=True))
     lengths = tuple(len(part.y) for part in segments)
     # The signals of the file at the samples of the segments.
     stamped = np.flatnonzero(~np.isnan(signals.time))
@@ -233,7 +233,7 @@ def _record(
         findings=(*signals.findings, *done, *found),
         header=tuple(signals.sheet.header),
         means=np.nanmean(signals.u[:, :r], axis=0),
-        lined=any(part.lined for part in segments),
+        lined=any(one.where.startswith("y") and one.figures.get("line") for one in done),
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,6 @@ from inputdesign_cli.findings.prepared_records import (
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.records.preparation import Detrend, Preparation
 from inputdesign_cli.records.signals import SHORTEST, Signals
-from inputdesign_cli.records.text import BLANK, COMMENTED
 
 # Times may be off by this share of the sample time unsaid, and by the second with a finding.
 EVEN = 1e-3
@@ -30,18 +30,12 @@ MOST_JITTER = 0.25
 _GAP, _LONG_GAP = 1.5, 3.0
 
 
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p).
-
-    Attributes:
-        lined: whether a line was taken away from an output.
-    """
+class Segment(NamedTuple):
+    """A stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p)."""
 
     time: Array
     u: Array
     y: Array
-    lined: bool = False
 
 
 def segments_of(
@@ -88,11 +82,9 @@ def _cut(
     """The stretches between gaps, of ten samples or more if there are any, and where the record is cut."""
     lines, found = signals.sheet.lines, list[Finding]()
     apart = np.zeros(len(lines), dtype=bool)
-    for kind in () if signals.name else (BLANK, COMMENTED):
-        passed = [line for line, own in signals.sheet.passed if own == kind and lines[0] < line < lines[-1]]
-        apart[np.searchsorted(lines, passed)] = True
-        fact = f"{listed(passed, 'line')} {'is' if len(passed) == 1 else 'are'} {kind}"
-        found += LINES_PASSED_OVER.when(passed, fact, lines=len(passed))
+    passed = [line for line in signals.sheet.passed if lines[0] < line < lines[-1] and not signals.name]
+    apart[np.searchsorted(lines, passed)] = True
+    found += LINES_PASSED_OVER.when(passed, listed(passed, "line"), lines=len(passed))
     kept = np.flatnonzero(whole)
     cut = (np.diff(kept) > 1) | apart[kept[1:]]
     long = np.diff(time[kept]) > (_LONG_GAP if resample else _GAP) * step
@@ -143,19 +135,18 @@ def _detrended(
     part: Segment, names: tuple[str, ...], preparation: Preparation
 ) -> tuple[Segment, list[Finding]]:
     """A segment without its trends or its operating point, and what was taken away."""
-    found, lined, left = list[Finding](), False, []
+    found, left = list[Finding](), []
     for name, x in zip(names, (*part.u.T, *part.y.T), strict=True):
         if preparation.detrend == "none":
             left.append(x - preparation.operating_point.get(name if name[1:] else f"{name}1", 0.0))
             continue
         away, line = trend(x, preparation.detrend)
-        lined |= line and name.startswith("y")
         first, last = float(away[0]), float(away[-1])
         fact = f"a line from {first:.6g} to {last:.6g} of {name}" if line else f"{first:.6g} of {name}"
         found.append(TREND_REMOVED.found(fact, where=name, first=first, last=last, line=line))
         left.append(x - away)
     u, y = np.split(np.column_stack(left), [part.u.shape[1]], axis=1)
-    return Segment(part.time, u, y, lined), found
+    return Segment(part.time, u, y), found
 
 
 def trend(x: Array, kind: Detrend) -> tuple[Array, bool]:

@@ -71,7 +71,7 @@ class Sheet:
         lines: (n,) of the text file, or of rows counted from one.
         head: line and text of the header; `texts` what the rows say, for diagnostics.
         shown: whether messages may show what the file holds: most of it is numbers.
-        passed: blank lines and rows that are commented out, between rows of numbers, and which they are.
+        passed: blank lines and rows that are commented out, between rows of numbers.
         sample_time, time_unit: what the file itself states.
         others: sheets of the workbook that were not read, where none was named.
     """
@@ -83,7 +83,7 @@ class Sheet:
     head: tuple[int, str] = (1, "")
     texts: Sequence[str] = ()
     shown: bool = True
-    passed: tuple[tuple[int, str], ...] = ()
+    passed: tuple[int, ...] = ()
     sample_time: float | None = None
     time_unit: str | None = None
     others: tuple[str, ...] = ()

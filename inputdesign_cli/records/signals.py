@@ -14,7 +14,7 @@ from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.outlying_values import beyond_precision
 from inputdesign_cli.findings.prepared_records import COLUMNS_JOINED, SHEETS_UNREAD, TIMES_READ
-from inputdesign_cli.records.cells import SAY_TIME, form_of_digits
+from inputdesign_cli.records.cells import SAY_TIME, is_date_in_digits
 from inputdesign_cli.records.columns import TIME_UNITS, called, column_named, columns_of, rising, time_unit_in
 from inputdesign_cli.records.preparation import Preparation, Run
 from inputdesign_cli.records.sheet import Sheet
@@ -116,10 +116,11 @@ def _times(
     if column.dated or unit:
         return time, unit, column.dated, findings
     there = time[~np.isnan(time)]
-    form, what = form_of_digits(there)
-    if form:
-        message = f"{there[0]:.17g} in column {name} looks like a {what} in digits"
-        hint = f"{SAY_TIME}; here perhaps --time-format {form}; if it counts, say in what: --time-unit s"
+    if is_date_in_digits(there):
+        message = f"{there[0]:.17g} in column {name} looks like a date in digits"
+        hint = (
+            f"{SAY_TIME}; here perhaps --time-format %Y%m%d%H%M%S; if it counts, say in what: --time-unit s"
+        )
         raise sheet.error("data-not-a-number", message, hint, int(np.flatnonzero(~np.isnan(time))[0]))
     for what, a_second in _SINCE_1970.items():
         if a_second * _FIRST <= there.min() and there.max() <= a_second * _LAST:

@@ -25,7 +25,6 @@ from inputdesign_cli.records.columns import is_called_time, named_columns
 from inputdesign_cli.records.sheet import Sheet, Source
 
 Rows = list[tuple[int, list[str]]]
-BLANK, COMMENTED = "blank", "commented out"
 _COMMENTS = ("#", "%", "//")
 _MARKS = (
     *((codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16")),
@@ -96,10 +95,9 @@ def table_in(source: Source, text: str) -> Sheet:
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
     sheet = sheet_of(source, head, names, body, separator)
-    between = [(line, kind) for line, kind in passed if body[0][0] < line < body[-1][0]]
+    between = [line for line in passed if body[0][0] < line < body[-1][0]]
     # Blank lines between most rows mean nothing.
-    spaced = 2 * sum(kind == BLANK for _, kind in between) > len(body)
-    return replace(sheet, passed=tuple(one for one in between if one[1] != BLANK or not spaced))
+    return replace(sheet, passed=tuple(between) if 2 * len(between) <= len(body) else ())
 
 
 def sheet_of(
@@ -173,20 +171,20 @@ def _separator_of(text: str) -> str | None:
         return ","
 
 
-def _rows_of(source: Source, text: str, separator: str | None) -> tuple[Rows, list[tuple[int, str]], str]:
-    """Return line numbers and fields of the rows, blank and commented rows, and the last comment above."""
-    rows, passed, comment = Rows(), list[tuple[int, str]](), ""
+def _rows_of(source: Source, text: str, separator: str | None) -> tuple[Rows, list[int], str]:
+    """Return rows with their lines, lines that are blank or commented rows, and the last comment above."""
+    rows, passed, comment = Rows(), list[int](), ""
     for line, row in _split(source, text, separator):
         if len(row) > _MOST_FIELDS:
             what = f"has a line of {len(row)} fields (line {line}), and at most {_MOST_FIELDS} are taken"
             raise source.unreadable(what, "write one sample a line", line)
         if len(row) < 2 and not any(map(str.strip, row)):
-            passed.append((line, BLANK))
+            passed.append(line)
         elif row[0].lstrip().startswith(_COMMENTS) and not (len(row) > 1 and ERROR.fullmatch(row[0])):
             bare = (separator or " ").join(row).lstrip("#%/ \t")
             cells = re.split(r"[;,\t ]+", bare) if len(row) == 1 else bare.split(separator)
             if len(cells) > 1 and all(map(is_plain, filter(str.strip, cells))):
-                passed.append((line, COMMENTED))
+                passed.append(line)
             comment = comment if rows else bare
         else:
             rows.append((line, row))

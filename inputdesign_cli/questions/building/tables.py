@@ -47,8 +47,8 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
             `beyond-precision`.
     """
     sheet = read_sheet(path, key=key)
-    for line, kind in sheet.passed:
-        message = f"line {line} of {path.name} is {kind}: is a sample missing between the rows about it?"
+    for line in sheet.passed:
+        message = f"line {line} of {path.name} is blank or commented out: is a sample missing there?"
         row = int(np.searchsorted(sheet.lines, line)) - 1
         raise sheet.error("data-not-a-number", message, "take the line out of the file", row)
     found = read_columns(path, wanted, key=key)
