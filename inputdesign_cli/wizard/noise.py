@@ -13,18 +13,17 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
-from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.grammar import NUMBER, UNIT, Phrase, needed, seconds, short
-from inputdesign_cli.wizard.questions import AS_LOG, bad_answer, chosen, file_of
-from inputdesign_cli.wizard.stated_plants import PlantAnswer
+from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.plants import PlantAnswer
+from inputdesign_cli.wizard.questions import AS_LOG, bad_answer, chosen, file_of, in_their_words
 
 _DRIFTING = (1.0, -0.8)  # C of noise that drifts
 _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
 _STRONGEST = 0.98  # correlation from one sample to the next
+_STEADY = 1e-3  # D(1) below it is that of an integrator
 _LONG = 100_000  # samples after which no pole of a log remembers anything
-_DRIFTS = "  drift: true  # an integrator in the noise"
 
 
 @dataclass(frozen=True)
@@ -45,51 +44,50 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    moves = plant.explored is not None and bool(np.any(plant.explored.noise.drift))
+    explored = plant.explored
+    moves = explored is not None and _moves(explored.noise)
     drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moves})
-    if plant.explored is not None:
-        return _of_log(plant.explored, plant.source, text, folder, moves=moves, drifts=drifts)
-    level = _stated(text, folder, plant.sample_time)
-    lines = ["noise:", f"  variance: {short(level.variance)}  # {level.why}"]
-    if drifts:
-        return [*lines, _DRIFTS, f"  C: {list(_DRIFTING)}"]
-    return [*lines, f"  D: [1, {short(-level.pole)}]  # {level.why}"] if level.pole else lines
+    if explored is None:
+        level = _stated(text, folder, plant.sample_time)
+        shape = [*_drift(drifts), f"  C: {list(_DRIFTING)}"] if drifts else _pole(level, f"  # {level.why}")
+        return ["noise:", f"  variance: {short(level.variance)}  # {level.why}", *shape]
+    if text == AS_LOG and drifts == moves:
+        own = json.dumps(np.asarray(explored.noise.variance).tolist())
+        return [f"noise:  # as in {plant.source}", f"  variance: {own}", *_shape(explored.noise)]
+    level = None if text == AS_LOG else _stated(text, folder, explored.sample_time)
+    return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
 
 
-def _of_log(explored: Spec, source: str, text: str, folder: Path, *, moves: bool, drifts: bool) -> list[str]:
-    """Return the lines of `noise` beside a log, which moves or not, of noise that is said to drift or not.
+def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: bool, drifts: bool) -> list[str]:
+    """Return the lines of noise that is stated otherwise than the log has it.
 
     The size is the one that is stated; a resolution is the least that noise can be, and the log may show
-    more. Noise without drift is correlated as in the log, unless data at rest show its correlation.
+    more. The noise is correlated as in the log, unless data at rest show its correlation, or it drifts there
+    and not here.
     """
     noise, plant = explored.noise, explored.plant
     assert plant.kind != "regression"
-    own = json.dumps(np.asarray(noise.variance).tolist())
-    if text == AS_LOG and drifts == moves:
-        return [f"noise:  # as in {source}", f"  variance: {own}", *_shape(noise)]
-    powers = np.diag(noise.covariance(plant.outputs))
-    level = _Level(float(np.max(powers)), 0.0, "the variance in the log")
-    if text != AS_LOG:
-        level = _stated(text, folder, explored.sample_time)
     A = _per_output(plant.A if plant.kind == "polynomial" else (1.0,), plant.outputs)
-    steady = not (drifts or moves or level.at_rest)
-    gains = _gains(noise, A) if steady else np.ones(plant.outputs)
-    variance, why = short(level.variance), level.why
-    if level.rounded and np.max(powers * gains) > level.variance:
-        variance, why = own, f"of {source}: more than rounding leaves"
-    elif np.any(gains > 1.0):
-        sizes = float(variance) / gains
-        variance = short(sizes[0]) if sizes.size == 1 else json.dumps(np.diag(sizes).tolist())
-        why += f", correlated as in {source}"
-    listed = ", ".join(map(short, (powers * gains).tolist()))
-    has = f"the log has a variance of {listed}, {'and drift' if moves else 'and no drift'}"
-    lines = [f"noise:  # as you said; {has}", f"  variance: {variance}  # {why}"]
-    if steady or (drifts and moves):  # with the colour that was estimated along
+    powers, gains = np.diag(noise.covariance(len(A))), np.ones(len(A)) if moves else _gains(noise, A)
+    kept = drifts == moves and (drifts or level is None or not level.at_rest)
+    sizes, why = powers, f"of {source}"
+    if level is not None and not (level.rounded and np.any(powers * gains > level.variance)):
+        sizes, why = level.variance / (gains if kept else np.ones(len(A))), level.why
+    variance = short(sizes[0]) if len(A) == 1 else json.dumps(np.diag(sizes).tolist())
+    seen = f"{', '.join(map(short, powers * gains))}, {'and drift' if moves else 'and no drift'}"
+    lines = [f"noise:  # as you said; the log has a variance of {seen}", f"  variance: {variance}  # {why}"]
+    if kept:
         return [*lines, *_shape(noise)]
-    lines += [_DRIFTS] if drifts else [f"  D: [1, {short(-level.pole)}]"] if level.pole else []
+    lines += _drift(drifts) or ([] if level is None else _pole(level))
     # 1/A stands before C: with the factor A in C, the noise of y is that without A.
     C = [np.convolve(_DRIFTING if drifts else (1.0,), row).tolist() for row in A]
     return lines if [[1.0]] * len(C) == C else [*lines, f"  C: {json.dumps(C if len(C) > 1 else C[0])}"]
+
+
+def _moves(noise: Noise) -> bool:
+    """Return whether noise drifts, or remembers so long that it cannot be told from drift in a record."""
+    longest = min(abs(float(np.sum(row))) for row in _per_output(noise.D, 1))
+    return bool(np.any(noise.drift)) or longest < _STEADY
 
 
 def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
@@ -105,22 +103,22 @@ def _gains(noise: Noise, A: Sequence[Sequence[float]]) -> Array:
     return np.array([np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows])
 
 
+def _drift(drift: Any) -> list[str]:
+    return [f"  drift: {json.dumps(drift)}  # an integrator in the noise"] * bool(np.any(drift))
+
+
+def _pole(level: _Level, comment: str = "") -> list[str]:
+    return [f"  D: [1, {short(-level.pole)}]{comment}"] if level.pole else []
+
+
 def _shape(noise: Noise) -> list[str]:
     """Return the drift, where there is one, and C and D, where they are not 1."""
-    drift = f"  drift: {json.dumps(noise.drift)}  # an integrator in the noise"
     rows = (("C", noise.C), ("D", noise.D))
-    return [drift] * bool(np.any(noise.drift)) + [
-        f"  {name}: {json.dumps(found)}" for name, found in rows if found != (1.0,)
-    ]
+    return _drift(noise.drift) + [f"  {name}: {json.dumps(row)}" for name, row in rows if row != (1.0,)]
 
 
 def _stated(text: str, folder: Path, step: float) -> _Level:
-    """Return what an answer says; a step is the seconds between samples.
-
-    Raises:
-        SpecError: `bad-answer`.
-        DataError: a file cannot be used.
-    """
+    """Return what an answer says; a step is the seconds between samples."""
     word, _, name = text.partition(" ")
     if word.lower() == "rest":
         return _at_rest(folder / name.strip(), step)
@@ -180,13 +178,14 @@ def _at_rest(path: Path, step: float) -> _Level:
 
 
 def _seconds_apart(path: Path) -> float | None:
-    """Return the time between the rows of a file; None without a column of times."""
+    """Return the time between the rows of a file; None without a column of times that grow."""
     from inputdesign_cli.records import read_sheet
     from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
 
     sheet = read_sheet(path, key="noise")
-    for name in time_columns(sheet)[:1]:
-        unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
-        apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"])))
-        return seconds(f"{apart!r} {unit}", "noise") if apart > 0.0 else None
-    return None
+    name = next(iter(time_columns(sheet)), None)
+    if name is None:
+        return None
+    unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
+    apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"]))) * SCALES["time"][unit]
+    return apart if apart > 0.0 else None

@@ -9,7 +9,7 @@ from inputdesign_cli import parse_spec
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.noise import noise_lines
-from inputdesign_cli.wizard.stated_plants import PlantAnswer
+from inputdesign_cli.wizard.plants import PlantAnswer
 from tests.support.wishes import ENGINEER
 
 
@@ -48,7 +48,8 @@ def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
     draft.validate()
     spec = draft.spec()
     assert spec.sample_time == 5.0
-    assert spec.noise.drift
+    assert spec.noise.variance == pytest.approx(0.04)
+    assert np.sum(spec.noise.D) == pytest.approx(0.0, abs=1e-3)  # the drift
     plant = spec.plant.continuous
     assert plant.numerator == pytest.approx((2.0,), rel=0.05)
     assert plant.denominator == pytest.approx((180.0, 1.0), rel=0.05)
@@ -93,7 +94,8 @@ def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
 def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
     _log(tmp_path, 300, beside=4.0)
     wish = "prediction within 5 % up to 0.1"
-    draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
+    answers = {**ENGINEER, "plant": "log log.csv", "wish": wish, "loop": "PI Kp 0.5, Ti 180"}
+    draft = compose(answers, "x", tmp_path)
     draft.validate()
     assert any("residuals" in one for one in draft.notes)
     for one in draft.notes:
