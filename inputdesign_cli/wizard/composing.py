@@ -49,25 +49,16 @@ Solve = Callable[[Spec], Result]
 
 @dataclass(frozen=True)
 class Draft:
-    """A spec as facts for its template, and the files next to it.
+    """A spec as facts for its template, and the files next to it."""
 
-    Args:
-        facts: what the template knows by name.
-        spectrum: as in a spec; None if the accuracy has the lines.
-        said: the answers.
-        there: seconds that may be taken.
-        notes: what the user must know of the plant, a sentence each.
-        why: the comment on the spectrum.
-    """
-
-    facts: Mapping[str, object]
+    facts: Mapping[str, object]  # what the template knows by name
     files: Mapping[str, bytes]
-    spectrum: str | None
+    spectrum: str | None  # as in a spec; None if the accuracy has the lines
     folder: Path
-    said: Mapping[str, str]
-    there: float
-    notes: tuple[str, ...] = ()
-    why: str = "filtered noise"
+    said: Mapping[str, str]  # the answers
+    there: float  # seconds that may be taken
+    notes: tuple[str, ...] = ()  # what the user must know of the plant, a sentence each
+    why: str = "filtered noise"  # the comment on the spectrum
 
     @property
     def text(self) -> str:

@@ -33,7 +33,6 @@ class _Level:
     variance: float
     pole: float
     why: str
-    at_rest: bool = False
     rounded: bool = False  # it is the least that noise can be
 
 
@@ -47,41 +46,43 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
     explored = plant.explored
     moves = explored is not None and _moves(explored.noise)
     drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moves})
-    if explored is None:
-        level = _stated(text, folder, plant.sample_time)
-        shape = [*_drift(drifts), f"  C: {list(_DRIFTING)}"] if drifts else _pole(level, f"  # {level.why}")
-        return ["noise:", f"  variance: {short(level.variance)}  # {level.why}", *shape]
-    if text == AS_LOG and drifts == moves:
-        own = json.dumps(np.asarray(explored.noise.variance).tolist())
-        return [f"noise:  # as in {plant.source}", f"  variance: {own}", *_shape(explored.noise)]
-    level = None if text == AS_LOG else _stated(text, folder, explored.sample_time)
-    return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
+    level = None if text == AS_LOG and explored else _stated(text, folder, plant.sample_time)
+    if explored is not None:
+        return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
+    assert level is not None
+    lines = ["noise:", f"  variance: {short(level.variance)}  # {level.why}"]
+    if drifts:
+        return [*lines, *_drift(drifts), f"  C: {list(_DRIFTING)}"]
+    return [*lines, f"  D: [1, {short(-level.pole)}]  # {level.why}"] if level.pole else lines
 
 
 def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: bool, drifts: bool) -> list[str]:
-    """Return the lines of noise that is stated otherwise than the log has it.
+    """Return the lines of noise as a log has it, scaled to the size that is stated.
 
-    The size is the one that is stated; a resolution is the least that noise can be, and the log may show
-    more. The noise is correlated as in the log, unless data at rest show its correlation, or it drifts there
-    and not here.
+    A resolution is the least that noise can be, and the log may show more. Noise that drifts in the log and
+    is said not to is white; noise that is said to drift beyond the log gets an integrator.
     """
     noise, plant = explored.noise, explored.plant
     assert plant.kind != "regression"
     A = _per_output(plant.A if plant.kind == "polynomial" else (1.0,), plant.outputs)
-    powers, gains = np.diag(noise.covariance(len(A))), np.ones(len(A)) if moves else _gains(noise, A)
-    kept = drifts == moves and (drifts or level is None or not level.at_rest)
-    sizes, why = powers, f"of {source}"
-    if level is not None and not (level.rounded and np.any(powers * gains > level.variance)):
-        sizes, why = level.variance / (gains if kept else np.ones(len(A))), level.why
-    variance = short(sizes[0]) if len(A) == 1 else json.dumps(np.diag(sizes).tolist())
-    seen = f"{', '.join(map(short, powers * gains))}, {'and drift' if moves else 'and no drift'}"
-    lines = [f"noise:  # as you said; the log has a variance of {seen}", f"  variance: {variance}  # {why}"]
-    if kept:
-        return [*lines, *_shape(noise)]
-    lines += _drift(drifts) or ([] if level is None else _pole(level))
-    # 1/A stands before C: with the factor A in C, the noise of y is that without A.
-    C = [np.convolve(_DRIFTING if drifts else (1.0,), row).tolist() for row in A]
-    return lines if [[1.0]] * len(C) == C else [*lines, f"  C: {json.dumps(C if len(C) > 1 else C[0])}"]
+    variance = noise.covariance(len(A))
+    powers = np.diag(variance) * (1.0 if moves else _gains(noise, A))
+    if level is not None:
+        shares = level.variance / powers
+        scale = np.sqrt(np.maximum(shares, 1.0) if level.rounded else shares)
+        variance = variance * np.outer(scale, scale)
+    own = short(variance[0, 0]) if len(A) == 1 else json.dumps(variance.tolist())
+    why = f"as in {source}" if level is None else f"{level.why}; as in {source} otherwise"
+    seen = f"{', '.join(map(short, powers))}, {'and drift' if moves else 'and no drift'}"
+    lines = [f"noise:  # the log has a variance of {seen}", f"  variance: {own}  # {why}"]
+    if moves and not drifts:
+        return lines
+    C, D = _per_output(noise.C, len(A)), _per_output(noise.D, len(A))
+    drift, new = (True, _DRIFTING) if drifts and not moves else (noise.drift, (1.0,))
+    C = [np.convolve(row, new).tolist() for row in C]
+    named = [(name, rows) for name, rows in (("C", C), ("D", D)) if any(len(row) > 1 for row in rows)]
+    shape = [f"  {name}: {json.dumps(rows if len(rows) > 1 else rows[0])}" for name, rows in named]
+    return [*lines, *_drift(drift), *shape]
 
 
 def _moves(noise: Noise) -> bool:
@@ -105,16 +106,6 @@ def _gains(noise: Noise, A: Sequence[Sequence[float]]) -> Array:
 
 def _drift(drift: Any) -> list[str]:
     return [f"  drift: {json.dumps(drift)}  # an integrator in the noise"] * bool(np.any(drift))
-
-
-def _pole(level: _Level, comment: str = "") -> list[str]:
-    return [f"  D: [1, {short(-level.pole)}]{comment}"] if level.pole else []
-
-
-def _shape(noise: Noise) -> list[str]:
-    """Return the drift, where there is one, and C and D, where they are not 1."""
-    rows = (("C", noise.C), ("D", noise.D))
-    return _drift(noise.drift) + [f"  {name}: {json.dumps(row)}" for name, row in rows if row != (1.0,)]
 
 
 def _stated(text: str, folder: Path, step: float) -> _Level:
@@ -171,10 +162,10 @@ def _at_rest(path: Path, step: float) -> _Level:
     same = abs(apart - step) <= _SAME_STEP * step
     seen = f"of {path.name}: {y.size} samples" + ("" if same else f", {short(apart)} s apart")
     if abs(rho) <= _WHITE / np.sqrt(y.size):
-        return _Level(power, 0.0, f"{seen}, white as far as they show", at_rest=True)
+        return _Level(power, 0.0, f"{seen}, white as far as they show")
     pole = min(rho if same else max(rho, 0.0) ** (step / apart), _STRONGEST)
     why = f"{seen}, correlation {rho:.2g} from one to the next"
-    return _Level(power * (1.0 - pole**2), pole, why, at_rest=True)
+    return _Level(power * (1.0 - pole**2), pole, why)
 
 
 def _seconds_apart(path: Path) -> float | None:

@@ -37,39 +37,22 @@ _REJECTED = (
 
 @dataclass(frozen=True)
 class PlantAnswer:
-    """What is known of the plant.
+    """What is known of the plant."""
 
-    Args:
-        lines: of the spec, with comments.
-        slow: its slowest time constant, in seconds.
-        intervals: of the parameters whose errors are stated, by name.
-        values: of the parameters, by name.
-        controller: of its usual operation, as YAML.
-        files: to be written next to the spec, by name.
-        covariance: the name of the file with the covariance of the estimate.
-        sampling: seconds between samples, where they are known already.
-        why_sampling: the reason for these.
-        tunable: whether rules of tuning know it.
-        channels: the larger number of its inputs and outputs.
-        explored: the model of a log, which has its noise.
-        source: the name of the data file.
-        against: what the data say against the model, a sentence each.
-    """
-
-    lines: tuple[str, ...]
-    slow: float
-    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    controller: str | None = None
-    files: Mapping[str, bytes] = field(default_factory=dict)
-    covariance: str | None = None
-    sampling: float | None = None
-    why_sampling: str = "as the plant is sampled"
-    tunable: bool = False
-    channels: int = 1
-    explored: Spec | None = None
-    source: str = ""
-    against: tuple[str, ...] = ()
+    lines: tuple[str, ...]  # of the spec, with comments
+    slow: float  # its slowest time constant, in seconds
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of the parameters
+    values: Mapping[str, float] = field(default_factory=dict)  # of the parameters
+    controller: str | None = None  # of its usual operation, as YAML
+    files: Mapping[str, bytes] = field(default_factory=dict)  # to be written next to the spec, by name
+    covariance: str | None = None  # the name of the file with the covariance of the estimate
+    sampling: float | None = None  # seconds between samples, where they are known already
+    why_sampling: str = "as the plant is sampled"  # the reason for these
+    tunable: bool = False  # whether rules of tuning know it
+    channels: int = 1  # the larger number of its inputs and outputs
+    explored: Spec | None = None  # the model of a log, which has its noise
+    source: str = ""  # the name of the data file
+    against: tuple[str, ...] = ()  # what the data say against the model, a sentence each
 
     @property
     def sample_time(self) -> float:

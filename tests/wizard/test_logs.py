@@ -77,7 +77,8 @@ def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     draft = compose(answers, "x", tmp_path)
     draft.validate()
     noise = draft.spec().noise
-    assert (noise.variance, noise.drift) == (0.04, drifts)
+    assert noise.variance == pytest.approx(0.04, rel=1e-5)
+    assert noise.drift == drifts
     assert "the log has a variance of 0.08" in draft.text
 
 
@@ -134,12 +135,13 @@ def test_noise_of_two_outputs_is_that_of_each():
     assert told.noise.D == spec.noise.D
 
 
-def test_noise_is_that_of_the_output_also_where_the_log_has_it_behind_a_lag():
-    """Noise e C / A that is to drift is that of the output alone where C has A as a factor."""
+def test_noise_that_is_said_to_drift_drifts_beside_a_log_that_does_not():
+    """The variance is that of e over that of e / (1 - 0.7 q^-1)."""
     explored = parse_spec(
         "sample_time: 5\nplant: {A: [1, -0.7], B: [0, 1]}\nnoise: {variance: 1}\n", design=False
     )
     lines = of_log(explored, "standard deviation 0.2", "yes")
     told = parse_spec("\n".join(["plant: {A: [1, -0.7], B: [0, 1]}", *lines]), design=False).noise
     assert told.drift
-    np.testing.assert_allclose(np.polydiv(told.C, [1.0, -0.7])[1], 0.0, atol=1e-12)
+    assert told.C == (1.0, -0.8)
+    assert told.variance == pytest.approx(0.04 * (1 - 0.49), rel=1e-5)
