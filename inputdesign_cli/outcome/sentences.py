@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from inputdesign_cli.outcome.shares import per_cent
@@ -16,7 +18,13 @@ _ITEM = re.compile(r"^\s*- ", re.MULTILINE)
 _LOOSE = re.compile(r" ([,;)]|:(?!:)|\.(?!\.))")
 
 
-def sentences(package: str, file: str, part: str, facts: Mapping[str, object]) -> list[str]:
+def sentences(
+    package: str,
+    file: str,
+    part: str,
+    facts: Mapping[str, object],
+    filters: Mapping[str, Callable[..., str]] = MappingProxyType({}),
+) -> list[str]:
     """Return the items that a part of a template makes of facts.
 
     A part is a macro. Each of its items begins with `- ` on a line, and may go on over further lines.
@@ -26,9 +34,17 @@ def sentences(package: str, file: str, part: str, facts: Mapping[str, object]) -
         file: a template in that folder.
         part: the name of the macro.
         facts: what the template knows by name.
+        filters: how it writes some of them, besides the filters of all templates.
     """
-    made = _templates(package).get_template(file).make_module(dict(facts))
+    templates = _templates(package)
+    templates.filters |= filters
+    made = templates.get_template(file).make_module(dict(facts))
     return [_tidy(item) for item in _ITEM.split(str(vars(made)[part]()))[1:]]
+
+
+def filled(package: str, file: str, facts: Mapping[str, object]) -> str:
+    """Return the text of a template with its facts; package, file and facts as of `sentences`."""
+    return _templates(package).get_template(file).render(facts)
 
 
 def _tidy(text: str) -> str:
@@ -46,6 +62,7 @@ def _templates(package: str) -> Environment:
         "g": lambda value, digits=4: f"{value:.{digits}g}",
         "fixed": lambda value, digits=1: f"{value:.{digits}f}",
         "per_cent": per_cent,
+        "json": lambda value: json.dumps(value, ensure_ascii=False),
         "shown": shown,
         "precise": precise,
         "enumerated": enumerated,
