@@ -15,9 +15,9 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
-from inputdesign_cli.identification.noise_first import Whitening
+from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.stability import reflected
-from inputdesign_cli.identification.starts import noise_polynomials
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.plant.filtering import filtered
 
 _WIDE, _ROUNDS, _POLISH, _BESIDE = 3, 8, 3, 5
