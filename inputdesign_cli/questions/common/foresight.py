@@ -43,13 +43,10 @@ class Foreseen:
 
 @dataclass(frozen=True)
 class Foresight:
-    """How the data of an experiment are foreseen.
+    """How the data of an experiment are foreseen, by the nominal one in raw parameters, its prior included.
 
-    Attributes:
-        nominal: the experiment in raw parameters, prior information included.
-        entries: errors that have r_u where no requirement bounds one.
-        earlier: what counts along where the data are assessed.
-        knowledge: what the spec says of the parameters, which rules rivals out.
+    `entries` are errors that have r_u where none is bounded, and `earlier` counts along where data are
+    assessed. `knowledge` of the parameters rules rivals out.
     """
 
     units: Units

@@ -54,10 +54,9 @@ class Reach:
 
 @dataclass(frozen=True)
 class StatedBound:
-    """A number of the spec that bounds an error, so that what is bought can be said in its words.
+    """A number of the spec that bounds an error: `factor` times the error is `value` times factor ** `power`.
 
-    An error `factor` times as large as asked stands for `value` times factor ** `power`. A `fraction` is
-    shown in per cent.
+    A `fraction` is shown in per cent.
     """
 
     key: str
@@ -80,11 +79,9 @@ class StatedBound:
 
 @dataclass(frozen=True)
 class Bought:
-    """The best accuracy within limits: `nearest` solves `problem` (goal "factor"), which was asked.
+    """The best accuracy within limits of the spec: `nearest` solves the `problem`, of the goal "factor".
 
-    Args:
-        stated: the numbers of the spec that are loosened alike; none if that has no words.
-        limits: of the spec; others of the problem are implied by them.
+    The numbers `stated` in the spec are loosened alike; there are none if that has no words.
     """
 
     units: Units

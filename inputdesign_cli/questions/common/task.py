@@ -39,9 +39,7 @@ _FADED = float(np.log(100.0))
 class SpectrumTask(ABC):
     """A question about the spectrum of an experiment, with its record and its trial.
 
-    Attributes:
-        unstated: errors of the entries of G that have r_u if no requirement bounds it.
-        ellipses: pairs of parameters; None for a choice of them.
+    Without a requirement on them `unstated` are the errors that have r_u; `ellipses` are None for a choice.
     """
 
     header: Header
@@ -121,11 +119,7 @@ def growth_by_start(
 ) -> float:
     """Return how many times as large errors are if the start of a record (n, r) and its levels are unknown.
 
-    Infinite if one has no bound. What samples after the start has faded show, about their means, decides
-    where it is enough.
-
-    Args:
-        step: time between samples in the unit of the experiment's frequencies.
+    What samples after the start has faded show, about their means, decides where it is enough.
     """
     plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
     try:

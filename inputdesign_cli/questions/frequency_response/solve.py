@@ -30,8 +30,7 @@ from inputdesign_cli.questions.common.infeasible import contradictory, named, no
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.simulation import Simulation
 from inputdesign_cli.questions.frequency_response import outcome
-from inputdesign_cli.questions.frequency_response.audit import audit_response
-from inputdesign_cli.questions.frequency_response.terms import KEY, Planned, ResponseTerms
+from inputdesign_cli.questions.frequency_response.outcome import KEY, Planned, ResponseTerms, audit_response
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.signal.kind import Draft
 from inputdesign_cli.signal.limits import Bounds, limited_responses

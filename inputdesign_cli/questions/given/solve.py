@@ -47,11 +47,10 @@ _TABLE_SHARE, _TABLE_ERROR = 0.5, 1e-4
 
 @dataclass(frozen=True)
 class GivenExcitation:
-    """What it is called, its powers by kind and channel, and the information matrix that it gives.
+    """An excitation by kind, its powers by channel, and M (k, k) in the coordinates of an experiment.
 
-    `information` maps an experiment to M (k, k) in its coordinates. A recorded signal has `samples` (n, r),
-    the others a `basis` and the coefficients `x` on it; `sinusoids` are the frequencies (L,) and amplitudes
-    (L, r) of a multisine, in phase over the channels.
+    A recorded signal has `samples` (n, r), the others a `basis` with coefficients `x`. Sinusoids `in_phase`
+    over several inputs have power matrices of rank one, in every period.
     """
 
     kind: str
@@ -59,8 +58,14 @@ class GivenExcitation:
     information: Callable[[Experiment], Array]
     basis: TabulatedSpectrum | LinesBasis | None = None
     x: Array | None = None
-    sinusoids: tuple[Array, Array] | None = None
+    in_phase: InPhase | None = None
     samples: Array | None = None
+
+    def drawn(self, step: float) -> DesignedSpectrum:
+        """Return the spectrum for samples that are a step apart."""
+        assert self.basis is not None
+        assert self.x is not None
+        return DesignedSpectrum.of(self.basis, self.x, inputs=len(self.power["excitation"]), step=step)
 
     @property
     def scale(self) -> float:
@@ -75,7 +80,7 @@ class GivenExcitation:
         x: Array,
         experiment: Experiment,
         *,
-        sinusoids: tuple[Array, Array] | None = None,
+        in_phase: InPhase | None = None,
     ) -> GivenExcitation:
         """An excitation that is known by its spectrum."""
 
@@ -91,7 +96,7 @@ class GivenExcitation:
             for of in POWER_KINDS
         }
         information = partial(spectral_information, basis, x)
-        return cls(kind, found, information, basis, x, sinusoids)
+        return cls(kind, found, information, basis, x, in_phase)
 
     def described(self, units: Units) -> Spectrum:
         """Return what the outcome says of it."""
@@ -115,14 +120,10 @@ class GivenExcitation:
 
 @dataclass(frozen=True)
 class GivenAsked:
-    """What is looked at of a given excitation.
+    """What is looked at of a given excitation: requirements are checked, a criterion is computed.
 
-    Attributes:
-        requirements: are checked, not met.
-        criterion: its value is computed, not bounded.
-        alpha: of r_u; `calibration` and `simulator` size it anew, see `Confidence`.
-        limits: that the excitation is compared with.
-        plants: others that the true one might be.
+    `calibration` and `simulator` size `alpha` anew, see `Confidence`; `plants` are others than the nominal
+    one.
     """
 
     requirements: Sequence[RequirementFactory]
@@ -243,10 +244,7 @@ class GivenTask(SpectrumTask):
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[float, float]:
-        """Return how far the largest ratio is above one, and how far off it may be by the rows of a table.
-
-        The second is 0 if it does not decide.
-        """
+        """Return how far the largest ratio is above one, and its error by a table if that decides."""
 
         def largest(M: Array) -> float:
             return max((worst(r.violations(M)).ratio for r in requirements), default=0.0)
@@ -263,11 +261,10 @@ class GivenTask(SpectrumTask):
         excitation, request = self.excitation, self.record
         if excitation.samples is not None:
             return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
-        samples = request.length(experiment.samples)
-        if self._in_phase is None or not request.feasible(experiment.samples, least_period(1)):
-            return given_record(request, experiment, self._spectrum, ratio)
-        rng = np.random.default_rng(request.settings.seed)
-        record = self._in_phase.draw(1, samples, rng)[0]
+        if excitation.in_phase is None or not request.feasible(experiment.samples, least_period(1)):
+            return given_record(request, experiment, excitation.drawn(request.step), ratio)
+        samples, rng = request.length(experiment.samples), np.random.default_rng(request.settings.seed)
+        record = excitation.in_phase.draw(1, samples, rng)[0]
         plant = FiniteRecord(experiment, samples, request.step)
         return Record(record, "multisine", ratio_at(plant, ratio, record))
 
@@ -283,26 +280,12 @@ class GivenTask(SpectrumTask):
 
     def _renewed(self, samples: int) -> Excitation | None:
         """What realises the spectrum anew; None for a record that was given."""
-        basis, x, request = self.excitation.basis, self.excitation.x, self.record
-        if basis is None or x is None:
+        excitation, request = self.excitation, self.record
+        if excitation.basis is None or excitation.x is None:
             return None
-        generator = SignalGenerator(self._spectrum, request.settings, samples, request.band)
-        return self._in_phase or Redrawn("design", generator, basis, x)
-
-    @property
-    def _in_phase(self) -> InPhase | None:
-        """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
-        basis, x, sinusoids = self.excitation.basis, self.excitation.x, self.excitation.sinusoids
-        if sinusoids is None or x is None or not isinstance(basis, LinesBasis) or self.experiment.inputs == 1:
-            return None
-        return InPhase("design", sinusoids[0] * self.record.step, sinusoids[1], basis, x)
-
-    @property
-    def _spectrum(self) -> DesignedSpectrum:
-        basis, x = self.excitation.basis, self.excitation.x
-        assert basis is not None
-        assert x is not None
-        return DesignedSpectrum.of(basis, x, inputs=self.experiment.inputs, step=self.record.step)
+        spectrum = excitation.drawn(request.step)
+        generator = SignalGenerator(spectrum, request.settings, samples, request.band)
+        return excitation.in_phase or Redrawn("design", generator, excitation.basis, excitation.x)
 
 
 def _check_excites(experiment: Experiment, information: Array) -> None:

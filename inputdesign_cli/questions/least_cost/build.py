@@ -165,11 +165,7 @@ def _check_interpolated(spec: Spec) -> None:
 
 
 def _grid_method(spec: Spec) -> GridMethod | None:
-    """The papers' own program is for one requirement, a bound on the model error to first order.
-
-    Raises:
-        SpecError: `not-supported` for any other question.
-    """
+    """Return the papers' own program; raise `not-supported` unless model_error alone is asked."""
     if spec.solver.method != "lmi":
         return None
     error, stated = spec.accuracy.error, spec.limits

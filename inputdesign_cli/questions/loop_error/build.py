@@ -22,23 +22,20 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries
 from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
+from inputdesign_cli.questions.building import system
 from inputdesign_cli.questions.building.demand import check_effects, check_model, check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
 from inputdesign_cli.questions.building.signal_settings import build_bounds
-from inputdesign_cli.questions.building.system import (
-    bare_experiment,
-    build_cost,
-    build_model,
-    held_plant,
-    per_output,
-    polynomial_model,
-    state_space_model,
-)
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
-from inputdesign_cli.questions.loop_error.outcome import LoopErrorTerms
-from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorSignalSettings, LoopErrorTask, LossTrial
+from inputdesign_cli.questions.loop_error.solve import (
+    KEY,
+    LoopErrorSignalSettings,
+    LoopErrorTask,
+    LoopErrorTerms,
+    LossTrial,
+)
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
@@ -52,13 +49,11 @@ _INTEGRATES = 1e-7
 
 
 def estimated_model(spec: Spec) -> Model | None:
-    """Return the model in the estimated parameters; None if they are all coefficients of a plant in q^-1.
+    """Return the model in the estimated parameters, or raise `SpecError` (`nothing-to-estimate`).
 
-    Raises:
-        SpecError: `nothing-to-estimate` where the plant is known; see `build_model`, `check_model` and
-            `check_effects`.
+    None if they are all coefficients of a plant in q^-1.
     """
-    model = build_model(spec)
+    model = system.build_model(spec)
     check_model(spec, model)
     if not np.any(model.in_plant):
         raise spec.complain(
@@ -67,7 +62,7 @@ def estimated_model(spec: Spec) -> Model | None:
             hint="take those out of known that the experiment is to find",
             key="plant.known",
         )
-    check_effects(spec, bare_experiment(spec, model))
+    check_effects(spec, system.bare_experiment(spec, model))
     match spec.plant:
         case PolynomialPlant(parameters=None, known=None) if not spec.noise.known:
             return None
@@ -75,11 +70,7 @@ def estimated_model(spec: Spec) -> Model | None:
 
 
 def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
-    """Return the matrix of polynomials of `plant` or of the true system `simulation.plant`.
-
-    Raises:
-        SpecError: `not-supported`; `inaccurate-conversion` of states.
-    """
+    """Return the polynomials of `plant` or of the true system, or raise `SpecError` (`not-supported`)."""
     if noise.variance is None:
         raise bad_spec(
             "not-supported",
@@ -87,7 +78,7 @@ def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, k
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
-    drifting = [d for d in per_output(noise.D) if np.any(np.abs(roots_in_z(d)) > 1.0 - _INTEGRATES)]
+    drifting = [d for d in system.per_output(noise.D) if np.any(np.abs(roots_in_z(d)) > 1.0 - _INTEGRATES)]
     if any(noise.drifts) or drifting:
         raise bad_spec(
             "not-supported",
@@ -97,11 +88,11 @@ def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, k
             key="noise.D" if drifting else "noise.drift",
         )
     if plant.kind == "continuous" and plant.sampled:
-        plant = held_plant(plant, spec.sample_time)
+        plant = system.held_plant(plant, spec.sample_time)
     if plant.kind == "state_space":
         channels = _of_states(spec, plant, noise, key)
     elif plant.kind == "polynomial":
-        channels = polynomial_model(plant, noise, noise.covariance(plant.outputs))
+        channels = system.polynomial_model(plant, noise, noise.covariance(plant.outputs))
     else:
         raise bad_spec(
             "not-supported",
@@ -126,8 +117,8 @@ def _of_states(
     spec: Spec, plant: StateSpacePlant, noise: Noise | SimulationNoise, key: str
 ) -> PolynomialModel:
     """Return a model with G entry by entry, and H by the gain K or by C and D."""
-    model = state_space_model(spec, plant, noise.covariance(plant.outputs))
-    C, D = per_output(noise.C), per_output(noise.D)
+    model = system.state_space_model(spec, plant, noise.covariance(plant.outputs))
+    C, D = system.per_output(noise.C), system.per_output(noise.D)
     step = model.sample_time or 0.0
     # Whole samples of the dead time need no states.
     late = model.matrices._replace(delay=model.matrices.delay - model.lag * step)
@@ -165,13 +156,7 @@ class AddedLaw(Protocol):
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
-    """Build the task, and refuse what cannot be designed.
-
-    Faults of the simulation alone are reported by `simulate`.
-
-    Raises:
-        SpecError: what this version does not design, and the diagnostics of `ControlLaw.check`.
-    """
+    """Return the task and refuse what cannot be designed; `simulate` reports faults of its section alone."""
     error = spec.accuracy.closed_loop_error
     assert error is not None
     _check_supported(spec)
@@ -181,11 +166,19 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     law.check(plant, key=f"{KEY}.control.{name}")
     coloured = error.reference.filter
     lo, hi = spec.clip_band(spec.limits.band)
+    stated = sorted(build_power_limits(spec), key=lambda one: one.kind == "output")
     problem = LoopErrorProblem(
         plant=plant,
         estimated=estimated_model(spec),
         law=law,
-        limits=_limits(spec),
+        limits=tuple(
+            PowerLimit(
+                "input" if one.kind == "excitation" else one.kind,  # in open loop they are the same
+                one.bound,
+                one.channel or 0 if one.implied else one.channel,
+            )
+            for one in (*stated, *implied_limits(spec))
+        ),
         reference_variance=np.asarray(error.reference.variance) * np.ones(plant.outputs),
         reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
@@ -197,7 +190,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         covariance=error.covariance,
         samples=spec.experiment.samples,
         tolerance=spec.solver.tolerance,
-        cost=build_cost(spec),
+        cost=system.build_cost(spec),
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
     return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, error, problem))
@@ -232,19 +225,6 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tu
 def _transfer(spec: Spec, transfer: Transfer) -> Rational:
     """Return a transfer function of the spec, sampled by a zero-order hold if it is given in s."""
     return rational(transfer) if transfer.kind == "discrete" else held(transfer, spec.sample_time)
-
-
-def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
-    """Return the limits on powers; in open loop the excitation is the input."""
-    stated = sorted(build_power_limits(spec), key=lambda one: one.kind == "output")
-    return tuple(
-        PowerLimit(
-            "input" if one.kind == "excitation" else one.kind,
-            one.bound,
-            one.channel or 0 if one.implied else one.channel,
-        )
-        for one in (*stated, *implied_limits(spec))
-    )
 
 
 def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalSettings:

@@ -13,8 +13,13 @@ from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
-from inputdesign_cli.questions.regression.outcome import RegressionTerms
-from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, RegressorSettings
+from inputdesign_cli.questions.regression.solve import (
+    KEY,
+    RegressionTask,
+    RegressionTerms,
+    RegressionTrial,
+    RegressorSettings,
+)
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
@@ -31,11 +36,7 @@ _refuse = partial(refuse, who="a regression design")
 
 
 def build_regression_task(spec: Spec) -> RegressionTask:
-    """Return the task; everything that can be wrong with its spec is reported here.
-
-    Raises:
-        SpecError: the spec asks for what a regression design does not do.
-    """
+    """Return the task; everything that can be wrong with its spec is reported here."""
     error, plant = spec.accuracy.mean_squared_error, spec.plant
     assert plant.kind == "regression"
     if error is None:

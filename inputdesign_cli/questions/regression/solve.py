@@ -3,32 +3,178 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli import outcome as out
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz
+from inputdesign_cli.design import regression as theory
+from inputdesign_cli.design.regression import ErrorSplit, OutOfReachError, Regression, design_toeplitz
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.design.regression.periodic import design_periodic
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
-from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
-from inputdesign_cli.outcome import Signal, Simulation, Solver
-from inputdesign_cli.outcome.curves import Curves, MomentsCurves
-from inputdesign_cli.outcome.results import Results, Table
-from inputdesign_cli.outcome.simulation import TriedInput
-from inputdesign_cli.questions.common.delivery import results_of, timing, with_study
-from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
-from inputdesign_cli.questions.regression.outcome import (
-    MomentsDesign,
-    RegressionTerms,
-    error_curves,
-    moments_outcome,
-    tried_regressors,
+from inputdesign_cli.monte_carlo.regression import (
+    Contender,
+    Estimates,
+    contending_regressors,
+    run_experiments,
 )
+from inputdesign_cli.outcome import Signal, Simulation, Solver
+from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
+from inputdesign_cli.outcome.results import Results, Table
+from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.questions.common.delivery import (
+    check_claims,
+    of_bounds,
+    proof_status,
+    results_of,
+    timing,
+    with_study,
+)
+from inputdesign_cli.questions.common.signal_outcome import plain_signal, signal_results
 from inputdesign_cli.signal.moments import Start, delayed_regressors, free_regressors, periodic_input, rank
+
+_POINTS = 400
+
+
+@dataclass(frozen=True)
+class RegressionTerms:
+    """The question: the least energy for a `target` error, or the least error for an `energy`, trace R.
+
+    With `toeplitz` the regressors are delayed copies of one input.
+    """
+
+    header: Header
+    regression: Regression
+    toeplitz: bool
+    samples: int
+    target: float | None
+    energy: float | None
+
+    def free(self) -> tuple[Array, float]:
+        """Return the best moments R (n, n) of any structure, and the bound that proves them."""
+        if self.target is not None:
+            R = theory.least_energy(self.regression, self.target)
+            return R, theory.energy_bound(self.regression, self.target, R)
+        assert self.energy is not None
+        R = theory.least_error(self.regression, self.energy)
+        return R, theory.error_bound(self.regression, self.energy)
+
+
+@dataclass(frozen=True)
+class MomentsDesign:
+    """R with its proof: no R of the structure goes beyond the `bound`, within `tolerance` it is optimal.
+
+    Of one input `rho` are the autocorrelations (n,).
+    """
+
+    R: Array
+    rho: Array | None
+    split: ErrorSplit
+    bound: float
+    tolerance: float
+    how: out.Solver
+
+    @property
+    def energy(self) -> float:
+        """trace R."""
+        return float(np.trace(self.R))
+
+
+def moments_outcome(
+    terms: RegressionTerms, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
+) -> out.Outcome:
+    """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
+    regression, split, target, n = terms.regression, design.split, terms.target, terms.regression.n
+    unit, white = regression.error(np.eye(n)), None
+    if target is not None:
+        kind, value, of = "least_cost", design.energy, "energy"
+        changes = theory.energy_sensitivity(regression, design.energy, target, split)
+        slack = target - unit.bias_squared
+        if slack > 0.0:  # white regressors can meet the target
+            energy = n * unit.variance / slack
+            white = out.White(cost=energy, ratio=energy / value)
+    else:
+        assert terms.energy is not None
+        kind, value, of = "mean_squared_error", split.total, "mean_squared_error"
+        changes = theory.error_sensitivity(regression, design.energy, split)
+        error = regression.error(np.eye(n) * (terms.energy / n)).total
+        white = out.White(mean_squared_error=error, ratio=error / value)
+    gap = abs(value - design.bound) / value
+    any_bound = terms.free()[1] if terms.toeplitz else design.bound
+    objective = out.Objective(
+        kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
+    )
+    check_claims(of_bounds(objective, design.tolerance), "rescale the regressors, or state the weights anew")
+    return out.Outcome(
+        title=terms.header.title,
+        status=proof_status(gap, design.tolerance),
+        objective=objective,
+        cost=design.energy,
+        samples=terms.samples,
+        mean_squared_error=out.MeanSquaredError(
+            split.total, split.bias_squared, split.variance, target, others=asdict(split)
+        ),
+        moments=out.Moments(
+            structure="toeplitz" if terms.toeplitz else "free",
+            estimated=regression.m,
+            trace=design.energy,
+            R=design.R,
+            entries={f"R_{i + 1}_{j + 1}": float(design.R[i, j]) for i in range(n) for j in range(i, n)},
+            autocorrelations=design.rho,
+        ),
+        sensitivity=out.Sensitivity(
+            of,
+            changes.neglected_norm,
+            changes.noise_deviation,
+            target=None if target is None else changes.goal,
+            energy=changes.goal if target is None else None,
+        ),
+        baseline=out.Baseline(white),
+        signal=signal,
+        solver=design.how,
+        timing_s=timing,
+    )
+
+
+def error_curves(terms: RegressionTerms, design: MomentsDesign) -> ErrorCurves:
+    """Return squared bias and variance over the energy, beside the error of white regressors."""
+    regression = terms.regression
+    energy = design.energy * np.geomspace(0.1, 10.0, _POINTS)
+    white = regression.error(np.eye(regression.n) / regression.n)
+    return ErrorCurves(
+        energy=energy,
+        bias_squared=np.full(_POINTS, design.split.bias_squared),
+        variance=design.split.variance * design.energy / energy,
+        white=white.bias_squared + white.variance / energy,
+        design=(design.energy, design.split.total),
+        target=terms.target,
+    )
+
+
+def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Estimates) -> TriedInput:
+    """Return means with their standard errors, and the theory of these samples."""
+    squared = found.error**2
+    runs = squared.size
+    G, m = Phi.T @ Phi, regression.m
+    inverse = np.linalg.pinv(G[:m, :m], rcond=1e-12, hermitian=True)
+    mean = inverse @ G[:m] @ theta
+    bias = regression.estimated @ mean - regression.estimated @ theta[:m] - regression.neglected @ theta[m:]
+    variance = regression.variance * (regression.estimated @ inverse @ regression.estimated)
+    root, several = np.sqrt(runs), runs > 1
+    return TriedInput(
+        mse=float(squared.mean()),
+        mean_estimate=found.theta.mean(axis=0),
+        theory=TheoryOfError(float(bias**2 + variance), tuple(mean.tolist())),
+        energy=float(np.trace(G)),
+        mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
+        mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
+    )
+
 
 KEY = "accuracy.mean_squared_error"
 
@@ -41,24 +187,6 @@ class RegressorSettings:
     periods: int | None
     start: Start
     seed: int
-
-    def period(self, least: int) -> int | None:
-        """Return the samples of a period, `least` or more; None if no periods are asked for.
-
-        Raises:
-            SpecError: `bad-period`.
-        """
-        samples, periods = self.samples, self.periods
-        if periods is None:
-            return None
-        if samples % periods or samples // periods < least:
-            raise bad_spec(
-                "bad-period",
-                f"{samples} samples do not make {periods} equal periods of at least {least} samples",
-                hint=f"choose a divisor of {samples} up to {samples // least}, or change signal.samples",
-                key="signal.periods",
-            )
-        return samples // periods
 
 
 @dataclass(frozen=True)
@@ -77,20 +205,22 @@ class RegressorRecord:
 def realise_regressors(
     settings: RegressorSettings, regression: Regression, R: Array, rho: Array | None, target: float | None
 ) -> RegressorRecord | None:
-    """Return the record that is asked for; None when it is too short for any.
+    """Return the record with moments R (n, n) summed over the samples; None when it is too short.
 
-    Args:
-        R: (n, n) moments summed over the samples.
-        rho: (n,) autocorrelations of one input, of which the regressors are delayed copies; None: free ones.
-        target: the error that is allowed, if the energy is what counts.
-
-    Raises:
-        SpecError: `bad-period` when signal.periods does not fit.
+    `rho` (n,) are autocorrelations of one input, of which the regressors are delayed copies; None: free ones.
+    The `target` is the error that is allowed, if any. It raises `SpecError` (`bad-period`).
     """
-    samples, least = settings.samples, rank(R) if rho is None else regression.n
+    samples, least, periods = settings.samples, rank(R) if rho is None else regression.n, settings.periods
     if samples < least:
         return None
-    period, details, lines = settings.period(least), dict[str, object](), None
+    if periods is not None and (samples % periods or samples // periods < least):
+        raise bad_spec(
+            "bad-period",
+            f"{samples} samples do not make {periods} equal periods of at least {least} samples",
+            hint=f"choose a divisor of {samples} up to {samples // least}, or change signal.samples",
+            key="signal.periods",
+        )
+    period, details, lines = samples // periods if periods else None, dict[str, object](), None
     if rho is None:
         period = period or (least if samples % least == 0 else samples)
         Phi = channels = free_regressors(R, samples, period)
@@ -121,11 +251,7 @@ def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class RegressionTrial:
-    """The Monte Carlo study: the true parameters and the other inputs to try.
-
-    `variance` of the true noise, or its deviation relative to the output without noise, are None if they are
-    nominal.
-    """
+    """The study: the true parameters, inputs to compare, and the noise, None where it is nominal."""
 
     theta: Array
     runs: int
@@ -133,13 +259,6 @@ class RegressionTrial:
     compare: tuple[Contender, ...]
     variance: float | None
     relative_std: float | None
-
-    def of(self, nominal: Regression, Phi: Array) -> Regression:
-        """Return the regression with the true variance of the noise, for regressors Phi (N, n)."""
-        variance = nominal.variance if self.variance is None else self.variance
-        if self.relative_std is not None:
-            variance = float(self.relative_std**2 * np.mean((Phi @ self.theta) ** 2))
-        return replace(nominal, variance=variance)
 
 
 @dataclass(frozen=True)
@@ -177,7 +296,10 @@ class RegressionTask:
                 hint="set experiment.samples",
                 key="experiment.samples",
             )
-        begun, regression = time.perf_counter(), trial.of(self.terms.regression, record.Phi)
+        begun, regression, variance = time.perf_counter(), self.terms.regression, trial.variance
+        if trial.relative_std is not None:
+            variance = float(trial.relative_std**2 * np.mean((record.Phi @ trial.theta) ** 2))
+        regression = replace(regression, variance=regression.variance if variance is None else variance)
         seeds = np.random.SeedSequence(trial.seed).spawn(1 + 2 * len(trial.compare))
 
         def tried(Phi: Array, seed: np.random.SeedSequence) -> TriedInput:
@@ -201,7 +323,12 @@ class RegressionTask:
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
         started = time.perf_counter()
         terms = self.terms
-        design = self._toeplitz() if terms.toeplitz else self._free()
+        if terms.toeplitz:
+            design = self._toeplitz()
+        else:
+            R, bound = terms.free()
+            split = terms.regression.error(R)
+            design = MomentsDesign(R, None, split, bound, 1e-9, Solver("closed_form"))
         solved = time.perf_counter()
         record = realise_regressors(self.signal, terms.regression, design.R, design.rho, terms.target)
         signal = None if record is None else record.signal
@@ -218,10 +345,6 @@ class RegressionTask:
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
         curves["moments"] = moments
         return record, results_of(terms.header, outcome, tables, curves)
-
-    def _free(self) -> MomentsDesign:
-        R, bound = self.terms.free()
-        return MomentsDesign(R, None, self.terms.regression.error(R), bound, 1e-9, Solver("closed_form"))
 
     def _toeplitz(self) -> MomentsDesign:
         terms = self.terms
@@ -250,23 +373,19 @@ def _out_of_reach(
     """Return the error that no Toeplitz moments reach the target, as far as it is proved."""
     bias = error.bias * float(np.linalg.norm(regression.estimated))
     smallest, largest = (regression.neglected_norm * bias) ** 2, float(np.sqrt(target)) / bias
-    key, hint = (
-        f"{KEY}.target",
-        (
-            f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}; "
-            "or estimate more parameters"
-        ),
-    )
+    key, of = f"{KEY}.target", f"a mean-squared error of {target:.7g}"
+    hint = f"a target above {smallest:.7g} can be met, or neglected_norm below {largest:.7g}"
+    hint += "; or estimate more parameters"
     if not error.proved:
         message = (
-            f"no Toeplitz moments were found that reach a mean-squared error of {target:.7g} (the least "
-            f"biased ones have {smallest:.7g} at any energy), nor was it proved that there are none"
+            f"no Toeplitz moments were found that reach {of} (the least biased ones have {smallest:.7g} at "
+            "any energy), nor was it proved that there are none"
         )
         return InaccurateError.because("target-undecided", message, hint=hint, key=key)
     unit = regression.n * regression.variance * float(np.sum(regression.estimated**2)) / target
     assumed = f" and R11 / r_0 with eigenvalues above {SMALLEST_EIGENVALUE:g}" if error.assumed else ""
     message = (
-        f"no Toeplitz moments reach a mean-squared error of {target:.7g} (proved for every energy up to "
-        f"{error.proved * unit:.3g}{assumed}): the bias alone is {smallest:.7g}"
+        f"no Toeplitz moments reach {of} (proved for every energy up to {error.proved * unit:.3g}{assumed}): "
+        f"the bias alone is {smallest:.7g}"
     )
     return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=key)
