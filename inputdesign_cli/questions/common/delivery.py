@@ -25,6 +25,10 @@ ALMOST = 100.0
 _ROUNDING = 1e-6
 
 
+APART = 1e-6
+"""Two ways to the same number may differ by this share of it."""
+
+
 @dataclass(frozen=True)
 class Delivered:
     """What a design or an analysis delivers to be tried: a record (n, r), None if no excitation is needed.
@@ -88,10 +92,6 @@ def proof_status(gap: float, tolerance: float) -> str:
     if gap <= tolerance * (1.0 + _ROUNDING):
         return "optimal"
     return "almost_optimal" if gap <= ALMOST * tolerance else "gap_open"
-
-
-APART = 1e-6
-"""Two ways to the same number may differ by this share of it."""
 
 
 def check_claims(wrong: Iterable[str], remedy: str) -> None:

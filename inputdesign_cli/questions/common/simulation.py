@@ -18,7 +18,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.findings import simulated_runs
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
@@ -294,12 +294,8 @@ def _flat(plan: Simulation, kind: str, name: str, power: float, samples: int) ->
     nominal, band = plan.nominal, plan.nominal.band
     everywhere = plan.units.sampled and band == (0.0, np.pi)
     if kind_of(kind).few_levels and not everywhere:
-        raise bad_spec(
-            "not-supported",
-            f"a {kind} signal has power at all frequencies of discrete time, the excitation only on a band",
-            hint="compare with multisine or white",
-            key="simulation.compare",
-        )
+        what = f"compare a {kind} signal, which has power at all frequencies, with an excitation on a band"
+        raise refuse("simulation.compare", what, "compare with multisine or white")
     powers = np.full(nominal.inputs, power / nominal.inputs)
     return Redrawn.flat(name, kind, powers, band, samples, plan.units.step)
 

@@ -53,6 +53,10 @@ from inputdesign_cli.records import Preparation, Record, read_data
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification.models.sizes import most
 
+# Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
+_FREEDOM = 60
+_SURE = 0.95
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -231,11 +235,6 @@ def _assessment(
         no_top_up=no_top_up,
         periods=periods,
     ), doubts
-
-
-# Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
-_FREEDOM = 60
-_SURE = 0.95
 
 
 @dataclass(frozen=True)

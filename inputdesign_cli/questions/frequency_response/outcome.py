@@ -45,6 +45,15 @@ from inputdesign_cli.signal.selection import Record
 KEY = "accuracy.frequency_response"
 
 
+_KINDS: dict[Goal, str] = {
+    "cost": "least_cost",
+    "factor": "accuracy_factor",
+    "samples": "shortest_experiment",
+}
+_ROUNDING = 1e-9
+_CHANCE = 0.05
+
+
 @dataclass(frozen=True)
 class ResponseTerms:
     """The lines and their accuracy, limits and cost.
@@ -152,15 +161,6 @@ def deviation_curves(
         shown = (w, size, admitted, of_entry["deviation"], drawn, label)
         panels.append(DeviationPanel(*shown, entry, units.passage(entry)))
     return columns, DeviationCurves(tuple(panels))
-
-
-_KINDS: dict[Goal, str] = {
-    "cost": "least_cost",
-    "factor": "accuracy_factor",
-    "samples": "shortest_experiment",
-}
-_ROUNDING = 1e-9
-_CHANCE = 0.05
 
 
 def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, float]) -> out.Outcome:

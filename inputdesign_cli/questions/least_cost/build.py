@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.errors import bad_spec, refuse
+from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design
 from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header
@@ -155,13 +155,9 @@ def _check_interpolated(spec: Spec) -> None:
     levels = signal.type is not None and kind_of(signal.type).of_levels
     if levels or signal.hold is not None or signal.bits is not None:
         key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
-        raise bad_spec(
-            "not-supported",
-            "a plant in s is driven by the band-limited interpolation of the samples, which has no levels "
-            "and holds nothing between them",
-            hint="write plant.sample: zoh for a signal that is held between samples, or use a multisine",
-            key=f"signal.{key}",
-        )
+        hint = "write plant.sample: zoh for a signal that is held between samples, or use a multisine"
+        what = "hold levels: between samples a plant in s is driven by their band-limited interpolation"
+        raise refuse(f"signal.{key}", what, hint)
 
 
 def _grid_method(spec: Spec) -> GridMethod | None:
@@ -182,13 +178,11 @@ def _grid_method(spec: Spec) -> GridMethod | None:
         and not limited
     )
     if not plain:
-        raise bad_spec(
-            "not-supported",
-            "solver.method lmi is the papers' program: the least cost of a FIR spectrum of one input for "
-            "model_error alone, without limits",
-            hint="use method: exchange, which does the rest, at every frequency",
-            key="solver.method",
+        what = (
+            "design more than the least cost of a FIR spectrum of one input for model_error, without limits"
         )
+        hint = "use method: exchange, which does the rest, at every frequency"
+        raise refuse("solver.method", what, hint, who="the papers' program (lmi)")
     return GridMethod(int(spec.solver.grid), spec.solver.positivity)
 
 
@@ -200,10 +194,7 @@ def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
     plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
     floors = any(not limit.upper for limit in build_power_limits(spec))
     if not isinstance(basis, PolynomialBasis) or not plain or floors or spec.limits.spectrum is not None:
-        raise bad_spec(
-            "not-supported",
-            "factor_columns is for a criterion under upper limits on powers",
-            hint="remove factor_columns: the default, a factor of full rank, is the true optimum",
-            key="spectrum.factor_columns",
-        )
+        hint = "remove factor_columns: the default, a factor of full rank, is the true optimum"
+        what = "take few columns but for a criterion under upper limits on powers"
+        raise refuse("spectrum.factor_columns", what, hint)
     return FewColumns(spectrum.factor_columns, spec.signal.seed or 0)

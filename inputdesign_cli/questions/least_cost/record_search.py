@@ -57,6 +57,23 @@ Way = Callable[[int, int], Made | None]
 """Makes the first record of a length that meets the accuracy, or the best, of the spectrum for a length."""
 
 
+# From the design towards the least input power that meets the accuracy, with a little room there.
+_SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
+_ROOM = 1.02
+_TOLERANCE = 1e-5
+# Number of candidates of a long record: luck averages out.
+_ENOUGH = 3
+# No record of a length is made if its pilot needs more than this multiple of that length.
+_FAR_FROM = 1.03
+_WORDS = {
+    "filtered_noise": "noise",
+    "multisine": "a multisine",
+    "binary": "a binary signal",
+    "ternary": "a signal of three levels",
+    "slewed": "a signal of ramps between two levels",
+}
+
+
 def reach(record: Record, before: float = np.inf) -> float:
     """Return the length that a record needs if its information grows with it, from the ratio `before`."""
     if not np.isfinite(record.worst_ratio):
@@ -194,23 +211,6 @@ class ShortestRecord:
         unit = self.block * self.inputs
         fast = unit * int(scipy.fft.next_fast_len(int(np.ceil(length / unit))))
         return whole if whole <= LONG or fast > min(_MARGIN * whole, self.longest) else fast
-
-
-# From the design towards the least input power that meets the accuracy, with a little room there.
-_SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
-_ROOM = 1.02
-_TOLERANCE = 1e-5
-# Number of candidates of a long record: luck averages out.
-_ENOUGH = 3
-# No record of a length is made if its pilot needs more than this multiple of that length.
-_FAR_FROM = 1.03
-_WORDS = {
-    "filtered_noise": "noise",
-    "multisine": "a multisine",
-    "binary": "a binary signal",
-    "ternary": "a signal of three levels",
-    "slewed": "a signal of ramps between two levels",
-}
 
 
 def fitting_record(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:

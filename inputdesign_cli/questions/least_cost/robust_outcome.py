@@ -30,8 +30,8 @@ from inputdesign_cli.outcome import robust as parts
 from inputdesign_cli.outcome.curves import Curves, FanCurves
 from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.questions.common import robust
 from inputdesign_cli.questions.common.robust import (
+    CONFIDENCE,
     MET,
     Batch,
     Kept,
@@ -39,7 +39,9 @@ from inputdesign_cli.questions.common.robust import (
     Region,
     Searched,
     Tried,
+    delivered,
     delivered_samples,
+    estimate_from,
     kept_by,
     tried_on,
 )
@@ -57,17 +59,15 @@ _NEARLY, _MOST_ADDED = 1.0 + 1e-6, 8
 Keeps = Callable[[Array, Alternative], Kept]
 
 
-@dataclass(frozen=True)
-class Found:
-    """The worst plant that was found, at `theta` (k,), what it keeps, and how many were tried."""
-
-    theta: Array
-    plant: Alternative
-    kept: Kept
-    tried: int
+# A plant binds when it is within this share of its limit.
+_BINDS = 1e-5
+_LISTED = 12
+# Estimates that are foreseen, and the share of them that counts.
+_ESTIMATES, _MOST_OF_THEM = 100, 0.95
+_GRID_POINTS = 300
 
 
-def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> Found:
+def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> tuple[Searched, Alternative]:
     """Return the worst plant of the region that ascents from parameters (k,) find, the worst known first."""
     tried, worst = 0, list[tuple[Array, Alternative, Kept]]()
 
@@ -110,7 +110,8 @@ def worst_plant(region: Region, keeps: Keeps, starts: Sequence[Array]) -> Found:
 
     for theta in starts[: 1 + _STARTS]:
         ascend(region.nearest(theta))
-    return Found(*worst[0], tried)
+    ((theta, plant, kept),) = worst
+    return Searched(region.name, theta, kept, tried, added=0), plant
 
 
 def with_worst_plants(
@@ -129,23 +130,14 @@ def with_worst_plants(
         def keeps(theta: Array, plant: Alternative, design: Design = design, samples: int = samples) -> Kept:
             return tried_on(design, samples, Batch(theta[None], (plant,), 1))[0].kept
 
-        found = worst_plant(region, keeps, thetas)
+        found, plant = worst_plant(region, keeps, thetas)
         if found.kept.share <= _NEARLY or added == _MOST_ADDED:
-            searched = Searched(region.name, found.theta, found.kept, found.tried, added)
-            return replace(plants, searched=searched), question, answer
+            return replace(plants, searched=replace(found, added=added)), question, answer
         batch, added = plants.batch, added + 1
         thetas_now = np.concatenate([batch.thetas, found.theta[None]])
-        plants = replace(plants, batch=Batch(thetas_now, (*batch.plants, found.plant), batch.drawn + 1))
-        question = replace(question, others=[*question.others, found.plant])
+        plants = replace(plants, batch=Batch(thetas_now, (*batch.plants, plant), batch.drawn + 1))
+        question = replace(question, others=[*question.others, plant])
         answer = solve(question)
-
-
-# A plant binds when it is within this share of its limit.
-_BINDS = 1e-5
-_LISTED = 12
-# Estimates that are foreseen, and the share of them that counts.
-_ESTIMATES, _MOST_OF_THEM = 100, 0.95
-_GRID_POINTS = 300
 
 
 @dataclass(frozen=True)
@@ -203,7 +195,7 @@ Peak = Callable[[Experiment], float]
 def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> RobustResult:
     """Return what a design keeps at its plants; `peak` is None if limits do not depend on the plant."""
     kept, problem, samples = done.kept, done.problem, done.experiment.samples
-    at_each = robust.kept_by(problem, done.design, samples)
+    at_each = kept_by(problem, done.design, samples)
     numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
     # The plants that bind, the largest multipliers first.
     shares, weight = np.array([one.share for one in at_each]), done.design.result.certificate.shares
@@ -217,15 +209,15 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
         costs, promised = costs_of(done, problem.basis, done.design.result.x), done.design.result.objective
         dearest = int(np.argmax(costs))
         entry = replace(entry, dearest=parts.DearestPlant(numbers[dearest], costs[dearest]))
-    fresh, fewer = fresh_plants(plants, partial(robust.tried_on, done.design, samples), peak, promised)
+    fresh, fewer = fresh_plants(plants, partial(tried_on, done.design, samples), peak, promised)
     if plants.afresh is not None:
         entry = replace(entry, fresh=fresh, estimates=_estimates(done, plants, binding))
-        drawn, beta = len(plants.batch.plants), 1.0 - robust.CONFIDENCE
+        drawn, beta = len(plants.batch.plants), 1.0 - CONFIDENCE
         searched = plants.searched is not None and plants.searched.added
         # If some were left out, or searched, the theory is silent, and fresh draws count.
         if len(kept) == drawn and not searched:
             before = None if plants.unknowns is None else risk_before(drawn, beta, plants.unknowns)
-            risk = parts.Risk(robust.CONFIDENCE, risk_after(drawn, beta, support), before)
+            risk = parts.Risk(CONFIDENCE, risk_after(drawn, beta, support), before)
             entry = replace(entry, risk=risk)
     fan = fan_curves(done, numbers, binding) if done.excites else None
     tables, curves = ({}, {}) if fan is None else ({"fan": fan[0]}, {"fan": fan[1]})
@@ -362,12 +354,12 @@ def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> parts.
     rng, samples, shares = np.random.default_rng(0), done.experiment.samples, list[float]()
     try:
         for plant in islice(cycle(worst), _ESTIMATES):
-            theta = robust.estimate_from(done.design, samples, plant, rng)
+            theta = estimate_from(done.design, samples, plant, rng)
             estimated = None if theta is None else plants.at(theta)
             if theta is None or estimated is None:
                 shares.append(np.inf)
                 continue
-            tried = robust.tried_on(done.design, samples, Batch(theta[None], (estimated,), 1))
+            tried = tried_on(done.design, samples, Batch(theta[None], (estimated,), 1))
             shares += [one.kept.share for one in tried]
     except IdesignError:  # no time is left, or what is asked cannot be asked of this plant
         return None
@@ -387,7 +379,7 @@ def fan_curves(
     grid = np.unique(np.concatenate([error.grid for error in bounded[0]]))
     lo, hi = bounded[0][0].band
     w = axis(lo, hi, np.concatenate([np.clip(peaks, lo, hi), grid[:: max(grid.size // _GRID_POINTS, 1)]]))
-    informations = robust.delivered(problem, done.design, done.experiment.samples)
+    informations = delivered(problem, done.design, done.experiment.samples)
     at_each = zip(bounded, informations, strict=True)
     ratios = np.array([np.max([error.ratios(M, w) for error in errors], axis=0) for errors, M in at_each])
     named = {f"plant {numbers[place]}": ratios[place] for place in active if place > 0}
@@ -445,9 +437,8 @@ def given_robust(at: AtPlants, plants: Plants, nominal: Kept, centre: Array, uni
     looked_at = list(at_each)
     if plants.region is not None:
         starts = [centre, *(batch.thetas[place] for place in reversed(rising))]
-        found = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
-        sought = robust.Searched(plants.region.name, found.theta, found.kept, found.tried, added=0)
-        plants, looked_at = replace(plants, searched=sought), [*looked_at, found.kept]
+        found, _ = worst_plant(plants.region, lambda _, plant: at.on(plant).kept, starts)
+        plants, looked_at = replace(plants, searched=found), [*looked_at, found.kept]
     if not all(np.isfinite(one.share) for one in looked_at):
         raise bad_spec(
             "not-exciting",

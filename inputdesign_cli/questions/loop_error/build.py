@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Protocol, cast
 
 import numpy as np
@@ -18,7 +19,7 @@ from inputdesign_cli.design.loop_error import (
     PowerLimit,
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries
 from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
@@ -42,6 +43,7 @@ from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.specification.plugins import added
 from inputdesign_cli.specification.transfer_of_states import transfer_functions
 
+_refuse = partial(refuse, who="a design for the closed-loop error")
 _GRID = 512
 _CANDIDATES = 20
 # A pole this near to z = 1, or this near to the unit circle.
@@ -72,21 +74,11 @@ def estimated_model(spec: Spec) -> Model | None:
 def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
     """Return the polynomials of `plant` or of the true system, or raise `SpecError` (`not-supported`)."""
     if noise.variance is None:
-        raise bad_spec(
-            "not-supported",
-            "this version takes the noise of this simulation as a variance",
-            hint="write variance in place of relative_std",
-            key="simulation.noise",
-        )
+        raise _refuse("simulation.noise", "take relative noise", "write variance in place of relative_std")
     drifting = [d for d in system.per_output(noise.D) if np.any(np.abs(roots_in_z(d)) > 1.0 - _INTEGRATES)]
     if any(noise.drifts) or drifting:
-        raise bad_spec(
-            "not-supported",
-            "closed_loop_error is the mean square of a loop whose noise is stationary, and noise that drifts "
-            "is not",
-            hint="write a root of D inside the unit circle, or state the accuracy as model_error",
-            key="noise.D" if drifting else "noise.drift",
-        )
+        hint = "write a root of D inside the unit circle, or state the accuracy as model_error"
+        raise _refuse("noise.D" if drifting else "noise.drift", "take noise that drifts", hint)
     if plant.kind == "continuous" and plant.sampled:
         plant = system.held_plant(plant, spec.sample_time)
     if plant.kind == "state_space":
@@ -94,22 +86,12 @@ def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, k
     elif plant.kind == "polynomial":
         channels = system.polynomial_model(plant, noise, noise.covariance(plant.outputs))
     else:
-        raise bad_spec(
-            "not-supported",
-            "this version designs for the closed-loop error of sampled plants only",
-            hint="add sample: zoh to a continuous-time plant",
-            key=key,
-        )
+        raise _refuse(key, "take a plant that is not sampled", "add sample: zoh to a continuous-time plant")
     made = MatrixPlant.of(channels)
     poles = join_roots(roots_in_z(part) for part in (*made.A, *(f for row in made.F for f in row)))
     if np.any(np.abs(poles - 1.0) < _INTEGRATES):
-        raise bad_spec(
-            "not-supported",
-            "closed_loop_error takes an experiment in open loop with stationary outputs, and the outputs of "
-            "a plant that integrates are not",
-            hint="move the pole into the unit circle, or state the accuracy as model_error",
-            key=key,
-        )
+        hint = "move the pole into the unit circle, or state the accuracy as model_error"
+        raise _refuse(key, "take a plant that integrates, whose outputs are not stationary", hint)
     return made
 
 
@@ -127,13 +109,11 @@ def _of_states(
         identity = np.eye(model.outputs)
         above, below = _in_delays(model.held[0], model.matrices.K, model.matrices.C, identity, lag=0)
         if any(np.any(entry) for i, row in enumerate(above) for j, entry in enumerate(row) if i != j):
-            raise bad_spec(
-                "not-supported",
-                "this version designs for the closed-loop error of outputs with noise of their own, and K "
-                "takes that of one to others",
-                hint="write C and D of the noise in place of K",
-                key=f"{key}.state_space.K",
+            what, hint = (
+                "take noise that K leads to other outputs",
+                "write C and D of the noise in place of K",
             )
+            raise _refuse(f"{key}.state_space.K", what, hint)
         C, D = (tuple(rows[i][i] for i in range(model.outputs)) for rows in (above, below))
     return PolynomialModel(B, (np.ones(1),), F, C, D, model.covariance)
 
@@ -232,12 +212,8 @@ def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalS
     signal, samples = spec.signal, spec.signal_samples
     filtered = signal.type == "filtered_noise"
     if filtered and error.covariance == "parametric":
-        raise bad_spec(
-            "not-supported",
-            "this version makes multisines of a parametric design, which consists of lines",
-            hint="write type: multisine, or covariance: asymptotic",
-            key="signal.type",
-        )
+        what, hint = "filter noise to the lines of a parametric design", "write type: multisine"
+        raise _refuse("signal.type", what, f"{hint}, or covariance: asymptotic")
     if not filtered and signal.periods is not None and samples % signal.periods:
         raise bad_spec(
             "conflicting-keys",

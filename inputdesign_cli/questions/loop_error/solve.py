@@ -51,6 +51,9 @@ _POINTS = 800
 _LOWEST = 1e-3
 
 
+KEY = "accuracy.closed_loop_error"
+
+
 @dataclass(frozen=True)
 class LoopErrorTerms:
     """What results state: the control `law` as the spec calls it, and the points (`grid`) of spectrum.csv.
@@ -239,9 +242,6 @@ def loss_results(
 def _moments(values: Array) -> LossMoments:
     sd = float(values.std(ddof=1))
     return LossMoments(float(values.mean()), sd, sd / float(np.sqrt(values.size)))
-
-
-KEY = "accuracy.closed_loop_error"
 
 
 @dataclass(frozen=True)

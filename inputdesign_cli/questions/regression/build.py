@@ -108,12 +108,8 @@ def _refuse_coloured(noise: Noise | SimulationNoise, key: str) -> None:
     """Raise `SpecError` (`not-supported`) unless noise is white, as the theory takes it."""
     for name, polynomial in (("C", noise.C), ("D", noise.D)):
         if np.ravel(polynomial).tolist() != [1.0]:
-            raise bad_spec(
-                "not-supported",
-                "a regression design takes white noise",
-                hint=f"remove {key}.{name}; filter regressors and output with its inverse beforehand",
-                key=f"{key}.{name}",
-            )
+            hint = f"remove {key}.{name}; filter regressors and output with its inverse beforehand"
+            raise _refuse(f"{key}.{name}", "take coloured noise", hint)
 
 
 def _check_supported(spec: Spec) -> None:

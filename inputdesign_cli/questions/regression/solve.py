@@ -41,6 +41,9 @@ from inputdesign_cli.signal.moments import Start, delayed_regressors, free_regre
 _POINTS = 400
 
 
+KEY = "accuracy.mean_squared_error"
+
+
 @dataclass(frozen=True)
 class RegressionTerms:
     """The question: the least energy for a `target` error, or the least error for an `energy`, trace R.
@@ -174,9 +177,6 @@ def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Es
         mse_standard_error=float(squared.std(ddof=1) / root) if several else None,
         mean_estimate_standard_error=found.theta.std(axis=0, ddof=1) / root if several else None,
     )
-
-
-KEY = "accuracy.mean_squared_error"
 
 
 @dataclass(frozen=True)
