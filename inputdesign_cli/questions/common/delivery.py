@@ -110,7 +110,7 @@ def of_bounds(claimed: Objective, apart: float = APART, size: float = 0.0) -> It
         ("any_spectrum_bound", claimed.any_spectrum_bound),
     ):
         beyond = 0.0 if bound is None else value - bound
-        if not (beyond if largest else -beyond) <= apart * max(abs(value), size):
+        if not (beyond if largest else -beyond) <= max(apart, APART) * max(abs(value), size):
             yield f"the value {value:.10g} lies beyond {name} ({bound:.10g})"
 
 

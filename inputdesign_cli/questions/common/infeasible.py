@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -298,7 +298,11 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
             return low
         if at >= high:
             at = float(np.sqrt(low * high))
-        problem, within = _raised(unreachable.problem.on(found.basis), bounds, at), unreachable.within
+        problem, within = unreachable.problem.on(found.basis), unreachable.within
+        raised = list(problem.limits)
+        for index, bound in bounds.items():
+            raised[index] = replace(raised[index], bound=at * bound)
+        problem = replace(problem, limits=tuple(raised), finer=None)
         if within is not None:
             within = np.pad(within, (0, problem.basis.size - within.size))
         found = exchange(
@@ -309,13 +313,6 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
             enough=lambda objective, _: objective < 1.0 - 1e-3,
         )
     return low if np.isfinite(high) else None
-
-
-def _raised(problem: Problem, bounds: Mapping[int, float], factor: float) -> Problem:
-    limits = list(problem.limits)
-    for index, bound in bounds.items():
-        limits[index] = replace(limits[index], bound=factor * bound)
-    return replace(problem, limits=tuple(limits), finer=None)
 
 
 def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:

@@ -46,7 +46,7 @@ class Delivery:
 
 @dataclass(frozen=True)
 class RecordRequest:
-    """What a spec asks of its record, of `samples` samples (None: those of the experiment).
+    """What a spec asks of its record, of `samples` samples (None: as many as the experiment has).
 
     Bounds are on single samples, by `limit_keys`. The band is in rad per sample, the step between samples in
     the unit of the experiment. A record that `meets` keeps the accuracy itself; else it has the power of the

@@ -107,7 +107,7 @@ def tried_input(
     cost: Mapping[PowerKind, Weight],
     modelled: Tried | None,
 ) -> TriedInput:
-    """Return what one excitation gave: errors beside what is `predicted`, and those on the design model."""
+    """Return what one excitation gave: errors, compared with what is `predicted`, on the design model too."""
     trials, information, r_adm = tried.trials, tried.information, predicted.r_adm
     frequency = predicted.w / units.frequency
     entry = TriedInput(
@@ -230,9 +230,8 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
     counted, simulated = outcome.samples, len(delivered.record)
     foretold = results.curves if counted == simulated else delivered.of_length(simulated)
     predicted = _predicted(plan, foretold, delivered.alpha, excitations[0].information(nominal))
-    inputs: dict[str, TriedInput] = {}
+    inputs, tables = dict[str, TriedInput](), dict[str, Table]()
     curves: dict[str, plots.Curves] = {name: foretold[name] for name in ("ellipses",) if name in foretold}
-    tables: dict[str, Table] = {}
     for excitation in excitations:
         name = excitation.name
         tried = tried_on_truth(study, excitation, executor)

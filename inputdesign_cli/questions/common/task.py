@@ -65,7 +65,7 @@ class SpectrumTask(ABC):
         return simulate(self.simulation, delivered, executor)
 
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
-        """Return the errors that are asked about, or else those of every entry of G; and which they are."""
+        """Return the errors that are asked about, or r_u of all entries of G, and whether one is asked about."""
         stated = model_errors(asked)
         return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
 
@@ -93,8 +93,8 @@ class SpectrumTask(ABC):
         results = adding(results, results.outcome, found)
         if self.foresight is None:
             return results
-        foreseen = self.foresight.foreseen(samples, requirements)
-        return adding(results, replace(results.outcome, foreseen=foreseen.entry), foreseen.findings)
+        foreseen, rivals = self.foresight.foreseen(samples, requirements)
+        return adding(results, replace(results.outcome, foreseen=foreseen), rivals)
 
     def to_be_tried(
         self,
@@ -108,7 +108,7 @@ class SpectrumTask(ABC):
         *,
         flat: bool = True,
     ) -> Delivered:
-        """Return what a trial of a record (n, r) takes; the curves are those of the information."""
+        """Return what a trial of a record (n, r) takes; the curves show its information."""
         of_length = partial(informed.of_length, experiment, self.ellipses, flat=flat)
         search = None if self.foresight is None else partial(self.foresight.tried, record, requirements)
         return Delivered(results, record, renewed, alpha, of_length, search)

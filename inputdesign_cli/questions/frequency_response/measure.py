@@ -320,7 +320,7 @@ def _check(each: int, together: int, stated: Periods, name: str) -> None:
 class Measurement:
     """How a response is measured: at the lines of `terms`, or without them where data excite.
 
-    The nominal `model` is drawn beside it; signals vary about the `operating_point`, by channel.
+    The nominal `model` is drawn, too; signals vary about the `operating_point`, by channel.
     """
 
     header: Header

@@ -58,7 +58,7 @@ _CHANCE = 0.05
 class ResponseTerms:
     """The lines and their accuracy, limits and cost.
 
-    The experiment has the samples that count (one where the shortest is asked for), `asked` those of the
+    The experiment has the samples that count (one where the shortest is asked for), `asked` are stated in the
     spec. Of noise that is `tabulated` there is no model.
     """
 

@@ -182,7 +182,14 @@ class ResponseTask:
         if terms.goal == "cost" and self.record.meets:
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
-                raise self._too_tight(scale * beyond, len(samples))
+                length, times = len(samples), rounded_up(scale * beyond, 4)
+                more = int(np.ceil(length * (scale * beyond) ** 2))
+                best = (
+                    f"meets the accuracy: the one of the lowest peaks would have to be {times} times as large"
+                )
+                hint = f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
+                hint += f"{times} times as much, or write objective: shortest_experiment"
+                raise no_record(self.record, length, f"{best} as they allow", hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
@@ -210,13 +217,6 @@ class ResponseTask:
         )
         details = {"factor": factor}
         return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
-
-    def _too_tight(self, beyond: float, length: int) -> InfeasibleError:
-        more, times = int(np.ceil(length * beyond**2)), rounded_up(beyond, 4)
-        best = f"meets the accuracy: the one of the lowest peaks would have to be {times} times as large"
-        enough = f"about {more} samples do ({self.record.units.length(more)}); raise the limits"
-        hint = f"{enough}, admit {times} times as much, or write objective: shortest_experiment"
-        return no_record(self.record, length, f"{best} as they allow", hint)
 
     def _length(self, counted: int) -> int:
         """Return the length of a record, transient included.

@@ -32,7 +32,7 @@ from inputdesign_cli.questions.building.system import (
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.common.robust import Plants
-from inputdesign_cli.questions.given.solve import GivenAsked, GivenExcitation, GivenTask
+from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models import spectrum as stated_spectrum
@@ -61,26 +61,23 @@ def build_given(spec: Spec) -> GivenTask:
     experiment.whitened(1.0)  # raises an error that names unidentifiable parameters
     check_pairs(spec, experiment.model.names)
     amplitude = spec.limits.amplitude
-    asked = GivenAsked(
-        requirements,
-        build_criterion(spec, experiment),
-        build_cost(spec),
-        model_error_alpha(spec, experiment.model),
-        build_calibration(spec),
-        build_simulator(spec, experiment),
-        StatedLimits(
+    return GivenTask(
+        experiment=experiment,
+        excitation=_excitation(spec, spec.spectrum, experiment),
+        requirements=requirements,
+        criterion=build_criterion(spec, experiment),
+        cost=build_cost(spec),
+        alpha=model_error_alpha(spec, experiment.model),
+        calibration=build_calibration(spec),
+        simulator=build_simulator(spec, experiment),
+        limits=StatedLimits(
             powers=tuple(build_power_limits(spec)),
             input=None if amplitude is None else amplitude.input,
             output=None if amplitude is None else amplitude.output,
             rate=spec.limits.rate,
             samples=spec.limits.samples,
         ),
-        _build_plants(spec, experiment),
-    )
-    return GivenTask(
-        experiment=experiment,
-        excitation=_excitation(spec, spec.spectrum, experiment),
-        asked=asked,
+        plants=_build_plants(spec, experiment),
         header=build_header(spec),
         record=build_record_request(spec, experiment.size),
         unstated=unstated_errors(spec, experiment),

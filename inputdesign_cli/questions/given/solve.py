@@ -118,14 +118,16 @@ class GivenExcitation:
         return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
 
 
-@dataclass(frozen=True)
-class GivenAsked:
-    """What is looked at of a given excitation: requirements are checked, a criterion is computed.
+@dataclass(frozen=True, kw_only=True)
+class GivenTask(SpectrumTask):
+    """The analysis of an excitation: requirements are checked, a criterion is computed.
 
     `calibration` and `simulator` size `alpha` anew, see `Confidence`; `plants` are others than the nominal
     one.
     """
 
+    experiment: Experiment
+    excitation: GivenExcitation
     requirements: Sequence[RequirementFactory]
     criterion: Callable[[Experiment], Criterion] | None
     cost: dict[PowerKind, Weight]
@@ -135,27 +137,26 @@ class GivenAsked:
     limits: StatedLimits
     plants: Plants | None
 
-
-@dataclass(frozen=True, kw_only=True)
-class GivenTask(SpectrumTask):
-    """The analysis of an excitation: what is looked at, what is done with its record, what is reported."""
-
-    experiment: Experiment
-    excitation: GivenExcitation
-    asked: GivenAsked
-
     def delivered(self) -> Delivered:
         """Return r_u, information, predicted standard deviations and powers of the excitation."""
         started = time.perf_counter()
-        excitation, asked = self.excitation, self.asked
+        excitation = self.excitation
         experiment = self.experiment.whitened(excitation.scale)
         if excitation.samples is not None:
             experiment = replace(experiment, samples=len(excitation.samples))
         information = excitation.information(experiment)
-        _check_excites(experiment, information)
-        requirements = [make(experiment) for make in asked.requirements]
+        eigenvalues, vectors = np.linalg.eigh(information)
+        if eigenvalues[0] <= _TOO_FAINT * eigenvalues[-1]:
+            raise bad_spec(
+                "not-exciting",
+                f"this excitation has no information on {experiment.unexcited(vectors[:, 0])}: infinite "
+                "variance",
+                hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
+                key="spectrum.given",
+            )
+        requirements = [make(experiment) for make in self.requirements]
         simulated = self._simulated(experiment)
-        confidence = Confidence.of(asked.calibration, requirements, information, asked.alpha, simulated)
+        confidence = Confidence.of(self.calibration, requirements, information, self.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
         informed, white = self._informed(experiment, requirements, information)
         results = self._report(experiment, informed, white, requirements, confidence)
@@ -165,7 +166,7 @@ class GivenTask(SpectrumTask):
         else:
             signal, found = signal_of(self.record, informed.units, experiment, record, requirements), []
         power = Powers.of(excitation.power)
-        found += limits_not_kept(asked.limits, experiment.samples, power, signal)
+        found += limits_not_kept(self.limits, experiment.samples, power, signal)
         if record is None or signal is None:
             results = adding(results, results.outcome, found)
         else:
@@ -183,12 +184,12 @@ class GivenTask(SpectrumTask):
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> tuple[Informed, White]:
         """Return what curves show of the excitation, and white excitation at the same cost."""
-        cost = weighted_sum(self.asked.cost, self.excitation.power)
-        level = cost / weighted_sum(self.asked.cost, GivenExcitation.even(self.experiment, 1.0).power)
+        cost = weighted_sum(self.cost, self.excitation.power)
+        level = cost / weighted_sum(self.cost, GivenExcitation.even(self.experiment, 1.0).power)
         white = GivenExcitation.even(self.experiment, level).information(experiment)
         errors, stated = self.errors(experiment, requirements)
         found = White(cost=cost, excitation_power=level)
-        kind = None if self.asked.criterion is None else self.asked.criterion(experiment).letter
+        kind = None if self.criterion is None else self.criterion(experiment).letter
         labels, known = white_labels(kind, found, experiment.samples), (errors, information, stated)
         return Informed(self.header.units, *known, white=white, white_labels=labels, label="given"), found
 
@@ -206,8 +207,8 @@ class GivenTask(SpectrumTask):
         met = beyond <= max(_ROUNDING, of_table)
         error, listed = accuracy_of(units, confidence, requirements, informed.information, np.zeros(0))
         objective = None
-        if self.asked.criterion is not None:
-            criterion = self.asked.criterion(experiment)
+        if self.criterion is not None:
+            criterion = self.criterion(experiment)
             objective = Objective(criterion.letter, criterion.value(criterion.level(informed.information)))
         outcome = Outcome(
             title=self.header.title,
@@ -231,7 +232,7 @@ class GivenTask(SpectrumTask):
                 units, excitation.basis, excitation.x, experiment.band, white=level
             )
             curves["spectrum"] = replace(drawn, label="given")
-        plants = self.asked.plants
+        plants = self.plants
         if plants is not None:
             excited = AtPlants(excitation.information, excitation.scale, experiment.samples)
             nominal, centre = kept_of(requirements, informed.information), experiment.model.theta
@@ -270,13 +271,13 @@ class GivenTask(SpectrumTask):
 
     def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
         """Estimates of such experiments, for an exact confidence."""
-        if self.asked.simulator is None:
+        if self.simulator is None:
             return None
         if self.excitation.samples is not None:
-            return self.asked.simulator.of_record(self.excitation.samples)
+            return self.simulator.of_record(self.excitation.samples)
         samples = as_long(self.record, experiment)
         renewed = None if samples is None else self._renewed(samples)
-        return None if samples is None or renewed is None else self.asked.simulator.of(renewed, samples)
+        return None if samples is None or renewed is None else self.simulator.of(renewed, samples)
 
     def _renewed(self, samples: int) -> Excitation | None:
         """What realises the spectrum anew; None for a record that was given."""
@@ -286,16 +287,3 @@ class GivenTask(SpectrumTask):
         spectrum = excitation.drawn(request.step)
         generator = SignalGenerator(spectrum, request.settings, samples, request.band)
         return excitation.in_phase or Redrawn("design", generator, excitation.basis, excitation.x)
-
-
-def _check_excites(experiment: Experiment, information: Array) -> None:
-    """Raise `SpecError` (`not-exciting`) when the information matrix is singular to working precision."""
-    eigenvalues, vectors = np.linalg.eigh(information)
-    if eigenvalues[0] > _TOO_FAINT * eigenvalues[-1]:
-        return
-    raise bad_spec(
-        "not-exciting",
-        f"this excitation has no information on {experiment.unexcited(vectors[:, 0])}: infinite variance",
-        hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
-        key="spectrum.given",
-    )

@@ -31,7 +31,6 @@ from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.questions.least_cost.sought import FewColumns, GridMethod, Sought
 from inputdesign_cli.signal.kinds import kind_of
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
@@ -119,15 +118,17 @@ _UNHANDLED = {
 def check_supported(spec: Spec, question: str = "a design of the input spectrum") -> None:
     """Raise `SpecError` (`not-supported`) for what is not designed here, rather than ignore it."""
     refuse_unhandled(spec, question, _UNHANDLED, {"solver.method": ("exchange", "lmi")})
+    signal, spectrum, error, uncertainty = spec.signal, spec.spectrum, spec.accuracy.error, spec.uncertainty
     if not spec.plant.sampled:
-        _check_interpolated(spec)
-    if spec.uncertainty is not None:
-        _check_robust(spec, spec.uncertainty)
-
-
-def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
-    """What is not designed for several plants at once."""
-    spectrum, error = spec.spectrum, spec.accuracy.error
+        # In continuous time samples are interpolated within their band: between them there are no levels.
+        levels = signal.type is not None and kind_of(signal.type).of_levels
+        stated = {"hold": signal.hold is not None, "bits": signal.bits is not None, "type": levels}
+        for key in (name for name, there in stated.items() if there):
+            hint = "write plant.sample: zoh for a signal that is held between samples, or use a multisine"
+            what = "hold levels: between samples a plant in s is driven by their band-limited interpolation"
+            raise refuse(f"signal.{key}", what, hint)
+    if uncertainty is None:
+        return
     columns = spectrum is not None and spectrum.type == "polynomial" and spectrum.factor_columns is not None
     if columns:
         what, hint = "hold a robust design to few factor columns", "remove spectrum.factor_columns"
@@ -147,17 +148,6 @@ def check_pairs(spec: Spec, known: Sequence[str]) -> None:
     for n, pair in enumerate(spec.report.ellipses or ()):
         for m, name in enumerate(pair):
             check_known(spec, known, name, f"report.ellipses[{n}][{m}]")
-
-
-def _check_interpolated(spec: Spec) -> None:
-    """In continuous time samples are interpolated within their band: between them there are no levels."""
-    signal = spec.signal
-    levels = signal.type is not None and kind_of(signal.type).of_levels
-    if levels or signal.hold is not None or signal.bits is not None:
-        key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
-        hint = "write plant.sample: zoh for a signal that is held between samples, or use a multisine"
-        what = "hold levels: between samples a plant in s is driven by their band-limited interpolation"
-        raise refuse(f"signal.{key}", what, hint)
 
 
 def _grid_method(spec: Spec) -> GridMethod | None:

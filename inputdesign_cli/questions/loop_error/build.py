@@ -30,13 +30,7 @@ from inputdesign_cli.questions.building.limits import build_power_limits, implie
 from inputdesign_cli.questions.building.signal_settings import build_bounds
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
 from inputdesign_cli.questions.building.weights import held, rational
-from inputdesign_cli.questions.loop_error.solve import (
-    KEY,
-    LoopErrorSignalSettings,
-    LoopErrorTask,
-    LoopErrorTerms,
-    LossTrial,
-)
+from inputdesign_cli.questions.loop_error.solve import KEY, LoopErrorSignalSettings, LoopErrorTask, LossTrial
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant, StateSpacePlant, TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
@@ -164,7 +158,8 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
     )
     spectrum = spec.spectrum
-    terms = LoopErrorTerms(
+    return LoopErrorTask(
+        problem=problem,
         header=build_header(spec),
         law=name,
         covariance=error.covariance,
@@ -172,8 +167,9 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         tolerance=spec.solver.tolerance,
         cost=system.build_cost(spec),
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
+        signal=_signal(spec, error, plant.inputs),
+        trial=_trial(spec, error, problem),
     )
-    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, error, problem))
 
 
 def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant, key: str) -> tuple[str, ControlLaw]:

@@ -54,28 +54,12 @@ _LOWEST = 1e-3
 KEY = "accuracy.closed_loop_error"
 
 
-@dataclass(frozen=True)
-class LoopErrorTerms:
-    """What results state: the control `law` as the spec calls it, and the points (`grid`) of spectrum.csv.
-
-    The `covariance` is in the limit of a high model order, or exact for the model structure.
-    """
-
-    header: Header
-    law: str
-    covariance: Literal["asymptotic", "parametric"]
-    samples: int
-    tolerance: float
-    cost: Mapping[PowerKind, Weight]
-    grid: int
-
-
 def design_outcome(
-    terms: LoopErrorTerms, design: LoopErrorDesign, signal: out.Signal, timing: dict[str, float]
+    task: LoopErrorTask, design: LoopErrorDesign, signal: out.Signal, timing: dict[str, float]
 ) -> out.Outcome:
     """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
-    samples, white, multipliers = terms.samples, design.white, design.multipliers
-    lo, hi = (edge / terms.header.units.sample_time for edge in design.problem.band)
+    samples, white = task.samples, design.white
+    lo, hi = (edge / task.header.units.sample_time for edge in design.problem.band)
     informations = {"design": design.information, "white": white.information}
     theories = {name: loss_theory(design.criterion, M) for name, M in informations.items()}
     inputs, outputs = (np.diag(part).tolist() for part in (design.input_covariance, design.output_covariance))
@@ -83,16 +67,6 @@ def design_outcome(
     G, weights = design.problem.plant.plant_at(design.rule.nodes), design.rule.weights
     even = [white.level * float(weights.sum())] * design.problem.plant.inputs
     caused = white.level * np.einsum("kab,kab,k->a", G, np.conj(G), weights).real
-    limits = (
-        ActivePower(
-            limit.kind,
-            limit.most,
-            float(design.powers[index]),
-            channel=None if limit.channel is None else limit.channel + 1,
-            multiplier=None if multipliers is None else float(multipliers[index]),
-        )
-        for index, limit in enumerate(design.problem.limits)
-    )
     details = {"steps": design.steps, "nodes": int(design.rule.nodes.size), "settled": design.settled}
     objective = out.Objective(
         "closed_loop_error",
@@ -101,29 +75,29 @@ def design_outcome(
         relative_gap=design.gap,
         any_spectrum_bound=design.lower_bound,
     )
-    check_claims(of_bounds(objective, terms.tolerance), "rescale the signals, or restrict the band")
+    check_claims(of_bounds(objective, task.tolerance), "rescale the signals, or restrict the band")
     return out.Outcome(
-        title=terms.header.title,
-        status=proof_status(design.gap, terms.tolerance),
+        title=task.header.title,
+        status=proof_status(design.gap, task.tolerance),
         objective=objective,
-        cost=weighted_sum(terms.cost, {"input": inputs, "output": outputs, "excitation": inputs}),
+        cost=weighted_sum(task.cost, {"input": inputs, "output": outputs, "excitation": inputs}),
         samples=samples,
         power=out.Powers(tuple(inputs), tuple(outputs), tuple(inputs)),
         closed_loop_error=out.ClosedLoopError(
-            law=terms.law,
-            covariance=terms.covariance,
+            law=task.law,
+            covariance=task.covariance,
             expected=design.value / samples,
             band=(lo, hi),
             noise_model_part=design.noise_part,
             parametric={name: theory_of(theory) for name, theory in theories.items()},
-            limits=tuple(limits),
+            limits=_limits(design),
         ),
         information=out.Information(
             design.problem.structure.names,
             samples * design.information,
             np.linalg.inv(design.information) / samples,
         ),
-        spectrum=_spectrum(terms, design),
+        spectrum=_spectrum(task, design),
         baseline=out.Baseline(
             out.White(
                 value=white.value,
@@ -132,21 +106,35 @@ def design_outcome(
             )
         ),
         signal=signal,
-        solver=out.Solver("exchange" if design.of_lines else "dual", terms.tolerance, details=details),
+        solver=out.Solver("exchange" if design.of_lines else "dual", task.tolerance, details=details),
         timing_s=timing,
     )
 
 
+def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
+    multipliers = [None] * len(design.powers) if design.multipliers is None else design.multipliers.tolist()
+    return tuple(
+        ActivePower(
+            limit.kind,
+            limit.most,
+            float(power),
+            channel=None if limit.channel is None else limit.channel + 1,
+            multiplier=multiplier,
+        )
+        for limit, power, multiplier in zip(design.problem.limits, design.powers, multipliers, strict=True)
+    )
+
+
 def spectrum_results(
-    terms: LoopErrorTerms, design: LoopErrorDesign
+    task: LoopErrorTask, design: LoopErrorDesign
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
     """Return spectrum.csv on the grid that the spec asks for, and the figures."""
-    units, (lo, hi) = terms.header.units, design.problem.band
+    units, (lo, hi) = task.header.units, design.problem.band
     if design.of_lines:
         w, Phi, white = design.frequencies, design.spectrum, None
         shown, drawn = w, Phi
     else:
-        w, white = np.linspace(lo, hi, terms.grid), design.white.level
+        w, white = np.linspace(lo, hi, task.grid), design.white.level
         Phi = design.density(w)
         shown = np.geomspace(max(lo, _LOWEST * hi), hi, _POINTS)
         drawn = design.density(shown)
@@ -166,8 +154,8 @@ def theory_of(theory: LossTheory) -> TheoreticalLoss:
     return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
 
 
-def _spectrum(terms: LoopErrorTerms, design: LoopErrorDesign) -> out.Spectrum:
-    unit, problem = terms.header.units.frequency, design.problem
+def _spectrum(task: LoopErrorTask, design: LoopErrorDesign) -> out.Spectrum:
+    unit, problem = task.header.units.frequency, design.problem
     if design.of_lines:
         lines = {"frequencies": design.frequencies / unit, "masses": design.spectrum}
         return out.Spectrum("multisine", lines)
@@ -197,7 +185,7 @@ def _spectrum(terms: LoopErrorTerms, design: LoopErrorDesign) -> out.Spectrum:
         "root": _tidy(power_of(matrix, 0.5)[0]),
         "root_eigenvalues": np.sqrt(np.maximum(np.linalg.eigvalsh(matrix[0]), 0.0)),
     }
-    details = {"grid": terms.grid, **{name: at(w) for name, w in shown.items()}, "loop_input": loop_input}
+    details = {"grid": task.grid, **{name: at(w) for name, w in shown.items()}, "loop_input": loop_input}
     return out.Spectrum("pointwise", details)
 
 
@@ -339,10 +327,20 @@ class LossTrial:
 
 @dataclass(frozen=True)
 class LoopErrorTask:
-    """A design for the closed-loop error, and its study."""
+    """A design for the closed-loop error, and its study.
+
+    The `law` of control is called as in the spec, `grid` are the points of spectrum.csv, and the `covariance`
+    is that of a high model order, or exact for the model structure.
+    """
 
     problem: LoopErrorProblem
-    terms: LoopErrorTerms
+    header: Header
+    law: str
+    covariance: Literal["asymptotic", "parametric"]
+    samples: int
+    tolerance: float
+    cost: Mapping[PowerKind, Weight]
+    grid: int
     signal: LoopErrorSignalSettings
     trial: LossTrial
 
@@ -373,13 +371,13 @@ class LoopErrorTask:
 
     def _solved(self) -> tuple[LoopErrorDesign, Results]:
         started = time.perf_counter()
-        design = design_loop_error(self.problem, self.terms.covariance, tolerance=self.terms.tolerance)
+        design = design_loop_error(self.problem, self.covariance, tolerance=self.tolerance)
         solved = time.perf_counter()
         samples, signal = realise(design, self.signal)
-        outcome = design_outcome(self.terms, design, signal, timing(started, solved))
-        tables, curves = spectrum_results(self.terms, design)
-        tables["signal"], curves["signal"] = signal_results(self.terms.header.units, samples)
-        return design, results_of(self.terms.header, outcome, tables, curves)
+        outcome = design_outcome(self, design, signal, timing(started, solved))
+        tables, curves = spectrum_results(self, design)
+        tables["signal"], curves["signal"] = signal_results(self.header.units, samples)
+        return design, results_of(self.header, outcome, tables, curves)
 
 
 def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:

@@ -13,13 +13,7 @@ from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
-from inputdesign_cli.questions.regression.solve import (
-    KEY,
-    RegressionTask,
-    RegressionTerms,
-    RegressionTrial,
-    RegressorSettings,
-)
+from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, RegressorSettings
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
@@ -56,7 +50,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
             key=f"{KEY}.estimated",
         )
     spectrum, signal, solver = spec.spectrum, spec.signal, spec.solver
-    terms = RegressionTerms(
+    return RegressionTask(
         header=build_header(spec),
         regression=Regression(
             estimated=np.array(error.estimated, dtype=float),
@@ -68,9 +62,6 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         samples=spec.experiment.samples,
         target=error.target,
         energy=spec.limits.energy if error.target is None else None,
-    )
-    return RegressionTask(
-        terms=terms,
         alternating=solver.method == "alternating",
         tolerance=solver.tolerance if "tolerance" in solver.model_fields_set else _STRUCTURED_TOLERANCE,
         signal=RegressorSettings(

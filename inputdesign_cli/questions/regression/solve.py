@@ -26,7 +26,6 @@ from inputdesign_cli.outcome import Signal, Simulation, Solver
 from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
-from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.delivery import (
     check_claims,
     of_bounds,
@@ -42,30 +41,6 @@ _POINTS = 400
 
 
 KEY = "accuracy.mean_squared_error"
-
-
-@dataclass(frozen=True)
-class RegressionTerms:
-    """The question: the least energy for a `target` error, or the least error for an `energy`, trace R.
-
-    With `toeplitz` the regressors are delayed copies of one input.
-    """
-
-    header: Header
-    regression: Regression
-    toeplitz: bool
-    samples: int
-    target: float | None
-    energy: float | None
-
-    def free(self) -> tuple[Array, float]:
-        """Return the best moments R (n, n) of any structure, and the bound that proves them."""
-        if self.target is not None:
-            R = theory.least_energy(self.regression, self.target)
-            return R, theory.energy_bound(self.regression, self.target, R)
-        assert self.energy is not None
-        R = theory.least_error(self.regression, self.energy)
-        return R, theory.error_bound(self.regression, self.energy)
 
 
 @dataclass(frozen=True)
@@ -89,10 +64,10 @@ class MomentsDesign:
 
 
 def moments_outcome(
-    terms: RegressionTerms, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
+    task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
 ) -> out.Outcome:
     """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
-    regression, split, target, n = terms.regression, design.split, terms.target, terms.regression.n
+    regression, split, target, n = task.regression, design.split, task.target, task.regression.n
     unit, white = regression.error(np.eye(n)), None
     if target is not None:
         kind, value, of = "least_cost", design.energy, "energy"
@@ -102,28 +77,28 @@ def moments_outcome(
             energy = n * unit.variance / slack
             white = out.White(cost=energy, ratio=energy / value)
     else:
-        assert terms.energy is not None
+        assert task.energy is not None
         kind, value, of = "mean_squared_error", split.total, "mean_squared_error"
         changes = theory.error_sensitivity(regression, design.energy, split)
-        error = regression.error(np.eye(n) * (terms.energy / n)).total
+        error = regression.error(np.eye(n) * (task.energy / n)).total
         white = out.White(mean_squared_error=error, ratio=error / value)
     gap = abs(value - design.bound) / value
-    any_bound = terms.free()[1] if terms.toeplitz else design.bound
+    any_bound = task.free()[1] if task.toeplitz else design.bound
     objective = out.Objective(
         kind, value, lower_bound=design.bound, relative_gap=gap, any_structure_bound=any_bound
     )
     check_claims(of_bounds(objective, design.tolerance), "rescale the regressors, or state the weights anew")
     return out.Outcome(
-        title=terms.header.title,
+        title=task.header.title,
         status=proof_status(gap, design.tolerance),
         objective=objective,
         cost=design.energy,
-        samples=terms.samples,
+        samples=task.samples,
         mean_squared_error=out.MeanSquaredError(
             split.total, split.bias_squared, split.variance, target, others=asdict(split)
         ),
         moments=out.Moments(
-            structure="toeplitz" if terms.toeplitz else "free",
+            structure="toeplitz" if task.toeplitz else "free",
             estimated=regression.m,
             trace=design.energy,
             R=design.R,
@@ -144,9 +119,9 @@ def moments_outcome(
     )
 
 
-def error_curves(terms: RegressionTerms, design: MomentsDesign) -> ErrorCurves:
+def error_curves(task: RegressionTask, design: MomentsDesign) -> ErrorCurves:
     """Return squared bias and variance over the energy, beside the error of white regressors."""
-    regression = terms.regression
+    regression = task.regression
     energy = design.energy * np.geomspace(0.1, 10.0, _POINTS)
     white = regression.error(np.eye(regression.n) / regression.n)
     return ErrorCurves(
@@ -155,7 +130,7 @@ def error_curves(terms: RegressionTerms, design: MomentsDesign) -> ErrorCurves:
         variance=design.split.variance * design.energy / energy,
         white=white.bias_squared + white.variance / energy,
         design=(design.energy, design.split.total),
-        target=terms.target,
+        target=task.target,
     )
 
 
@@ -251,7 +226,7 @@ def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class RegressionTrial:
-    """The study: the true parameters, inputs to compare, and the noise, None where it is nominal."""
+    """The study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
 
     theta: Array
     runs: int
@@ -268,7 +243,7 @@ class RegressionTask:
     `alternating` and `tolerance` (the relative gap to be proved) concern Toeplitz moments.
     """
 
-    terms: RegressionTerms
+    task: RegressionTask
     alternating: bool
     tolerance: float
     signal: RegressorSettings
@@ -296,7 +271,7 @@ class RegressionTask:
                 hint="set experiment.samples",
                 key="experiment.samples",
             )
-        begun, regression, variance = time.perf_counter(), self.terms.regression, trial.variance
+        begun, regression, variance = time.perf_counter(), self.regression, trial.variance
         if trial.relative_std is not None:
             variance = float(trial.relative_std**2 * np.mean((record.Phi @ trial.theta) ** 2))
         regression = replace(regression, variance=regression.variance if variance is None else variance)
@@ -313,29 +288,37 @@ class RegressionTask:
             Phi = contending_regressors(
                 name,
                 record.channels.shape,
-                delayed=regression.n if self.terms.toeplitz else None,
+                delayed=regression.n if self.toeplitz else None,
                 energy=float(np.sum(record.Phi**2)),
                 rng=np.random.default_rng(drawn),
             )
             inputs[name] = tried(Phi, noise)
         return with_study(results, Simulation(trial.runs, trial.seed, inputs), begun)
 
+    def free(self) -> tuple[Array, float]:
+        """Return the best moments R (n, n) of any structure, and the bound that proves them."""
+        if self.target is not None:
+            R = theory.least_energy(self.regression, self.target)
+            return R, theory.energy_bound(self.regression, self.target, R)
+        assert self.energy is not None
+        R = theory.least_error(self.regression, self.energy)
+        return R, theory.error_bound(self.regression, self.energy)
+
     def _solved(self) -> tuple[RegressorRecord | None, Results]:
         started = time.perf_counter()
-        terms = self.terms
-        if terms.toeplitz:
+        if self.toeplitz:
             design = self._toeplitz()
         else:
-            R, bound = terms.free()
-            split = terms.regression.error(R)
+            R, bound = self.free()
+            split = self.regression.error(R)
             design = MomentsDesign(R, None, split, bound, 1e-9, Solver("closed_form"))
         solved = time.perf_counter()
-        record = realise_regressors(self.signal, terms.regression, design.R, design.rho, terms.target)
+        record = realise_regressors(self.signal, self.regression, design.R, design.rho, self.target)
         signal = None if record is None else record.signal
-        outcome = moments_outcome(terms, design, signal, timing(started, solved))
-        units, tables = terms.header.units, dict[str, Table]()
-        curves: dict[str, Curves] = {"error": error_curves(terms, design)}
-        moments = MomentsCurves(design.R, terms.regression.m)
+        outcome = moments_outcome(self, design, signal, timing(started, solved))
+        units, tables = self.header.units, dict[str, Table]()
+        curves: dict[str, Curves] = {"error": error_curves(self, design)}
+        moments = MomentsCurves(design.R, self.regression.m)
         if record is not None:
             tables["signal"], curves["signal"] = signal_results(units, record.channels)
             if record.lines is not None:
@@ -344,22 +327,21 @@ class RegressionTask:
                 nyquist = np.pi / units.sample_time
                 moments = replace(moments, line_frequency=w, line_power=power, nyquist=nyquist)
         curves["moments"] = moments
-        return record, results_of(terms.header, outcome, tables, curves)
+        return record, results_of(self.header, outcome, tables, curves)
 
     def _toeplitz(self) -> MomentsDesign:
-        terms = self.terms
         try:
             found = design_toeplitz(
-                terms.regression,
-                target=terms.target,
-                energy=terms.energy,
+                self.regression,
+                target=self.target,
+                energy=self.energy,
                 tolerance=self.tolerance,
                 rng=np.random.default_rng(self.signal.seed),
                 alternating=self.alternating,
             )
         except OutOfReachError as error:
-            assert terms.target is not None
-            raise _out_of_reach(terms.regression, terms.target, error) from error
+            assert self.target is not None
+            raise _out_of_reach(self.regression, self.target, error) from error
         how: dict[str, object] = {"starts": found.starts, "solves": found.solves, "nodes": found.nodes}
         how |= {"assumed_smallest_eigenvalue": found.assumed} if found.assumed else {}
         method = "alternating" if self.alternating else "sequential_convex"
