@@ -65,7 +65,7 @@ class SpectrumTask(ABC):
         return simulate(self.simulation, delivered, executor)
 
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
-        """Return the errors that are asked about, or r_u of all entries of G, and whether one is asked about."""
+        """Return the errors that are asked about, or r_u of all entries of G, and whether they are."""
         stated = model_errors(asked)
         return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
 
