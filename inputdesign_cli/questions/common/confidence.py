@@ -149,14 +149,12 @@ def covered(coverage: Coverage) -> Reported:
     )
 
 
-def too_few(coverage: Coverage, probability: float) -> bool:
-    """Whether fewer runs than asked keep r_adm, by more than chance."""
-    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[1] < probability)
-
-
-def too_many(coverage: Coverage, probability: float) -> bool:
-    """Whether more of them do."""
-    return bool(coverage.runs and binomial_limits(coverage.kept, coverage.runs)[0] > probability)
+def beyond_chance(coverage: Coverage, probability: float) -> int:
+    """Return -1 if fewer runs than asked keep r_adm, 1 if more, by more than chance, and else 0."""
+    if not coverage.runs:
+        return 0
+    least, most = binomial_limits(coverage.kept, coverage.runs)
+    return int(least > probability) - int(most < probability)
 
 
 def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:

@@ -17,10 +17,9 @@ from inputdesign_cli.questions.common.confidence import (
     Confidence,
     SimulatedEstimates,
     Simulator,
+    beyond_chance,
     bounded_errors,
     settled_alpha,
-    too_few,
-    too_many,
 )
 from inputdesign_cli.questions.common.record import Made, RecordRequest, as_long, redrawn, worst_ratio
 from inputdesign_cli.questions.least_cost.outcome import Designed
@@ -62,7 +61,7 @@ class ExactConfidence:
             corrected = simulated.corrected(calibration, errors, done.information)
             if abs(corrected.excess / before - 1.0) <= _CORRECTED:
                 coverage, asked = self._coverage(done, done.information, simulated), calibration.probability
-                if sets > 1 or not (too_few(coverage, asked) or too_many(coverage, asked)):
+                if sets > 1 or not beyond_chance(coverage, asked):
                     break
                 sets = _SETS
                 corrected = replace(simulated, sets=sets).corrected(calibration, errors, done.information)
@@ -100,7 +99,7 @@ class ExactConfidence:
             needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED) and sets == 1:
                 coverage = self.of_record(done, made.record, information)
-                if too_few(coverage, self.calibration.probability):
+                if beyond_chance(coverage, self.calibration.probability) < 0:
                     sets = _SETS
                     needed = self._needed(done, made.record, information, sets)
             if needed <= alpha * (1.0 + SETTLED):
