@@ -182,13 +182,13 @@ class ResponseTask:
         if terms.goal == "cost" and self.record.meets:
             scale = min(worst, float(np.sqrt(problem.alike(design.powers / problem.needed))))
             if scale * beyond > 1.0 + _ROUNDING:
-                length, times = len(samples), rounded_up(scale * beyond, 4)
+                length, factor = len(samples), rounded_up(scale * beyond, 4)
                 more = int(np.ceil(length * (scale * beyond) ** 2))
                 best = (
-                    f"meets the accuracy: the one of the lowest peaks would have to be {times} times as large"
+                    f"meets the accuracy: that of the lowest peaks would have to be {factor} times as large"
                 )
                 hint = f"about {more} samples do ({self.record.units.length(more)}); raise the limits, admit "
-                hint += f"{times} times as much, or write objective: shortest_experiment"
+                hint += f"{factor} times as much, or write objective: shortest_experiment"
                 raise no_record(self.record, length, f"{best} as they allow", hint)
         elif self.given is None:
             scale = 1.0 / max(beyond, 1.0)

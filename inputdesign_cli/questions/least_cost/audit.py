@@ -192,7 +192,7 @@ class _Reread:
     @cached_property
     def _excitation(self) -> list[tuple[Array, ComplexArray]]:
         """Frequencies (n,) and roots (n, r, r) of the power at each; their powers add up."""
-        entry, unit = self.written, self.done.units.frequency
+        entry, unit = self.written, self.done.header.units.frequency
         r = self._experiment.inputs
         if entry.frequencies is not None and entry.powers is not None:
             return [(entry.frequencies * unit, _root(entry.powers.reshape(-1, r, r)))]

@@ -60,12 +60,7 @@ class Designed:
         """The design of the answer."""
         return self.answer.design
 
-    @property
-    def units(self) -> Units:
-        """The units of the spec."""
-        return self.header.units
-
-    @property
+    @cached_property
     def problem(self) -> Problem:
         """The problem on the basis of the answer, which may have grown."""
         return self.design.problem.on(self.design.result.basis)
@@ -99,13 +94,13 @@ def design_outcome(done: Designed) -> Outcome:
         power=powers(problem, found.basis, found.x),
         limits=(*_power_limits(done), *_density_limits(done)) or None,
         information=information_of(done.experiment, done.information),
-        spectrum=described_spectrum(done.units, found.basis, found.x),
+        spectrum=described_spectrum(done.header.units, found.basis, found.x),
         baseline=out.Baseline(_white(done, cost)),
         solver=answer.solver,
     )
     if answer.status != "nothing_needed":
         error, listed = accuracy_of(
-            done.units, done.confidence, done.asked, done.information, found.active_frequencies
+            done.header.units, done.confidence, done.asked, done.information, found.active_frequencies
         )
         outcome = replace(outcome, model_error=error, requirements=listed)
     return outcome.saying(_findings(done))
@@ -270,7 +265,7 @@ def _density_limits(done: Designed) -> Iterator[LimitUse]:
             tightest.ratio >= 1.0 - _BINDS,
             kind="max" if density.upper else "min",
             worst_ratio=tightest.ratio,
-            frequency=tightest.place.frequency / done.units.frequency,
+            frequency=tightest.place.frequency / done.header.units.frequency,
         )
 
 
@@ -282,11 +277,11 @@ def _findings(done: Designed) -> list[Finding]:
     excited = powers(problem, found.basis, found.x).excitation or ()
     findings = [*designs.inputs_without_power(excited), *designs.short_experiment(done.experiment)]
     findings += designs.sign_open(problem.requirements)
-    if done.units.closed_loop and not found.basis.has_density:
+    if done.header.units.closed_loop and not found.basis.has_density:
         lines, powers_of_lines = found.basis.lines(found.x)
         # The price of power one, even over the channels.
         prices = [matrices(problem.price.density(w)) for w in (lines, problem.gradients.grid)]
         costs, all_costs = (np.einsum("naa->n", price).real / price.shape[1] for price in prices)
         power = np.einsum("naa->n", powers_of_lines).real
-        findings += designs.almost_free(done.units, lines, power, costs, float(all_costs.max()))
+        findings += designs.almost_free(done.header.units, lines, power, costs, float(all_costs.max()))
     return findings

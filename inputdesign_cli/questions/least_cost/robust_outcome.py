@@ -203,7 +203,7 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
     binding = [place for place in np.lexsort((-shares, -weight)).tolist() if taking_part[place]]
     support = sum(place > 0 for place in binding)
     floors = [Floor.at((*one.requirements, *one.side)) for one in problem.scenarios[1:]]
-    found = plants_kept(done.units, plants, kept, at_each, binding, floors)
+    found = plants_kept(done.header.units, plants, kept, at_each, binding, floors)
     entry, promised = replace(found.entry, support=support), None
     if plants.paid == "worst" and problem.goal == "cost":
         costs, promised = costs_of(done, problem.basis, done.design.result.x), done.design.result.objective
@@ -371,7 +371,7 @@ def fan_curves(
     done: Designed, numbers: Sequence[int], active: Sequence[int]
 ) -> tuple[Table, FanCurves] | None:
     """Return fan.csv and its figure, r_u / r_adm over the plants; None if no model error is bounded."""
-    problem, units = done.problem, done.units
+    problem, units = done.problem, done.header.units
     bounded = [model_errors((*one.requirements, *one.side)) for one in problem.scenarios]
     if not bounded[0]:
         return None

@@ -26,6 +26,7 @@ from inputdesign_cli.outcome import Signal, Simulation, Solver
 from inputdesign_cli.outcome.curves import Curves, ErrorCurves, MomentsCurves
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import TheoryOfError, TriedInput
+from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.delivery import (
     check_claims,
     of_bounds,
@@ -238,12 +239,17 @@ class RegressionTrial:
 
 @dataclass(frozen=True)
 class RegressionTask:
-    """A design of moments, and its study where the spec has the true parameters.
+    """The least energy for a `target` error, or the least error for an `energy`, trace R, and its study.
 
-    `alternating` and `tolerance` (the relative gap to be proved) concern Toeplitz moments.
+    Toeplitz moments are those of delayed copies of one input, proved to a relative gap of `tolerance`.
     """
 
-    task: RegressionTask
+    header: Header
+    regression: Regression
+    toeplitz: bool
+    samples: int
+    target: float | None
+    energy: float | None
     alternating: bool
     tolerance: float
     signal: RegressorSettings
