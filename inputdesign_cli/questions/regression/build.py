@@ -13,7 +13,7 @@ from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.questions.building.demand import check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.unhandled import ONE_PLANT, check_compared, refuse_unhandled
-from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial, RegressorSettings
+from inputdesign_cli.questions.regression.solve import KEY, RegressionTask, RegressionTrial
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
@@ -64,9 +64,10 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         energy=spec.limits.energy if error.target is None else None,
         alternating=solver.method == "alternating",
         tolerance=solver.tolerance if "tolerance" in solver.model_fields_set else _STRUCTURED_TOLERANCE,
-        signal=RegressorSettings(
-            spec.signal_samples, signal.periods, signal.start or "steady", signal.seed or 0
-        ),
+        record_samples=spec.signal_samples,
+        periods=signal.periods,
+        start=signal.start or "steady",
+        seed=signal.seed or 0,
         trial=_trial(spec),
     )
 

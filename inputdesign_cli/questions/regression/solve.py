@@ -156,16 +156,6 @@ def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Es
 
 
 @dataclass(frozen=True)
-class RegressorSettings:
-    """The length of the record, its number of equal periods (None: free), its past, and the seed."""
-
-    samples: int
-    periods: int | None
-    start: Start
-    seed: int
-
-
-@dataclass(frozen=True)
 class RegressorRecord:
     """Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their description.
 
@@ -178,15 +168,13 @@ class RegressorRecord:
     lines: tuple[Array, Array] | None = None
 
 
-def realise_regressors(
-    settings: RegressorSettings, regression: Regression, R: Array, rho: Array | None, target: float | None
-) -> RegressorRecord | None:
-    """Return the record with moments R (n, n) summed over the samples; None when it is too short.
+def realise_regressors(task: RegressionTask, design: MomentsDesign) -> RegressorRecord | None:
+    """Return the record with the moments summed over the samples; None when it is too short.
 
-    `rho` (n,) are autocorrelations of one input, of which the regressors are delayed copies; None: free ones.
-    The `target` is the error that is allowed, if any. It raises `SpecError` (`bad-period`).
+    Regressors are free, or delayed copies of one input. It raises `SpecError` (`bad-period`).
     """
-    samples, least, periods = settings.samples, rank(R) if rho is None else regression.n, settings.periods
+    regression, R, rho = task.regression, design.R, design.rho
+    samples, least, periods = task.record_samples, rank(R) if rho is None else regression.n, task.periods
     if samples < least:
         return None
     if periods is not None and (samples % periods or samples // periods < least):
@@ -202,12 +190,12 @@ def realise_regressors(
         Phi = channels = free_regressors(R, samples, period)
     else:
         period = period or samples
-        found = design_periodic(regression, rho, float(np.trace(R)), period, target=target)
+        found = design_periodic(regression, rho, float(np.trace(R)), period, target=task.target)
         power = found.energy / (least * samples)
-        u = periodic_input(found.shares, power, samples, period, np.random.default_rng(settings.seed))
-        Phi, channels = delayed_regressors(u, least, settings.start), u[:, None]
+        u = periodic_input(found.shares, power, samples, period, np.random.default_rng(task.seed))
+        Phi, channels = delayed_regressors(u, least, task.start), u[:, None]
         at_rest = _attained(regression, delayed_regressors(u, least, "zero"), R)
-        details = {"start": settings.start, "on_grid": found.exact, "from_rest": at_rest}
+        details = {"start": task.start, "on_grid": found.exact, "from_rest": at_rest}
         used = np.flatnonzero(found.shares > 0.0)
         lines = 2.0 * np.pi * used / period, found.shares[used] * power
     attained = _attained(regression, Phi, R)
@@ -241,7 +229,8 @@ class RegressionTrial:
 class RegressionTask:
     """The least energy for a `target` error, or the least error for an `energy`, trace R, and its study.
 
-    Toeplitz moments are those of delayed copies of one input, proved to a relative gap of `tolerance`.
+    Toeplitz moments belong to delayed copies of one input, and are proved to a relative gap of `tolerance`.
+    The record has a number of equal `periods` (None: free), and a past by `start`.
     """
 
     header: Header
@@ -252,7 +241,10 @@ class RegressionTask:
     energy: float | None
     alternating: bool
     tolerance: float
-    signal: RegressorSettings
+    record_samples: int
+    periods: int | None
+    start: Start
+    seed: int
     trial: RegressionTrial | None
 
     def solve(self) -> Results:
@@ -273,7 +265,7 @@ class RegressionTask:
         if record is None:
             raise bad_spec(
                 "wrong-shape",
-                f"{self.signal.samples} samples are too few to realise these moments",
+                f"{self.record_samples} samples are too few to realise these moments",
                 hint="set experiment.samples",
                 key="experiment.samples",
             )
@@ -319,7 +311,7 @@ class RegressionTask:
             split = self.regression.error(R)
             design = MomentsDesign(R, None, split, bound, 1e-9, Solver("closed_form"))
         solved = time.perf_counter()
-        record = realise_regressors(self.signal, self.regression, design.R, design.rho, self.target)
+        record = realise_regressors(self, design)
         signal = None if record is None else record.signal
         outcome = moments_outcome(self, design, signal, timing(started, solved))
         units, tables = self.header.units, dict[str, Table]()
@@ -342,7 +334,7 @@ class RegressionTask:
                 target=self.target,
                 energy=self.energy,
                 tolerance=self.tolerance,
-                rng=np.random.default_rng(self.signal.seed),
+                rng=np.random.default_rng(self.seed),
                 alternating=self.alternating,
             )
         except OutOfReachError as error:
