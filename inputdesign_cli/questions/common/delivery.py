@@ -20,6 +20,8 @@ from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Searched
 from inputdesign_cli.outcome.units import Header
 
+KINDS = {"cost": "least_cost", "factor": "accuracy_factor", "samples": "shortest_experiment"}
+"""The kind of objective in the outcome, by the goal of a design."""
 # A gap up to this many tolerances is almost optimal.
 ALMOST = 100.0
 _ROUNDING = 1e-6

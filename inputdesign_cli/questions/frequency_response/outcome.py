@@ -15,7 +15,6 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum, weights_of
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.response_lines import Goal, ResponseDesign, ResponseLines, ResponseProblem
-from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept
 from inputdesign_cli.findings.frequency_responses import noise_leaks, record_of_whole_periods, start_shifts
 from inputdesign_cli.identification.periodic_response import Periods
@@ -29,6 +28,7 @@ from inputdesign_cli.outcome.text_formats import csv_columns, csv_text, json_tex
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.delivery import (
     APART,
+    KINDS,
     check_claims,
     of_bounds,
     of_cost,
@@ -45,11 +45,6 @@ from inputdesign_cli.signal.selection import Record
 KEY = "accuracy.frequency_response"
 
 
-_KINDS: dict[Goal, str] = {
-    "cost": "least_cost",
-    "factor": "accuracy_factor",
-    "samples": "shortest_experiment",
-}
 _ROUNDING = 1e-9
 _CHANCE = 0.05
 
@@ -172,6 +167,16 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
     met = "met" if ratios[worst] <= 1.0 + _ROUNDING else "missed"
     objective, baseline = _objective(terms, plan) if designed else (None, None)
     powers = _matrices(plan.powers) if units.inputs > 1 else plan.powers[:, 0]
+    # What a user should know before applying the record.
+    found = start_shifts(plan.shift)
+    if terms.goal in ("cost", "samples"):
+        found += noise_leaks(plan.record.worst_ratio)
+    if terms.goal != "samples":
+        times = terms.periods.blocks * terms.periods.each(plan.length)
+        found += record_of_whole_periods(plan.length, terms.asked, times, terms.grid.period)
+    if terms.goal == "given":
+        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
+        found += limits_not_kept(stated, plan.length, power, None)
     return out.Outcome(
         title=terms.header.title,
         status=proof_status(plan.design.gap, terms.tolerance) if designed else met,
@@ -194,7 +199,7 @@ def response_outcome(terms: ResponseTerms, plan: Planned, timing: dict[str, floa
         ),
         solver=out.Solver("lines", terms.tolerance) if designed else None,
         timing_s=timing,
-    ).saying(_findings(terms, plan, power))
+    ).saying(found)
 
 
 def _objective(terms: ResponseTerms, plan: Planned) -> tuple[out.Objective, out.Baseline]:
@@ -214,22 +219,8 @@ def _objective(terms: ResponseTerms, plan: Planned) -> tuple[out.Objective, out.
         else:
             value, bound, white = value**-0.5, bound**-0.5, out.White(value=float(within**-0.5))
     gap = abs(value - bound) / value
-    kind = _KINDS[terms.goal]
+    kind = KINDS[terms.goal]
     return out.Objective(kind, value, lower_bound=min(bound, value), relative_gap=gap), out.Baseline(white)
-
-
-def _findings(terms: ResponseTerms, plan: Planned, power: out.Powers) -> list[Finding]:
-    """Return what a user should know before applying the record."""
-    found = start_shifts(plan.shift)
-    if terms.goal in ("cost", "samples"):
-        found += noise_leaks(plan.record.worst_ratio)
-    if terms.goal != "samples":
-        times = terms.periods.blocks * terms.periods.each(plan.length)
-        found += record_of_whole_periods(plan.length, terms.asked, times, terms.grid.period)
-    if terms.goal == "given":
-        stated = StatedLimits(terms.limits, None, None, None, terms.most_samples)
-        found += limits_not_kept(stated, plan.length, power, None)
-    return found
 
 
 def response_results(

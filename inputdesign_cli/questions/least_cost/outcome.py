@@ -21,13 +21,13 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.outcome import LimitUse, ModelError, Outcome, RequirementMet
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.confidence import Confidence
+from inputdesign_cli.questions.common.delivery import KINDS
 from inputdesign_cli.questions.common.robust import Plants, delivered
 from inputdesign_cli.questions.common.spectrum import described_spectrum, distinct
 from inputdesign_cli.spectrum import Basis, flat_basis, matrices
 
 # A limit binds when the design uses all but this share of it.
 _BINDS = 1e-6
-_KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "accuracy_factor"}
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ def _objective(design: Design) -> out.Objective:
     if goal == "factor":
         value, bound, any_bound = (float(np.sqrt(v)) for v in (value, bound, any_bound))
     return out.Objective(
-        _KINDS[goal],
+        KINDS[goal],
         value,
         lower_bound=bound,
         relative_gap=abs(value - bound) / value if value > 0 else 0.0,
