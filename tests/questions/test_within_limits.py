@@ -105,16 +105,6 @@ def test_several_channels_name_the_entry_and_the_input():
     )
 
 
-@pytest.mark.slow
-def test_the_power_that_one_channel_needs_is_enough():
-    diagnostic = refused(TWO + ERROR.format(0.3))
-    needed = float(diagnostic.message.split("needs input 2 power >= ")[1].split(",")[0])
-    raised = TWO.replace("0.02]", f"{needed * (1 + 1e-4):.9g}]")
-    assert solve(parse_spec(raised + ERROR.format(0.3))).result["status"] == "optimal"
-    lowered = TWO.replace("0.02]", f"{needed * (1 - 1e-3):.9g}]")
-    refused(lowered + ERROR.format(0.3))
-
-
 def test_an_experiment_that_is_too_short_says_what_it_buys():
     text = FIRST + "objective: shortest_experiment\n" + ERROR.format(0.01)
     limits = "limits: {{input_power: 0.2, samples: {}}}\n"

@@ -40,7 +40,7 @@ from inputdesign_cli.questions.exploration.outcome import (
     structure_curves,
     validation_of,
 )
-from inputdesign_cli.questions.frequency_response.measured import silent_entry
+from inputdesign_cli.questions.frequency_response.measure import silent_entry
 from inputdesign_cli.records import Preparation, Record, read_logs
 
 # Where more shifts appear, once these are left out so often, the plant is none of the models tried.
