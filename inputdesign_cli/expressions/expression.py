@@ -96,9 +96,7 @@ class Expression:
         """Its value and its gradient (m,) where the `symbols` have these `values` (m,).
 
         Both are not a number where it is not defined, as one over zero or the root of a negative number.
-
-        Raises:
-            KeyError: a name is not among the symbols.
+        Raises `KeyError`: a name is not among the symbols.
         """
         here = evaluated((self,), symbols, values)
         return float(here.values[0]), here.gradients[0]
@@ -107,8 +105,7 @@ class Expression:
 def evaluated(expressions: tuple[Expression, ...], symbols: Sequence[str], values: Array) -> Evaluated:
     """What expressions are worth where `symbols` have `values` (m,); what they share is worked out once.
 
-    Raises:
-        KeyError: a name is not among the symbols.
+    Raises `KeyError`: a name is not among the symbols.
     """
     steps, places = _together(expressions)
     return worked_through(steps, places, symbols, values)

@@ -138,10 +138,8 @@ def read_tree(
 ) -> Tree:
     """Return the plain data of a spec with included files and overrides, not yet checked.
 
-    A file that lies outside `confine` is a diagnostic of the tree.
-
-    Raises:
-        SpecError: The text is no mapping in YAML, or a file cannot be included.
+    A file that lies outside `confine` is a diagnostic of the tree. Raises `SpecError`: The text is no mapping
+    in YAML, or a file cannot be included.
     """
     tree = read(text, file)
     check_mapping(tree)

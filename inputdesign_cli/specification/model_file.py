@@ -23,9 +23,8 @@ _SAME = 1e-6
 def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
     """Return the block `estimate` of a file that the spec names at `key`; errors show nothing else of it.
 
-    Raises:
-        SpecError: `bad-model-file`; `wrong-estimate`, its data have another sample time than the spec;
-            the file cannot be read.
+    Raises `SpecError`: `bad-model-file`; `wrong-estimate`, its data have another sample time than the spec;
+    the file cannot be read.
     """
     try:
         text = read_text(spec.resolve_path(name))

@@ -133,8 +133,7 @@ def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete
 def _in_delays(top: list[float], bottom: list[float]) -> Entry:
     """In q^-1, ascending, and monic; poles at 0 are delays and no coefficients to be estimated.
 
-    Raises:
-        SpecError: `improper-transfer`.
+    Raises `SpecError`: `improper-transfer`.
     """
     above, below = (np.trim_zeros(np.array(part, dtype=float), "f") for part in (top, bottom))
     if above.size > below.size:

@@ -48,8 +48,7 @@ class SpecTemplate:
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
         """Return the plain data of one variant, without the `sweep` block; only the overrides are checked.
 
-        Raises:
-            SpecError: An override that cannot be applied.
+        Raises `SpecError`: An override that cannot be applied.
         """
         tree = Tree(copy.deepcopy(self.data), Places())
         apply_overrides(tree, [*overrides, "sweep=null"])
@@ -68,8 +67,7 @@ class SpecTemplate:
     def sweep(self) -> Sweep | None:
         """Return the checked `sweep` block; None if the spec has none.
 
-        Raises:
-            SpecError: With the place of every error in the block.
+        Raises `SpecError`: With the place of every error in the block.
         """
         if "sweep" not in self.data:
             return None
@@ -110,8 +108,7 @@ def read_template(
 def same_content(one: str, other: str) -> bool:
     """Whether two texts of a spec agree, apart from comments, layout and order of keys.
 
-    Raises:
-        SpecError: One of them is not YAML.
+    Raises `SpecError`: One of them is not YAML.
     """
     first, second = (read(text, "spec.yaml").data for text in (one, other))
     return fingerprint(first) == fingerprint(second)

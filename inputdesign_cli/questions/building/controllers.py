@@ -124,8 +124,7 @@ def tuned(process: Process, tuning: Tuning) -> Pid:
 def process_of(spec: Spec) -> Process:
     """Return gain, time constant and dead time of the nominal plant; the half rule shares a second lag.
 
-    Raises:
-        SpecError: `not-supported`.
+    Raises `SpecError`: `not-supported`.
     """
     plant = spec.plant
 

@@ -37,10 +37,8 @@ def check_model(spec: Spec, model: Model) -> None:
 def check_effects(spec: Spec, experiment: Experiment) -> None:
     """Refuse plants with a parameter that changes G by no more than rounding.
 
-    The change is a shift by the whole value; a parameter that is zero must have some effect on G.
-
-    Raises:
-        SpecError: `without-effect`.
+    The change is a shift by the whole value; a parameter that is zero must have some effect on G. Raises
+    `SpecError`: `without-effect`.
     """
     model, (lo, hi) = experiment.model, experiment.band
     w = np.union1d(np.linspace(lo, hi, _PROBES + 1)[1:-1], np.geomspace(max(lo, 1e-4 * hi), hi, _PROBES)[:-1])
@@ -64,9 +62,7 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
     """Refuse convex designs that do not fit into memory, or whose first rounds exceed the time limit.
 
     A program has a matrix inequality of the order of the information matrix for each frequency that binds.
-
-    Raises:
-        SpecError: `too-large`.
+    Raises `SpecError`: `too-large`.
     """
     size = experiment.size
     if basis.size * size**2 * 8 > _MOST_BYTES:
@@ -96,8 +92,7 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
 def check_record(spec: Spec, parameters: int) -> None:
     """Refuse records that are too long; without a section `signal` they are left out later.
 
-    Raises:
-        SpecError: `too-large`.
+    Raises `SpecError`: `too-large`.
     """
     room = longest_record(parameters, spec.plant.outputs)
     samples = spec.signal_samples

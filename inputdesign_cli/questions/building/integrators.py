@@ -33,10 +33,7 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     """Return the experiment with a finite information matrix: its band starts at the lowest line.
 
     Near a pole at z = 1 that is not in a loop, the gradient of the prediction has no bound, and neither has
-    the information of any power there.
-
-    Raises:
-        SpecError: `infinite-information`.
+    the information of any power there. Raises `SpecError`: `infinite-information`.
     """
     source = experiment.model if experiment.loop is None else experiment.loop
     if not experiment.model.continuous:

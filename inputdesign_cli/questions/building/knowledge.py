@@ -49,12 +49,9 @@ class UncertainPlant:
     def spread(self) -> Knowledge:
         """How far the parameters spread around the nominal ones (k,), in columns (k, m).
 
-        They are even over the box of all intervals, or normal with the covariance columns columns^T.
-
-        Raises:
-            SpecError: `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, or
-                `wrong-estimate`.
-            DataError: a record cannot be used.
+        They are even over the box of all intervals, or normal with the covariance columns columns^T. Raises
+        `SpecError`: `unknown-parameter`, `wrong-shape`, `bad-interval`, `not-positive-definite`, or
+        `wrong-estimate`. Or `DataError`: a record cannot be used.
         """
         if self.stated.intervals is not None:
             return self._box(self.stated.intervals)
@@ -90,8 +87,7 @@ class UncertainPlant:
     def moved(self, values: Mapping[str, float], key: str) -> Array:
         """Return the nominal parameters (k,) with other values of some of them.
 
-        Raises:
-            SpecError: `unknown-parameter`.
+        Raises `SpecError`: `unknown-parameter`.
         """
         names, theta = list(self.nominal.names), self.nominal.theta.copy()
         for name, value in values.items():
@@ -158,8 +154,7 @@ class UncertainPlant:
 def build_knowledge(spec: Spec, confidence: float = POSSIBLE) -> Knowledge | None:
     """Return the region of the plants that are possible; None if it is not stated, or plants are listed.
 
-    Raises:
-        SpecError, DataError: see `UncertainPlant.spread`.
+    Raises `SpecError` or `DataError`: see `UncertainPlant.spread`.
     """
     stated = spec.uncertainty
     if stated is None or isinstance(stated.scenarios, tuple):

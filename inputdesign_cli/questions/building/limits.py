@@ -54,8 +54,7 @@ def implied_limits(spec: Spec) -> list[PowerLimit]:
 def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
     """Return the bounds on the density of the excitation at every frequency of its band.
 
-    Raises:
-        SpecError, DataError: a curve cannot be used, or the lower bound crosses the upper one.
+    Raises `SpecError` or `DataError`: a curve cannot be used, or the lower bound crosses the upper one.
     """
     stated = spec.limits.spectrum
     if stated is None:
@@ -94,8 +93,7 @@ def _level(
 ) -> tuple[Callable[[Array], Array], Array, ComplexArray, float | None]:
     """Return the level over frequency in rad/sample, its kinks, points of fast change, and its zero.
 
-    Raises:
-        SpecError: `bad-limit`, it is infinite somewhere in the band.
+    Raises `SpecError`: `bad-limit`, it is infinite somewhere in the band.
     """
     nowhere, smooth = np.zeros(0), np.zeros(0, dtype=complex)
     if isinstance(curve, float | int):

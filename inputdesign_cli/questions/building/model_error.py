@@ -204,8 +204,7 @@ def _admissible_of(
 ) -> AdmissibleError:
     """Return r_adm of a model; of a scenario its own down to a floor, or the nominal one (`uncertainty`).
 
-    Raises:
-        SpecError: see `build_model_errors`.
+    Raises `SpecError`: see `build_model_errors`.
     """
     stated = spec.uncertainty
     if nominal is None or stated is None:
@@ -237,8 +236,7 @@ def _admissible(
 def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> Table:
     """Return one column of a file, positive over the whole `band` of the section that has `key`.
 
-    Raises:
-        DataError: the file cannot be read, or does not have the column on the whole band (`bad-table`).
+    Raises `DataError`: the file cannot be read, or does not have the column on the whole band (`bad-table`).
     """
     units = build_units(spec)
     columns = read_frequency_table(spec, name, [column], key)

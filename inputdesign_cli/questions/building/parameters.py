@@ -39,8 +39,7 @@ def reparametrised(
 ) -> Model:
     """Return the model in the named parameters of the spec, without the known ones.
 
-    Raises:
-        SpecError: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
+    Raises `SpecError`: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
     """
     named, known = plant.named_parameters, (*(plant.known or ()), *(spec.noise.known or ()))
     if not named and not known:
@@ -118,8 +117,7 @@ def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
     """Return a matrix over some named parameters as one (k, k) over all `known`; no names stand for all.
 
-    Raises:
-        SpecError: `unknown-parameter` or `wrong-shape`.
+    Raises `SpecError`: `unknown-parameter` or `wrong-shape`.
     """
     for name in names or ():
         check_known(spec, known, name, key)

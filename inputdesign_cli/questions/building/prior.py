@@ -27,8 +27,7 @@ class StatedPrior:
     def over(self, spec: Spec, known: Sequence[str]) -> Array:
         """Return the information (k, k) about all parameters of the model.
 
-        Raises:
-            SpecError: it does not fit them.
+        Raises `SpecError`: it does not fit them.
         """
         return embedded(spec, known, self.matrix, self.names, PRIOR)
 
@@ -36,8 +35,7 @@ class StatedPrior:
 def stated_prior(spec: Spec) -> StatedPrior | None:
     """Return the prior of the spec, or of the model file that it names; None for a record, or no prior.
 
-    Raises:
-        SpecError: `bad-model-file`.
+    Raises `SpecError`: `bad-model-file`.
     """
     prior = spec.experiment.prior
     if prior is None:
@@ -54,8 +52,7 @@ def stated_prior(spec: Spec) -> StatedPrior | None:
 def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
     """Return the prior as an estimate, with nominal values of other parameters; None without values.
 
-    Raises:
-        SpecError: it does not fit the parameters; `bad-model-file`.
+    Raises `SpecError`: it does not fit the parameters; `bad-model-file`.
     """
     stated = stated_prior(spec)
     if stated is None or stated.values is None:
@@ -67,8 +64,7 @@ def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
 def inverse(covariance: Array) -> Array:
     """Return the inverse of a covariance or information matrix (k, k), by way of correlations.
 
-    Raises:
-        LinAlgError: it is singular.
+    Raises `LinAlgError`: it is singular.
     """
     scale = np.sqrt(np.diag(covariance))
     if not np.all(scale > 0.0):

@@ -67,8 +67,7 @@ def build_requirements(
 def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
     """Return the maker of `accuracy.criterion`, of the parameters or of their relative errors.
 
-    Raises:
-        SpecError: `zero-parameter` when a relative error of a parameter that is zero is asked for.
+    Raises `SpecError`: `zero-parameter` when a relative error of a parameter that is zero is asked for.
     """
     letter = spec.accuracy.criterion
     if letter is None:
@@ -94,8 +93,7 @@ def build_asked(
 ) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
     """Return the makers of the goal of a design, and of the requirements besides a criterion.
 
-    Raises:
-        SpecError, DataError: see `build_requirements` and `build_criterion`.
+    Raises `SpecError` or `DataError`: see `build_requirements` and `build_criterion`.
     """
     requirements = build_requirements(spec, experiment, nominal)
     criterion = build_criterion(spec, experiment)

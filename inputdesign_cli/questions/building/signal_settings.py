@@ -205,12 +205,11 @@ Fault = tuple[str, str, str, str]
 def check_signal(spec: Spec) -> None:
     """Refuse settings that no record can have.
 
-    Raises:
-        SpecError: `conflicting-keys` when the samples are no whole number of periods of held values, or
-            the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few
-            levels, and for ramps between levels without a limit on moves; `out-of-range`;
-            `coarse-converter` when a limit is below the converter's step;
-            `no-sample-rate` for a WAV file of a sampling rate that is not a whole number of hertz.
+    Raises `SpecError`: `conflicting-keys` when the samples are no whole number of periods of held values, or
+    the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few levels, and
+    for ramps between levels without a limit on moves; `out-of-range`; `coarse-converter` when a limit is
+    below the converter's step; `no-sample-rate` for a WAV file of a sampling rate that is not a whole number
+    of hertz.
     """
     settings = build_signal_settings(spec)
     fixed = spec.goal != "shortest_experiment" or spec.signal.samples is not None

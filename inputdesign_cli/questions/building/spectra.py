@@ -143,11 +143,9 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
     """Return the spectrum of `r` inputs in a table, and its coefficients.
 
     Columns phi, or phi_11, phi_12_re, phi_12_im, phi_22, .. are a density, linear in between. Columns power,
-    or power_11, .. are the powers of sinusoids at these frequencies, their mean squares.
-
-    Raises:
-        DataError: the file cannot be read, or holds no spectrum (`bad-table`).
-        SpecError: `too-large` for more sinusoids than `spectrum.given.frequencies` takes.
+    or power_11, .. are the powers of sinusoids at these frequencies, their mean squares. Raises `DataError`:
+    the file cannot be read, or holds no spectrum (`bad-table`). Or `SpecError`: `too-large` for more
+    sinusoids than `spectrum.given.frequencies` takes.
     """
     path = spec.resolve_path(name)
     lines = has_column(path, _POWER, key=_KEY) and not has_column(path, _DENSITY, key=_KEY)

@@ -52,9 +52,8 @@ _ROUNDING = 1e-9
 def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> StateSpaceModel:
     """Return the state-space model at the nominal parameters.
 
-    Raises:
-        SpecError: `unstable-polynomial` for an unstable predictor, or an unstable plant without a controller;
-            `conflicting-keys` for K together with coloured noise.
+    Raises `SpecError`: `unstable-polynomial` for an unstable predictor, or an unstable plant without a
+    controller; `conflicting-keys` for K together with coloured noise.
     """
     stated = plant.state_space
     shapes = {"D": (plant.outputs, plant.inputs), "K": (len(stated.A), plant.outputs)}
@@ -91,8 +90,7 @@ _WITHIN = 0.95
 def build_model(spec: Spec) -> Model:
     """Return the model of `plant` and `noise`.
 
-    Raises:
-        SpecError: `not-supported` for a regression; what is wrong with known and with named parameters.
+    Raises `SpecError`: `not-supported` for a regression; what is wrong with known and with named parameters.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
     noise = spec.noise
@@ -167,10 +165,9 @@ def bare_experiment(spec: Spec, model: Model, loop: Loop | None = None) -> Exper
 def build_experiment(spec: Spec) -> Experiment:
     """Return the experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
-    Raises:
-        SpecError: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
-            algebraic loop; a prior that does not fit the parameters.
-        DataError: the record of a prior cannot be used.
+    Raises `SpecError`: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
+    algebraic loop; a prior that does not fit the parameters. Or `DataError`: the record of a prior cannot be
+    used.
     """
     model, controller = build_model(spec), spec.experiment.controller
     check_model(spec, model)
@@ -194,9 +191,8 @@ def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
 def excitation_band(spec: Spec) -> tuple[float, float]:
     """Return the band of the excitation in rad/sample, or rad per time unit in continuous time.
 
-    Raises:
-        SpecError: `needs-band` in continuous time without a band.
-        DataError: the table of a given spectrum cannot be read.
+    Raises `SpecError`: `needs-band` in continuous time without a band. Or `DataError`: the table of a given
+    spectrum cannot be read.
     """
     band = _stated_band(spec)
     if spec.plant.sampled:
@@ -260,8 +256,7 @@ def information_in(spec: Spec, experiment: Experiment, record: Array) -> Array:
 def prior_record(spec: Spec) -> Array | None:
     """Return the earlier samples (n, r) that `experiment.prior` names; None if it names none.
 
-    Raises:
-        DataError: they cannot be used.
+    Raises `DataError`: they cannot be used.
     """
     prior = spec.experiment.prior
     if prior is None or prior.names_a_model or not isinstance(prior.information, str):
@@ -272,10 +267,7 @@ def prior_record(spec: Spec) -> Array | None:
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
     """Return the samples (n, r) of an excitation from columns u1, u2, .. (in closed loop r1, ..) of a file.
 
-    A single input may have the column u.
-
-    Raises:
-        DataError: the file cannot be used.
+    A single input may have the column u. Raises `DataError`: the file cannot be used.
     """
     units = build_units(spec)
     names = [units.excitation] if units.inputs == 1 else list(units.excitations)
@@ -286,8 +278,7 @@ def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
 def record_step(spec: Spec) -> float:
     """Return the time between samples in the unit of the experiment's frequencies: 1, or sample_time.
 
-    Raises:
-        SpecError: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
+    Raises `SpecError`: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
     """
     if spec.plant.sampled:
         return 1.0

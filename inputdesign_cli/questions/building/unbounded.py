@@ -48,10 +48,8 @@ _OUTCOMES = {
 def check_every_direction_counts(spec: Spec, question: Question) -> None:
     """Refuse a design in which some combination of the inputs may have any power.
 
-    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero.
-
-    Raises:
-        SpecError: `no-cost` or `needs-limits`.
+    Powers of fewer outputs than inputs do not count every combination, and neither do weights of zero. Raises
+    `SpecError`: `no-cost` or `needs-limits`.
     """
     priced = priced_powers(question)
     if priced is None:
@@ -77,8 +75,7 @@ def _free_direction(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:
 def check_reach(spec: Spec, question: Question) -> Reach:
     """Return what a bound over every spectrum may claim; refuse a family that has no best spectrum.
 
-    Raises:
-        SpecError: `no-cost` or `needs-limits`.
+    Raises `SpecError`: `no-cost` or `needs-limits`.
     """
     found = free_information(question)
     if found is None:

@@ -113,8 +113,7 @@ def _unknowns(spec: Spec, basis: Basis | None) -> int:
 def farthest_radius(spec: Spec, experiment: Experiment) -> float:
     """Return the radius beyond which poles of the plant, or of its loop, count as unstable.
 
-    Raises:
-        SpecError: `unsuitable-key`, `no-stable-plant`.
+    Raises `SpecError`: `unsuitable-key`, `no-stable-plant`.
     """
     nominal = experiment.model
     within = None if spec.uncertainty is None else spec.uncertainty.stable_within
@@ -153,10 +152,8 @@ class _Scenarios(UncertainPlant):
     def at(self, theta: Array, radius: float) -> Alternative:
         """Return the plant with these parameters, and the requirements on the design there.
 
-        Raises:
-            _NoPlantError: they give no plant of this structure, or a pole of it, or of its loop, lies beyond
-                the radius.
-            SpecError: a requirement cannot be asked of this plant.
+        Raises `_NoPlantError`: they give no plant of this structure, or a pole of it, or of its loop, lies
+        beyond the radius. Or `SpecError`: a requirement cannot be asked of this plant.
         """
         model, loop = self._sound(theta, radius)
         self._check_seen(theta, model)
@@ -250,8 +247,7 @@ class _Scenarios(UncertainPlant):
     def batch(self, number: int, rng: np.random.Generator) -> Batch:
         """Draw a number of plants; draws that give no stable plant are repeated.
 
-        Raises:
-            SpecError: `no-stable-plant` if hardly any draw gives one.
+        Raises `SpecError`: `no-stable-plant` if hardly any draw gives one.
         """
         radius, thetas, plants = self._radius, list[Array](), list[Alternative]()
         most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""

@@ -286,7 +286,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some parameter is named, and sampling and dead time are those of the time of the matrices."""
+        """Some parameter is named; sampling and dead time go with the time of the matrices."""
         if self.parameters is None:
             message = "{key} needs parameters: numbers in its matrices are not estimated"
             hint = "write parameters: {k: 2.0}, and k in the matrices"

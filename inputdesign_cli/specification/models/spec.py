@@ -40,15 +40,8 @@ _Error = TypeVar("_Error", bound=IdesignError)
 
 
 OF_DESIGNS = (
-    "accuracy",
-    "campaign",
-    "cost",
-    "limits",
-    "objective",
-    "simulation",
-    "spectrum",
-    "sweep",
-    "uncertainty",
+    *("accuracy", "campaign", "cost", "limits", "objective"),
+    *("simulation", "spectrum", "sweep", "uncertainty"),
 )
 """Keys of a design: a spec for an estimate alone has none of them."""
 

@@ -22,10 +22,8 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
     """Add the blocks of included files that the spec does not have; join other mappings key by key.
 
     A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
-    the `known` blocks: it may be any file of the machine.
-
-    Raises:
-        SpecError: A name is no text, or a file cannot be read, holds no blocks or includes others.
+    the `known` blocks: it may be any file of the machine. Raises `SpecError`: A name is no text, or a file
+    cannot be read, holds no blocks or includes others.
     """
     if not isinstance(tree.data, dict) or KEY not in tree.data:
         return
@@ -170,8 +168,7 @@ def _apply(tree: Tree, override: str) -> None:
 def _resolve(data: Plain, key: str, override: str) -> Path:
     """The path of a dotted key, with digits turned into indices where the tree has a list.
 
-    Raises:
-        SpecError: `bad-override`.
+    Raises `SpecError`: `bad-override`.
     """
     path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(key.strip()))
     if not path or "" in path or not key.isprintable():

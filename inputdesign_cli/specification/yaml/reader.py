@@ -116,8 +116,7 @@ class _Document:
     def check_size(self, text: str) -> None:
         """Read the events of a text before its nodes, whose composition recurses and takes memory.
 
-        Raises:
-            SpecError: `yaml-limit`; `several-documents`.
+        Raises `SpecError`: `yaml-limit`; `several-documents`.
         """
         depth = documents = 0
         for event in yaml.parse(text, Loader=_Loader):
