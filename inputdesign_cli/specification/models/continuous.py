@@ -48,9 +48,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     time_constant: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
-        "Damping ratio of a plant of second order."
-    )
+    damping: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional("Damping ratio (second order).")
     natural_frequency: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Undamped natural frequency of a plant of second order, rad per time_unit."
     )

@@ -32,14 +32,10 @@ class Pid(Section):
 
     ELSEWHERE: ClassVar[Mapping[str, str]] = {"Ki": "write Ti: Kp / Ki", "Kd": "write Td: Kd / Kp"}
 
-    Kp: fields.Number = Field(
-        description="Gain; negative where more input means less output.", examples=[2.0]
-    )
+    Kp: fields.Number = Field(description="Gain; negative if more input gives less output.", examples=[2.0])
     Ti: fields.Positive | None = optional("Integral time; absent: no integral action.")
     Td: fields.NonNegative = Field(default=0.0, description="Derivative time (default 0).")
-    Tf: fields.NonNegative | None = optional(
-        "Time constant of the filter of the derivative (default Td / 10)."
-    )
+    Tf: fields.NonNegative | None = optional("Time constant of the derivative's filter (default Td / 10).")
     sample: Rule = Field(default="tustin", description=_RULE)
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -155,9 +151,7 @@ class Control(Section):
 class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
-    variance: fields.PerChannel[fields.Positive] = Field(
-        default=1.0, description="Variance; a number or one per output."
-    )
+    variance: fields.PerChannel[fields.Positive] = Field(default=1.0, description="One, or one per output.")
     filter: Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -170,12 +164,9 @@ class ClosedLoopError(Section):
     """E||y - y0||^2 of the loop with the controller designed on the model."""
 
     control: Control = Field(description="The control law.")
-    reference: Reference = Field(
-        default=Reference(), description="The reference of the loop (default: white, variance 1)."
-    )
+    reference: Reference = Field(default=Reference(), description="The reference of the loop.")
     covariance: Literal["asymptotic", "parametric"] = Field(
-        default="asymptotic",
-        description="asymptotic in model order, or parametric: the exact covariance of the model structure.",
+        default="asymptotic", description="Asymptotic in model order, or exact for the model structure."
     )
 
 
@@ -186,9 +177,7 @@ MOST_DECIBELS = 100.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: fields.Positive | None = optional(
-        "Time constant of the closed loop, in time_unit (default: the dead time)."
-    )
+    tau_c: fields.Positive | None = optional("Time constant of the closed loop (default: the dead time).")
 
 
 class Amigo(Section):
@@ -227,15 +216,9 @@ class LoopMargin(
     controller: Controller | None = optional("C of the loop (default: the controller of the experiment).")
     tuning: Tuning | None = optional("Or the rule by which it is tuned.")
     max_sensitivity_db: _Peak | None = optional("Largest |S|, in dB.")
-    phase_margin: _Degrees | None = optional(
-        "Least phase margin in degrees, below 60, kept by the peak of |S| for it."
-    )
-    gain_margin: _Factor | None = optional(
-        "Least gain margin, a factor above 1, kept by the peak of |S| for it."
-    )
-    confidence: fields.Fraction | None = optional(
-        "Probability that fixes alpha by chi-squared (default 0.95)."
-    )
+    phase_margin: _Degrees | None = optional("Least phase margin in degrees, below 60, by the peak of |S|.")
+    gain_margin: _Factor | None = optional("Least gain margin, a factor above 1, by the peak of |S|.")
+    confidence: fields.Fraction | None = optional("Probability that fixes alpha (default 0.95).")
     band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
 
     @property

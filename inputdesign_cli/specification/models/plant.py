@@ -52,13 +52,10 @@ class NamedPlant(Section):
     parameters: Annotated[Mapping[str, fields.Number], SIZES["plant.parameters"]] | None = Field(
         default=None,
         min_length=1,
-        description="Named parameters and their values. Coefficients may then be expressions in them, and "
-        "these alone are estimated.",
+        description="Named parameters and their values; coefficients may be expressions in them.",
         examples=[{"K": 2.1, "T": 180}],
     )
-    known: fields.Names | None = optional(
-        "Names of parameters that are known and not estimated.", examples=[["b1"]]
-    )
+    known: fields.Names | None = optional("Names of parameters that are not estimated.", examples=[["b1"]])
 
     _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
 
@@ -136,15 +133,13 @@ class StateSpace(Section):
     C: Rows = Field(description="Outputs by states.", examples=[[[1, 0]]])
     D: Rows | None = optional("Outputs by inputs (default 0).")
     K: Rows | None = optional(
-        "Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
-        "noise is added to the outputs)."
+        "Gain of the one-step predictor of the sampled model, states by outputs (default 0)."
     )
     delay: Annotated[fields.NonNegative, EXPRESSIONS] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
     )
     time: Literal["continuous", "discrete"] = Field(
-        default="continuous",
-        description="Whether A and B give derivatives of the states, or their next samples.",
+        default="continuous", description="Whether A and B give derivatives of the states or next samples."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -182,7 +177,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         examples=[[0, 3.6]],
     )
     F: Annotated[fields.StableMatrix, EXPRESSIONS] | None = optional(
-        "Monic and stable, in the shape of B (default 1)."
+        "Monic, stable, shaped as B (default 1)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -235,9 +230,7 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     continuous: Continuous = Field(
         description="Transfer matrix in s, rows are outputs; or gain, time constant and dead time."
     )
-    sample: Literal["zoh"] | None = optional(
-        "zoh: sampled at sample_time with a zero-order hold. Absent: continuous time."
-    )
+    sample: Literal["zoh"] | None = optional("zoh: a zero-order hold. Absent: continuous time.")
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -281,9 +274,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("state_space",)
 
     state_space: StateSpace = Field(description="A, B, C, D, and K of the noise.")
-    sample: Literal["zoh"] | None = optional(
-        "zoh: matrices in continuous time are sampled with a zero-order hold."
-    )
+    sample: Literal["zoh"] | None = optional("zoh: matrices in continuous time are sampled.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Some parameter is named; sampling and dead time go with the time of the matrices."""
@@ -346,9 +337,7 @@ class TrueParameters(Section, family="plant", phrase="a list of true parameters"
 
     kind: ClassVar[Literal["parameters"]] = "parameters"
 
-    parameters: fields.Numbers = Field(
-        description="True values of all regression parameters, estimated ones first."
-    )
+    parameters: fields.Numbers = Field(description="True values of all parameters, estimated ones first.")
 
 
 _FORMS = Wording(

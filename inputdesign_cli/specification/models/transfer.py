@@ -138,9 +138,7 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 class TransferMatrix(Section):
     """numerator / denominator entry by entry, in s or in q^-1."""
 
-    numerator: fields.GainMatrix = Field(
-        description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
-    )
+    numerator: fields.GainMatrix = Field(description="Coefficients; rows (outputs) of columns (inputs).")
     denominator: fields.ContinuousDenominator = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
