@@ -1,17 +1,18 @@
-"""Spec -> the parameters to be estimated: coefficients, some of them known, or named parameters."""
+"""Spec -> the parameters to be estimated, and the information about them that `experiment.prior` states."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.expressions import Expression
+from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
@@ -130,3 +131,63 @@ def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[st
     index = [list(known).index(name) for name in listed]
     full[np.ix_(index, index)] = matrix
     return full
+
+
+PRIOR = "experiment.prior.information"
+
+
+@dataclass(frozen=True)
+class StatedPrior:
+    """The information (m, m) about named parameters (no names stand for all), and their values."""
+
+    matrix: Array
+    names: tuple[str, ...] | None
+    values: Mapping[str, float] | None
+
+    def over(self, spec: Spec, known: Sequence[str]) -> Array:
+        """Return the information (k, k) about all parameters of the model.
+
+        Raises `SpecError`: it does not fit them.
+        """
+        return embedded(spec, known, self.matrix, self.names, PRIOR)
+
+
+def stated_prior(spec: Spec) -> StatedPrior | None:
+    """Return the prior of the spec, or of the model file that it names; None for a record, or no prior.
+
+    Raises `SpecError`: `bad-model-file`.
+    """
+    prior = spec.experiment.prior
+    if prior is None:
+        return None
+    if not isinstance(prior.information, str):
+        return StatedPrior(np.array(prior.information, dtype=float), prior.names, prior.values)
+    if not prior.names_a_model:
+        return None
+    found = load_estimate(spec, prior.information, PRIOR)
+    covariance = np.array(found.covariance, dtype=float)
+    return StatedPrior(inverse(covariance), tuple(found.parameters), found.parameters)
+
+
+def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
+    """Return the prior as an estimate, with nominal values of other parameters; None without values.
+
+    Raises `SpecError`: it does not fit the parameters; `bad-model-file`.
+    """
+    stated = stated_prior(spec)
+    if stated is None or stated.values is None:
+        return None
+    theta = [stated.values.get(name, value) for name, value in zip(nominal.names, nominal.theta, strict=True)]
+    return Earlier(np.array(theta, dtype=float), stated.over(spec, nominal.names))
+
+
+def inverse(covariance: Array) -> Array:
+    """Return the inverse of a covariance or information matrix (k, k), by way of correlations.
+
+    Raises `LinAlgError`: it is singular.
+    """
+    scale = np.sqrt(np.diag(covariance))
+    if not np.all(scale > 0.0):
+        raise np.linalg.LinAlgError
+    half = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
+    return np.asarray(half.T @ half)

@@ -25,11 +25,15 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.questions.building.controllers import controller_matrix
-from inputdesign_cli.questions.building.demand import check_effects, check_model
+from inputdesign_cli.questions.building.demand import check_effects, check_model, on_finite_information
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.building.integrators import on_finite_information
-from inputdesign_cli.questions.building.parameters import degrees_of, delays_of, reparametrised
-from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
+from inputdesign_cli.questions.building.parameters import (
+    PRIOR,
+    degrees_of,
+    delays_of,
+    reparametrised,
+    stated_prior,
+)
 from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import NoiseShape
