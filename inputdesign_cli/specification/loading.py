@@ -20,7 +20,7 @@ from inputdesign_cli.specification.models.wording import show
 from inputdesign_cli.specification.plugins import install
 from inputdesign_cli.specification.schema import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
-from inputdesign_cli.specification.yaml.overrides import compose
+from inputdesign_cli.specification.yaml.overrides import KEY, apply_includes, apply_overrides
 from inputdesign_cli.specification.yaml.places import Path, Places, Source
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
@@ -143,7 +143,10 @@ def read_tree(
     """
     tree = read(text, file)
     check_mapping(tree)
-    compose(tree, folder, overrides, known=Spec.model_fields.keys(), confine=confine)
+    first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
+    apply_overrides(tree, first)
+    apply_includes(tree, folder, known=Spec.model_fields.keys(), confine=confine)
+    apply_overrides(tree, [override for override in overrides if override not in first])
     if confine is not None:
         keep_inside(tree, folder, confine)
     return tree

@@ -92,28 +92,6 @@ def _refused(tree: Tree, path: Path, message: str, hint: str) -> SpecError:
     return SpecError.because("bad-include", message.replace("{key}", key), hint, key, location)
 
 
-def compose(
-    tree: Tree,
-    folder: FilePath,
-    overrides: Sequence[str],
-    *,
-    known: Collection[str],
-    confine: FilePath | None = None,
-) -> None:
-    """Join included files to the spec as it is written, then apply overrides (`--set include=..` first).
-
-    Args:
-        tree, folder: the spec, and what names of files are relative to.
-        overrides: `key.path=value` texts.
-        known: the names of blocks.
-        confine: the folder outside of which nothing may be included.
-    """
-    first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
-    apply_overrides(tree, first)
-    apply_includes(tree, folder, known=known, confine=confine)
-    apply_overrides(tree, [override for override in overrides if override not in first])
-
-
 def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
     """Apply each `key.path=value` to the tree, in order; `null` as the value removes the key.
 
