@@ -17,7 +17,6 @@ from inputdesign_cli.specification.models.named import (
     TermMatrix,
     Terms,
     expressed,
-    matrix,
 )
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.transfer import (
@@ -205,10 +204,10 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
         above, below, delay = (
             expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
         )
-        rows = matrix(above)
+        rows = as_matrix(above)
         denominators: TermMatrix
         if fields.depth(below) == 3:
-            denominators = matrix(below)
+            denominators = as_matrix(below)
         else:
             common = product_of(below if fields.depth(below) == 2 else [below])
             denominators = tuple(tuple(common for _ in row) for row in rows)

@@ -17,11 +17,8 @@ from inputdesign_cli.specification.models.named import (
     NamedParameter,
     Terms,
     check_names,
-    check_used,
     expressed,
     leading,
-    matrix,
-    texts_in,
     values_of,
     worth,
 )
@@ -72,9 +69,15 @@ class NamedPlant(Section):
                 return handler(numbers)
             found = list(check_names(values))
             stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
-            numbers |= {key: worth(data[key], values, (key,), found) for key in stated}
-            if not found:
-                found += check_used(values, texts_in([data[key] for key in stated]))
+            used: set[str] = set()
+            numbers |= {key: worth(data[key], values, (key,), found, used) for key in stated}
+            for name in () if found else values.keys() - used:
+                message, hint = (
+                    f"nothing depends on the parameter {name}",
+                    "remove it, or write it where it acts",
+                )
+                path = ("parameters", name)
+                found.append(PathDiagnostic("unused-parameter", message, hint, path, at_key=True))
             if found:
                 raise carry(*found)
         made = handler(numbers)
@@ -188,13 +191,14 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         ):
             message = "{key} must have the shape of B: " + shape_words(self.B)
             yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
-        yield from check_gain(matrix(expressed(self.written["B"])), "B")
+        yield from check_gain(as_matrix(expressed(self.written["B"])), "B")
 
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
         """The power of the first coefficient of B that is present, entry by entry; the length if none is."""
         return tuple(
-            tuple(leading(entry) for entry in row) for row in matrix(expressed(self.written.get("B", self.B)))
+            tuple(leading(entry) for entry in row)
+            for row in as_matrix(expressed(self.written.get("B", self.B)))
         )
 
     @property
@@ -207,7 +211,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         written = expressed(self.written[letter.upper()])
         if letter == "a":
             return written[output] if fields.depth(written) == 2 else written
-        return matrix(written)[output][input]
+        return as_matrix(written)[output][input]
 
     @property
     def B_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (the paper's symbol)
