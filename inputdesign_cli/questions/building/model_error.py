@@ -276,5 +276,5 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
     settings: dict[str, float] = {}
     if given.kind == "pid":
-        settings = {key: float(v) for key in ("Kp", "Ti", "Td") if (v := getattr(given.pid, key))}
+        settings = {k: v for k, v in given.pid.model_dump(include={"Kp", "Ti", "Td"}).items() if v}
     return Sensitivity(loop, Rational.build([peak]), None if kept is None else settings)

@@ -21,6 +21,7 @@ from inputdesign_cli.specification.models.named import (
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.transfer import (
     TransferMatrix,
+    as_matrix,
     check_each,
     check_each_proper,
     check_gain,

@@ -71,12 +71,9 @@ class NamedPlant(Section):
             stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
             used: set[str] = set()
             numbers |= {key: worth(data[key], values, (key,), found, used) for key in stated}
-            for name in () if found else values.keys() - used:
-                message, hint = (
-                    f"nothing depends on the parameter {name}",
-                    "remove it, or write it where it acts",
-                )
-                path = ("parameters", name)
+            for name in () if found else [name for name in values if name not in used]:
+                message, path = f"nothing depends on the parameter {name}", ("parameters", name)
+                hint = "write it into a coefficient, or remove it"
                 found.append(PathDiagnostic("unused-parameter", message, hint, path, at_key=True))
             if found:
                 raise carry(*found)
@@ -196,10 +193,8 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
         """The power of the first coefficient of B that is present, entry by entry; the length if none is."""
-        return tuple(
-            tuple(leading(entry) for entry in row)
-            for row in as_matrix(expressed(self.written.get("B", self.B)))
-        )
+        rows = as_matrix(expressed(self.written.get("B", self.B)))
+        return tuple(tuple(leading(entry) for entry in row) for row in rows)
 
     @property
     def shape(self) -> tuple[int, int]:
