@@ -52,7 +52,7 @@ class SpecTemplate:
         """
         tree = Tree(copy.deepcopy(self.data), Places())
         apply_overrides(tree, [*overrides, "sweep=null"])
-        return _sound(tree).data
+        return tree.sound().data
 
     def digest(self, data: dict[str, Plain]) -> str:
         """Return the SHA-256 of a variant and of the contents of every file that it names."""
@@ -79,13 +79,6 @@ class SpecTemplate:
             raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
 
 
-def _sound(tree: Tree) -> Tree:
-    """The tree itself; its diagnostics are raised as a `SpecError`."""
-    if tree.diagnostics:
-        raise SpecError(tree.diagnostics)
-    return tree
-
-
 def read_template(
     path: str | os.PathLike[str],
     overrides: Sequence[str] = (),
@@ -101,7 +94,7 @@ def read_template(
     """
     text, file = read_text(path) if text is None else text, os.fspath(path)
     folder = FilePath(path).parent
-    tree = _sound(read_tree(text, file, overrides, folder, confine))
+    tree = read_tree(text, file, overrides, folder, confine).sound()
     return SpecTemplate(text, file, folder, tuple(overrides), tree.data, tuple(tree.included), confine)
 
 

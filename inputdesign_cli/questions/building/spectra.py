@@ -155,7 +155,11 @@ def read_given_spectrum(spec: Spec, name: str, r: int) -> tuple[TabulatedSpectru
     if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
         wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
         raise bad_table(spec, name, f"{symbol} must be {wanted}", _HINTS[symbol], _KEY)
-    frequency = _below_nyquist(spec, name, frequency)
+    if spec.plant.sampled and frequency[-1] > np.pi * (1 + 1e-4):
+        message = f"it reaches {build_units(spec).named(frequency[-1])}, beyond the Nyquist frequency"
+        raise bad_table(spec, name, message, "frequencies end at pi/sample_time", _KEY)
+    if spec.plant.sampled:  # the last one may lie beyond pi by rounding
+        frequency = np.minimum(frequency, np.pi)
     if not lines:
         return TabulatedSpectrum(frequency, values), np.ones(1)
     most = SIZES["spectrum.given.frequencies"]
@@ -186,14 +190,3 @@ def _read(spec: Spec, name: str, symbol: str, r: int, *, least: int) -> tuple[Ar
     for i, j in pairs:
         values[:, j, i] = values[:, i, j].conj()
     return columns["frequency"], values
-
-
-def _below_nyquist(spec: Spec, name: str, frequency: Array) -> Array:
-    """The frequencies; the last may lie beyond pi by rounding. It raises `DataError` (`bad-table`)."""
-    if not spec.plant.sampled:
-        return frequency
-    if frequency[-1] > np.pi * (1 + 1e-4):
-        reached = f"{frequency[-1] / build_units(spec).frequency:g} rad/{spec.time_unit}"
-        message = f"it reaches {reached}, beyond the Nyquist frequency"
-        raise bad_table(spec, name, message, "frequencies end at pi/sample_time", _KEY)
-    return np.minimum(frequency, np.pi)
