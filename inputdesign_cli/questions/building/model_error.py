@@ -113,7 +113,13 @@ def _on_entry(
     entry: Entry | None,
     nominal: Model | None,
 ) -> OnModelError:
-    units, admissible = build_units(spec), _admissible_of(spec, error, experiment.model, band, entry, nominal)
+    units, model = build_units(spec), experiment.model
+    scenario = None if nominal is None else spec.uncertainty
+    # r_adm of a scenario is its own down to a floor, or that of the nominal plant.
+    fixed = scenario is not None and scenario.r_adm == "fixed"
+    admissible = _admissible(spec, error, nominal if fixed and nominal is not None else model, band, entry)
+    if scenario is not None and nominal is not None and not fixed and scenario.floor > 0.0:
+        admissible = Floored(admissible, _admissible(spec, error, nominal, band, entry), scenario.floor)
     if error.weight is not None:
         key = f"{_KEY}.weight"
         weight = build_weight(spec, error.weight, key)
@@ -126,15 +132,14 @@ def _on_entry(
         admissible = Weighted(admissible, weight)
     bound: Callable[..., OnModelError] = ModelError
     if error.region == "ellipsoid":
-        _check_fraction(spec, experiment.model, entry)
+        _check_fraction(spec, model, entry)
         bound = partial(EllipsoidError, against="absolute" if error.relative is None else "relative")
-    alpha = model_error_alpha(spec, experiment.model)
+    alpha = model_error_alpha(spec, model)
     made = bound(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
     if nominal is None:
         check_bounded(spec, made, _KEY if spec.accuracy.loop is None else _LOOP)
-    stated = spec.uncertainty
-    # Scenarios have a positive r_adm since the nominal plant has one.
-    if nominal is None or stated is None or (stated.r_adm != "fixed" and stated.floor == 0.0):
+    # Otherwise it is positive since that of the nominal plant is.
+    if scenario is None or (not fixed and scenario.floor == 0.0):
         try:
             check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
         except SpecError as missed:
@@ -192,28 +197,6 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
         message = f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not"
         hint = "use region: first_order for this structure (A and F, sampled from s, an estimated dead time)"
         raise spec.complain("not-supported", message, hint=hint, key=key)
-
-
-def _admissible_of(
-    spec: Spec,
-    error: StatedError,
-    model: Model,
-    band: tuple[float, float],
-    entry: Entry | None,
-    nominal: Model | None,
-) -> AdmissibleError:
-    """Return r_adm of a model; of a scenario its own down to a floor, or the nominal one (`uncertainty`).
-
-    Raises `SpecError`: see `build_model_errors`.
-    """
-    stated = spec.uncertainty
-    if nominal is None or stated is None:
-        return _admissible(spec, error, model, band, entry)
-    known = _admissible(spec, error, nominal, band, entry)
-    if stated.r_adm == "fixed":
-        return known
-    own = _admissible(spec, error, model, band, entry)
-    return Floored(own, known, stated.floor) if stated.floor > 0.0 else own
 
 
 def _admissible(

@@ -8,7 +8,6 @@ from itertools import chain
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.outcome.results import Table
 from inputdesign_cli.questions.building.demand import check_record, longest_record
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_cost, excitation_band, record_step
@@ -146,14 +145,6 @@ def operating_points(spec: Spec) -> Array:
     return np.array([one.operating_point for one in quantisers]) if quantisers else _offsets(spec)
 
 
-def deviations(spec: Spec, table: Table) -> Array:
-    """Return the samples (n, r) of signal.csv about their operating points; a given record unchanged."""
-    columns = build_units(spec).excitations
-    values = np.stack([np.asarray(table.columns[name]) for name in columns], axis=1)
-    given = spec.given is not None and spec.given.type == "signal"
-    return values if given else values - operating_points(spec)
-
-
 def sampling_rate(spec: Spec) -> float:
     """Return the number of samples per second."""
     return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
@@ -179,17 +170,13 @@ def _other_methods(spec: Spec) -> tuple[str, ...]:
     """Other types that may serve as well; empty if the spec states how the signal is made."""
     if spec.signal.stated("phases", "lines", "bits"):
         return ()
-    levels: list[str] = ["slewed" if _ramps_needed(spec) else "binary"]
-    if not spec.plant.sampled or spec.signal.ramp:
-        levels = []
-    others = dict.fromkeys((_usual_method(spec), "multisine", *levels))
-    return tuple(method for method in others if method != _method(spec))
-
-
-def _ramps_needed(spec: Spec) -> bool:
-    """Whether the limits on moves prevent an input from switching between its levels at once."""
-    moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
-    return moves is not None and not spec.closed_loop and peak is not None and bool(np.isfinite(moves).any())
+    others = [_usual_method(spec), "multisine"]
+    if spec.plant.sampled and not spec.signal.ramp:
+        moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
+        # Limits on moves may prevent an input from switching between its levels at once.
+        slow = moves is not None and peak is not None and bool(np.isfinite(moves).any())
+        others.append("slewed" if slow and not spec.closed_loop else "binary")
+    return tuple(method for method in dict.fromkeys(others) if method != _method(spec))
 
 
 def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array | None:
@@ -231,12 +218,8 @@ def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
         yield "conflicting-keys", key, message, hint
     elif block > 1 and period < least:
         hint = "ask for more samples, fewer periods or a shorter hold"
-        yield (
-            "conflicting-keys",
-            key,
-            f"the values of a period are {period}, and must be {least} or more",
-            hint,
-        )
+        message = f"the values of a period are {period}, and must be {least} or more"
+        yield "conflicting-keys", key, message, hint
     if 2 * ramp > samples:
         message = f"ramp is {ramp}, but the signal has {samples} samples to fade in and out"
         yield "out-of-range", "signal.ramp", message, f"write at most {samples // 2}"
@@ -244,9 +227,7 @@ def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
         values = settings.period(samples) // blocks_of(settings.vectors, spec.plant.inputs)
         top, last = values // 2, settings.lines[-1]
         if last > top:
-            message = (
-                f"lines reaches harmonic {last}, but a period of {values} values has harmonics 0 to {top}"
-            )
+            message = f"lines reaches harmonic {last}; a period of {values} values has harmonics 0 to {top}"
             yield "out-of-range", "signal.lines", message, "remove the higher ones, or make the period longer"
 
 
@@ -258,10 +239,9 @@ def _kind_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
         message = f"ramp does not go with type: {method}, whose values are of a few levels"
         yield "unsuitable-key", "signal.ramp", message, "remove it, or use filtered_noise or multisine"
     if kind.slewed and (spec.closed_loop or spec.limits.rate is None):
-        why = "in a loop does not limit what is applied" if spec.closed_loop else "is not stated"
-        message = f"type: slewed ramps between two levels at the speed of limits.rate, which {why}"
-        instead = "" if spec.closed_loop else "state limits.rate, or "
-        yield "unsuitable-key", "signal.type", message, f"{instead}use type: binary, which switches at once"
+        message = "type: slewed ramps between two levels at the speed of limits.rate, in open loop"
+        hint = "state limits.rate in open loop, or use type: binary, which switches at once"
+        yield "unsuitable-key", "signal.type", message, hint
     if not kind.several and inputs > 1:
         message = f"type: {method} is a signal of one input, and the plant has {inputs}"
         yield "not-supported", "signal.type", message, "use type: multisine"
