@@ -8,17 +8,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models import fields, transfer
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import (
-    ContinuousRatio,
-    DiscreteMatrix,
-    DiscreteTransfer,
-    Target,
-    Transfer,
-    check_stable,
-)
 
 Rule = Literal["tustin", "backward", "zoh"]
 _RULE = "How s becomes q^-1: tustin (trapezoids), backward (backward differences) or zoh (a hold on y)."
@@ -68,7 +60,9 @@ class ContinuousController(Section, family="controller", phrase="a controller in
 
     kind: ClassVar[Literal["continuous"]] = "continuous"
 
-    continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
+    continuous: transfer.ContinuousRatio = Field(
+        description="numerator and denominator in descending powers of s."
+    )
     sample: Rule = Field(description=_RULE)
     delay: _Delay = Field(default=0, description=_DELAY)
 
@@ -83,10 +77,12 @@ _WORDING = Wording(
 def _single(value: dict[str, object]) -> str:
     if "pid" in value:
         return PidController.phrase
-    return (ContinuousController if "continuous" in value else DiscreteTransfer).phrase
+    return (ContinuousController if "continuous" in value else transfer.DiscreteTransfer).phrase
 
 
-SingleController = Annotated[DiscreteTransfer | PidController | ContinuousController, pick(_single), _WORDING]
+SingleController = Annotated[
+    transfer.DiscreteTransfer | PidController | ContinuousController, pick(_single), _WORDING
+]
 """From one output to one input."""
 
 
@@ -117,11 +113,15 @@ class LoopsController(Section, family="controller", phrase="a list of single loo
 def _kind(value: dict[str, object]) -> str:
     if "loops" in value:
         return LoopsController.phrase
-    return DiscreteMatrix.phrase if fields.depth(value.get("numerator")) > 1 else _single(value)
+    return transfer.DiscreteMatrix.phrase if fields.depth(value.get("numerator")) > 1 else _single(value)
 
 
 Controller = Annotated[
-    DiscreteTransfer | DiscreteMatrix | PidController | ContinuousController | LoopsController,
+    transfer.DiscreteTransfer
+    | transfer.DiscreteMatrix
+    | PidController
+    | ContinuousController
+    | LoopsController,
     pick(_kind),
     _WORDING,
 ]
@@ -131,10 +131,10 @@ Controller = Annotated[
 class Control(Section):
     """The control law that will be computed from the model: exactly one."""
 
-    model_reference: Target | None = optional(
+    model_reference: transfer.Target | None = optional(
         "Desired loop from reference to output: t I, or a matrix; from s by a zero-order hold."
     )
-    internal_model: Transfer | None = optional("Filter of an internal-model controller.")
+    internal_model: transfer.Transfer | None = optional("Filter of an internal-model controller.")
     minimum_variance: (
         Annotated[Literal[True], Wording("true", "remove the key to choose another law")] | None
     ) = optional("true: minimum-variance control.")
@@ -143,21 +143,21 @@ class Control(Section):
         """There is one law, and its transfer functions are stable."""
         yield from self.exactly_one(*type(self).model_fields)
         if self.model_reference is not None:
-            yield from check_stable(self.model_reference, "model_reference")
+            yield from transfer.check_stable(self.model_reference, "model_reference")
         if self.internal_model is not None:
-            yield from check_stable(self.internal_model, "internal_model")
+            yield from transfer.check_stable(self.internal_model, "internal_model")
 
 
 class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
     variance: fields.PerChannel[fields.Positive] = Field(default=1.0, description="One, or one per output.")
-    filter: Transfer | None = optional("Filter that colours it (default 1).")
+    filter: transfer.Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The filter is stable."""
         if self.filter is not None:
-            yield from check_stable(self.filter, "filter")
+            yield from transfer.check_stable(self.filter, "filter")
 
 
 class ClosedLoopError(Section):
