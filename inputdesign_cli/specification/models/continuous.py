@@ -32,9 +32,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     time_constant: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional(
         "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional(
-        "Damping ratio (second order)."
-    )
+    damping: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional("Damping (second order).")
     natural_frequency: Annotated[fields.PositiveGrid, named.EXPRESSIONS] | None = optional(
         "Undamped natural frequency of a plant of second order, rad per time_unit."
     )

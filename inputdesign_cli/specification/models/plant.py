@@ -165,10 +165,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     def check(self) -> Iterator[PathDiagnostic]:
         """A and F have the shape of B, of which some coefficient is present."""
         yield from transfer.check_per_output(self.A, self.outputs, "A")
-        if self.F is not None and (
-            fields.depth(self.F) != fields.depth(self.B)
-            or transfer.size_of(self.F) != transfer.size_of(self.B)
-        ):
+        if self.F is not None and transfer.shape_words(self.F) != transfer.shape_words(self.B):
             message = "{key} must have the shape of B: " + transfer.shape_words(self.B)
             yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
         yield from transfer.check_gain(transfer.as_matrix(named.expressed(self.written["B"])), "B")
