@@ -123,8 +123,11 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
             return (gain * (w * w) if gain.present else none,), (one, two * damping * w, w * w), delay
 
         rows = [[entry(i, j) for j in range(len(row))] for i, row in enumerate(self.grid("gain"))]
-        above, below, delays = (tuple(tuple(one[k] for one in row) for row in rows) for k in range(3))
-        return named.CoefficientTerms(above, below, delays)
+        return named.CoefficientTerms(
+            tuple(tuple(above for above, _, _ in row) for row in rows),
+            tuple(tuple(below for _, below, _ in row) for row in rows),
+            tuple(tuple(delay for _, _, delay in row) for row in rows),
+        )
 
     def _numbers(self, part: Literal["numerator", "denominator"]) -> fields.PolynomialMatrix:
         """The numerators or the denominators at the values of the quantities."""

@@ -15,7 +15,7 @@ from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
-def as_matrix(value: tuple) -> fields.PolynomialMatrix:
+def as_matrix(value: tuple) -> Plain:
     """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
     return value if fields.depth(value) == 3 else ((value,),)
 
