@@ -75,10 +75,9 @@ def from_control(
     if len(known):
         plant["known"] = list(known)
     time = system.dt if discrete else sample_time
-    data = {"plant": plant, "noise": {"variance": 1.0} if noise is None else noise, **blocks}
-    return Spec.from_dict(
-        data if time is None else {"sample_time": time, **data}, design="accuracy" in blocks
-    )
+    clock = {} if time is None else {"sample_time": time}
+    data = {**clock, "plant": plant, "noise": {"variance": 1.0} if noise is None else noise, **blocks}
+    return Spec.from_dict(data, design="accuracy" in blocks)
 
 
 def _listed(value: object) -> bool:
