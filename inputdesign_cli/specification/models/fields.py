@@ -49,7 +49,7 @@ def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
     if lead == 1.0:
         return None
     hint = "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0"
-    if polynomial[-1] == 1.0:
+    if lead and polynomial[-1] == 1.0:
         hint = f"its coefficients ascend in q^-1: did you mean {_listed(polynomial[::-1])}?"
     elif lead:
         hint = f"divide all its coefficients by {show(lead)}: {_listed([c / lead for c in polynomial])}"
