@@ -51,10 +51,8 @@ def build_identification(spec: Spec) -> Identification:
             key="plant",
         )
     nominal = build_model(spec)
-    stated = stated_prior(spec)
     # Errors of a prior are raised before any data are read, even if it does not count for these data.
-    if stated is not None:
-        stated.over(spec, nominal.names)
+    stated_prior(spec, nominal.names)
     prior_record(spec)
     controller = spec.experiment.controller
     record_step(spec)  # raises if samples are too far apart for the plant

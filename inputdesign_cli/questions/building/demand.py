@@ -158,7 +158,10 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
             raise spec.complain("infinite-information", message, hint=hint, key=part)
     lo, hi = experiment.band
     grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
-    if not grown and not (lo == 0.0 and _wanders(experiment)):
+    model = experiment.model
+    # Outputs have no bound at frequency zero, while drifting noise keeps the information finite.
+    wanders = lo == 0.0 and experiment.loop is None and not model.continuous
+    if not grown and not (wanders and np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None]))):
         return experiment
     lowest = _lowest_line(spec, hi)
     if lowest is not None and lowest > 0.0:
@@ -177,14 +180,6 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
         f"experiment in closed loop, under a controller{integrates}",
         key="spectrum" if spec.spectrum is not None else "plant",
     )
-
-
-def _wanders(experiment: Experiment) -> bool:
-    """Whether outputs have no bound at frequency zero, while drifting noise keeps the information finite."""
-    model = experiment.model
-    if experiment.loop is not None or model.continuous:
-        return False
-    return bool(np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None])))
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:

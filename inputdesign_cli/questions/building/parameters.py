@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -136,49 +136,32 @@ def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[st
 PRIOR = "experiment.prior.information"
 
 
-@dataclass(frozen=True)
-class StatedPrior:
-    """The information (m, m) about named parameters (no names stand for all), and their values."""
+def stated_prior(spec: Spec, names: Sequence[str]) -> tuple[Array, Mapping[str, float] | None] | None:
+    """Return the information (k, k) about all parameters that the spec states, and their values, if stated.
 
-    matrix: Array
-    names: tuple[str, ...] | None
-    values: Mapping[str, float] | None
-
-    def over(self, spec: Spec, known: Sequence[str]) -> Array:
-        """Return the information (k, k) about all parameters of the model.
-
-        Raises `SpecError`: it does not fit them.
-        """
-        return embedded(spec, known, self.matrix, self.names, PRIOR)
-
-
-def stated_prior(spec: Spec) -> StatedPrior | None:
-    """Return the prior of the spec, or of the model file that it names; None for a record, or no prior.
-
-    Raises `SpecError`: `bad-model-file`.
+    It may stand in a model file; None for a record, or no prior. Raises `SpecError`: `bad-model-file`, or the
+    prior does not fit the parameters.
     """
     prior = spec.experiment.prior
     if prior is None:
         return None
     if not isinstance(prior.information, str):
-        return StatedPrior(np.array(prior.information, dtype=float), prior.names, prior.values)
+        matrix = np.array(prior.information, dtype=float)
+        return embedded(spec, names, matrix, prior.names, PRIOR), prior.values
     if not prior.names_a_model:
         return None
     found = load_estimate(spec, prior.information, PRIOR)
-    covariance = np.array(found.covariance, dtype=float)
-    return StatedPrior(inverse(covariance), tuple(found.parameters), found.parameters)
+    information = inverse(np.array(found.covariance, dtype=float))
+    return embedded(spec, names, information, tuple(found.parameters), PRIOR), found.parameters
 
 
 def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
-    """Return the prior as an estimate, with nominal values of other parameters; None without values.
-
-    Raises `SpecError`: it does not fit the parameters; `bad-model-file`.
-    """
-    stated = stated_prior(spec)
-    if stated is None or stated.values is None:
+    """Return the prior as an estimate, with nominal values of other parameters; None without values."""
+    information, values = stated_prior(spec, nominal.names) or (None, None)
+    if information is None or values is None:
         return None
-    theta = [stated.values.get(name, value) for name, value in zip(nominal.names, nominal.theta, strict=True)]
-    return Earlier(np.array(theta, dtype=float), stated.over(spec, nominal.names))
+    theta = [values.get(name, value) for name, value in zip(nominal.names, nominal.theta, strict=True)]
+    return Earlier(np.array(theta, dtype=float), information)
 
 
 def inverse(covariance: Array) -> Array:

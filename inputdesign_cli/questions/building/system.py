@@ -244,9 +244,8 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     """The information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
-    stated = stated_prior(spec)
-    if stated is not None:
-        return stated.over(spec, experiment.model.names)
+    if (stated := stated_prior(spec, experiment.model.names)) is not None:
+        return stated[0]
     record = prior_record(spec)
     return None if record is None else information_in(spec, experiment, record)
 
