@@ -156,13 +156,13 @@ def check_mapping(tree: Tree) -> None:
     """Raise `SpecError` (`empty-file`, `not-a-mapping`) unless the data of a spec are a mapping."""
     if isinstance(tree.data, dict):
         return
-    empty, files = tree.data is None, [Location(file, 1, 1) for file, _ in tree.places.sources]
-    raise SpecError.because(
-        "empty-file" if empty else "not-a-mapping",
-        "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
-        "`idesign init` writes a spec to start from",
-        location=tree.places.location(tree.places.mark(())) or next(iter(files), None),
-    )
+    code, message = "not-a-mapping", 'a spec is a mapping of keys ("plant: ..", "noise: ..")'
+    if tree.data is None:
+        code, message = "empty-file", "the spec is empty"
+    files = [Location(file, 1, 1) for file, _ in tree.places.sources]
+    location = tree.places.location(tree.places.mark(())) or next(iter(files), None)
+    hint = "`idesign init` writes a spec to start from"
+    raise SpecError.because(code, message, hint, location=location)
 
 
 def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:

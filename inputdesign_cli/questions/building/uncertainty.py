@@ -202,9 +202,8 @@ class UncertainPlant:
             return Alternative(experiment, *build_asked(self.spec, experiment, self.nominal))
         except SpecError as error:
             found = error.diagnostics[0]
-            raise self.spec.complain(
-                found.code, f"at the scenario {self._named(theta)}: {found.message}", hint=found.hint, key=KEY
-            ) from error
+            message = f"at the scenario {self._named(theta)}: {found.message}"
+            raise self.spec.complain(found.code, message, hint=found.hint, key=KEY) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
         model, controller = self.nominal.at(theta), self.spec.experiment.controller
@@ -291,14 +290,10 @@ class UncertainPlant:
         most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
         while len(plants) < number:
             if drawn >= most_draws:
-                what = "loops" if self.spec.closed_loop else "plants"
-                raise self.spec.complain(
-                    "no-stable-plant",
-                    f"only {len(plants)} of {drawn} {what} drawn have all their poles within {radius:.6g}, "
-                    f"and dead times, gains and expressions that a plant can have{last}",
-                    hint="the uncertainty reaches far beyond what is possible: state it more tightly",
-                    key=KEY,
-                )
+                few = f"only {len(plants)} of {drawn} plants drawn are sound"
+                message = f"{few}, in their loop if there is one, with poles within {radius:.6g}{last}"
+                hint = "the uncertainty reaches far beyond what is possible: state it more tightly"
+                raise self.spec.complain("no-stable-plant", message, hint=hint, key=KEY)
             theta, drawn = self.draw(rng), drawn + 1
             try:
                 plants.append(self.at(theta, radius))
