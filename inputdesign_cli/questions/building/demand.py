@@ -16,13 +16,8 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.sizes import most
-from inputdesign_cli.specification.models.spectrum import (
-    GivenMultisine,
-    GivenSignal,
-    GivenSpectrum,
-    MultisineSpectrum,
-)
 from inputdesign_cli.spectrum import Basis
 
 _MOST_BYTES = 4 * 2**30
@@ -211,12 +206,12 @@ def _lowest_line(spec: Spec, hi: float) -> float | None:
     """The lowest frequency of an excitation of lines, in the unit of the experiment; None for others."""
     unit = build_units(spec).frequency
     match spec.spectrum:
-        case MultisineSpectrum(frequencies=given) if given:
+        case spectrum.MultisineSpectrum(frequencies=given) if given:
             return given[0] * unit
-        case MultisineSpectrum(lines=lines):
+        case spectrum.MultisineSpectrum(lines=lines):
             return hi / ((lines or 1) + (not spec.plant.sampled))
-        case GivenSpectrum(given=GivenMultisine(frequencies=given)):
+        case spectrum.GivenSpectrum(given=spectrum.GivenMultisine(frequencies=given)):
             return given[0] * unit
-        case GivenSpectrum(given=GivenSignal()):
+        case spectrum.GivenSpectrum(given=spectrum.GivenSignal()):
             return hi / spec.experiment.samples
     return None

@@ -24,30 +24,17 @@ from inputdesign_cli.plant import (
     hold_entries,
 )
 from inputdesign_cli.plant.model import DELAY
+from inputdesign_cli.questions.building import parameters
 from inputdesign_cli.questions.building.controllers import controller_matrix
 from inputdesign_cli.questions.building.demand import check_effects, check_model, on_finite_information
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.building.parameters import (
-    PRIOR,
-    degrees_of,
-    delays_of,
-    reparametrised,
-    stated_prior,
-)
 from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models import spectrum
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import depth
 from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
-from inputdesign_cli.specification.models.spectrum import (
-    GivenMultisine,
-    GivenSignal,
-    GivenSpectrum,
-    GivenTable,
-    MultisineSpectrum,
-    PolynomialSpectrum,
-)
 
 # A pole this near to the unit circle is on it, but for rounding.
 _ROUNDING = 1e-9
@@ -115,9 +102,9 @@ def build_model(spec: Spec) -> Model:
                 _arrays(matrix.denominator_matrix, -1),
                 covariance,
                 common=matrix.common,
-                delay=delays_of(plant),
+                delay=parameters.delays_of(plant),
                 common_delay=matrix.common_delay,
-                degrees=degrees_of(plant),
+                degrees=parameters.degrees_of(plant),
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
         case StateSpacePlant() as plant:
@@ -128,7 +115,7 @@ def build_model(spec: Spec) -> Model:
             raise spec.complain("not-supported", message, hint=hint, key="plant")
     if any(noise.drifts) or any(len(p) > 1 for p in (*C, *D)):
         model = Coloured(model, C, D, noise.held, noise.drifts)
-    return reparametrised(spec, plant, model)
+    return parameters.reparametrised(spec, plant, model)
 
 
 def polynomial_model(
@@ -215,17 +202,17 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
 def _stated_band(spec: Spec) -> tuple[float, float] | None:
     """The band of the spectrum or of the limits; in continuous time also of a given excitation."""
     match spec.spectrum:
-        case PolynomialSpectrum(band=band):
+        case spectrum.PolynomialSpectrum(band=band):
             return band
-        case MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
+        case spectrum.MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
             return _around(given)
-        case GivenSpectrum(given=stated) if spec.limits.band is None and not spec.plant.sampled:
+        case spectrum.GivenSpectrum(given=stated) if spec.limits.band is None and not spec.plant.sampled:
             match stated:
-                case GivenSignal():
+                case spectrum.GivenSignal():
                     return 0.0, np.pi / spec.sample_time
-                case GivenMultisine():
+                case spectrum.GivenMultisine():
                     return _around(stated.frequencies)
-                case GivenTable(file=name):
+                case spectrum.GivenTable(file=name):
                     rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)
                     return _around(rows["frequency"].tolist())
     return spec.limits.band
@@ -244,7 +231,7 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     """The information (k, k) of `experiment.prior`: stated, of a model file, or of earlier samples."""
-    if (stated := stated_prior(spec, experiment.model.names)) is not None:
+    if (stated := parameters.stated_prior(spec, experiment.model.names)) is not None:
         return stated[0]
     record = prior_record(spec)
     return None if record is None else information_in(spec, experiment, record)
@@ -264,7 +251,7 @@ def prior_record(spec: Spec) -> Array | None:
     prior = spec.experiment.prior
     if prior is None or prior.names_a_model or not isinstance(prior.information, str):
         return None
-    return read_excitation_record(spec, prior.information, PRIOR)
+    return read_excitation_record(spec, prior.information, parameters.PRIOR)
 
 
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:

@@ -16,17 +16,12 @@ from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Model
+from inputdesign_cli.questions.building import system
 from inputdesign_cli.questions.building.demand import check_effects, on_finite_information
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.model_error import confidence_factor, unstated_errors
 from inputdesign_cli.questions.building.parameters import build_earlier, check_known, embedded, inverse
 from inputdesign_cli.questions.building.requirements import build_asked
-from inputdesign_cli.questions.building.system import (
-    build_experiment,
-    build_loop,
-    information_in,
-    read_excitation_record,
-)
 from inputdesign_cli.questions.common.foresight import Foresight
 from inputdesign_cli.questions.common.knowledge import Foreseen, Knowledge
 from inputdesign_cli.questions.common.robust import CONFIDENCE, Batch, Plants, Region
@@ -148,9 +143,9 @@ class UncertainPlant:
         source = stated.covariance if stated.covariance is not None else stated.information
         if isinstance(source, str):
             if not source.endswith((".yaml", ".yml")):
-                record = read_excitation_record(self.spec, source, key)
+                record = system.read_excitation_record(self.spec, source, key)
                 earlier = replace(self.experiment, prior=None)
-                return self._inverted(information_in(self.spec, earlier, record), key)
+                return self._inverted(system.information_in(self.spec, earlier, record), key)
             found = load_estimate(self.spec, source, key)
             covariance, listed = np.array(found.covariance, dtype=float), tuple(found.parameters)
             full = embedded(self.spec, names, covariance, listed, key)
@@ -217,7 +212,7 @@ class UncertainPlant:
         loop = None
         if controller is not None:
             try:
-                loop = build_loop(self.spec, model, controller)
+                loop = system.build_loop(self.spec, model, controller)
             except SpecError as error:
                 raise _NoPlantError("no-stable-plant", error.diagnostics[0].message) from error
         if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
@@ -408,7 +403,7 @@ def build_knowledge(spec: Spec, confidence: float = POSSIBLE) -> Knowledge | Non
     stated = spec.uncertainty
     if stated is None or isinstance(stated.scenarios, tuple):
         return None
-    return UncertainPlant(spec, stated, build_experiment(spec)).region(confidence)
+    return UncertainPlant(spec, stated, system.build_experiment(spec)).region(confidence)
 
 
 def build_foreseen(spec: Spec, nominal: Model) -> Foreseen | None:
@@ -424,7 +419,7 @@ def build_nominal_covariance(spec: Spec, nominal: Model) -> Array:
     """
     covariance = np.zeros((nominal.theta.size, nominal.theta.size))
     if spec.uncertainty is not None:
-        moments = UncertainPlant(spec, spec.uncertainty, build_experiment(spec)).second_moments()
+        moments = UncertainPlant(spec, spec.uncertainty, system.build_experiment(spec)).second_moments()
         covariance[: len(moments), : len(moments)] = moments
     elif spec.estimate is not None:
         names, values = list(nominal.names), spec.estimate.parameters
