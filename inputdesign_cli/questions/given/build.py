@@ -11,7 +11,6 @@ from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.findings.designs import StatedLimits
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import InPhase
-from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header, build_units
 from inputdesign_cli.questions.building.limits import build_power_limits
 from inputdesign_cli.questions.building.model_error import (
@@ -29,7 +28,7 @@ from inputdesign_cli.questions.building.system import (
     read_excitation_record,
     record_step,
 )
-from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.given.solve import GivenExcitation, GivenTask

@@ -9,7 +9,6 @@ from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import refuse
 from inputdesign_cli.questions.building.demand import check_design
-from inputdesign_cli.questions.building.foresight import build_foresight
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.questions.building.model_error import (
@@ -24,7 +23,7 @@ from inputdesign_cli.questions.building.simulation import build_simulation, buil
 from inputdesign_cli.questions.building.spectra import build_basis
 from inputdesign_cli.questions.building.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
-from inputdesign_cli.questions.building.uncertainty import build_plants
+from inputdesign_cli.questions.building.uncertainty import build_foresight, build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
