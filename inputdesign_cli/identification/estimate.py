@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data
+from inputdesign_cli.identification.checks import check_noisy, factor_of_data
 from inputdesign_cli.identification.directed import alternative
-from inputdesign_cli.identification.records import Point, Records, inverses, shares, split
+from inputdesign_cli.identification.records import Point, Records, inverses, shares
 from inputdesign_cli.identification.search import Rival, Search
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.variations import variations
@@ -146,8 +146,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
     """
     records, point, kind, theta = found.records, found.point, found.records.kind, found.point.theta
     noise = noise_of(records, point)
-    check_noisy(np.diag(noise), records.y)
-    check_apart(noise)
+    check_noisy(noise, records.y)
     factor, earlier = factor_at(records, point, noise), records.earlier
     simulation = _simulation(records, point, y)
     known = None if kind.continuous or None in simulation.fit else simulation.outputs
@@ -174,9 +173,13 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
 def _simulation(records: Records, point: Point, y: Array) -> Simulation:
     """Return the simulation of the inputs, and the part that unknown starts explain."""
     kind, lengths = records.kind, records.lengths
-    parts = zip(records.parts, split(point.errors, point.near.begun, lengths), strict=True)
-    caused = [kind.caused(point.theta, *signals, *errors) for signals, errors in parts]
-    outputs = np.concatenate(caused) + y - records.y
+    model, every = kind.model.at(point.theta), records.from_rest(point.theta)[0] - point.near.begun
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        noise = [
+            model.simulate(0.0 * u, e, 1.0)[1]
+            for (u, _), e in zip(records.parts, np.split(every, np.cumsum(lengths)[:-1]), strict=True)
+        ]
+    outputs = y - np.concatenate(noise)
     varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, np.cumsum(lengths)[:-1])])
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
         left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)

@@ -176,11 +176,6 @@ class Kind(ABC):
             fades = np.max(late, axis=(1, 2, 3), initial=0.0) < np.max(early, axis=(1, 2, 3))
         return np.where(fades[:, None, None, None], found, 0.0)
 
-    def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
-        """Return the response (N, p) to inputs, and to errors that the start explains: `begun`."""
-        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-            return np.asarray(sum(self.model.at(theta).simulate(u, begun, 1.0)))
-
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs are stable, so that they can be simulated."""
         return (True,) * self.outputs
