@@ -35,17 +35,11 @@ class Ended(NamedTuple):
 
 
 class Begun(NamedTuple):
-    """How the records begin.
+    """How the records begin."""
 
-    Attributes:
-        free: whether unknown starts and levels were estimated along with theta.
-        rest_refuted: whether the records say that they do not begin at rest about zero.
-        first: (records, p), the first residuals if each record began at rest about zero.
-    """
-
-    free: bool
-    rest_refuted: bool
-    first: Array
+    free: bool  # whether unknown starts and levels were estimated along with theta
+    rest_refuted: bool  # whether the records say that they do not begin at rest about zero
+    first: Array  # (records, p), the first residuals if each record began at rest about zero
 
 
 class Simulation(NamedTuple):
@@ -61,15 +55,10 @@ class Simulation(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """How an earlier estimate, which is combined with the data, goes with them.
+    """How an earlier estimate, which is combined with the data, goes with them."""
 
-    Attributes:
-        differing: the probability that two estimates of one system differ as much.
-        alike: the probability that one from other data agrees as closely.
-    """
-
-    differing: float
-    alike: float
+    differing: float  # the probability that two estimates of one system differ as much
+    alike: float  # the probability that one from other data agrees as closely
 
 
 @dataclass(frozen=True)
@@ -79,22 +68,18 @@ class Estimate:
     Attributes:
         names, theta: (k,).
         factor: L (k, k), lower triangular; L L^T is the `information`, its inverse the `covariance` of theta.
-        noise: (p, p) covariance of e; of white noise on the samples where the model knows no other.
-        errors: (samples, p) prediction errors at theta.
-        lengths: the samples of each of the records, which follow each other.
-        prior: None without an earlier estimate.
     """
 
     names: tuple[str, ...]
     theta: Array
     factor: Array
-    noise: Array
-    errors: Array
-    lengths: tuple[int, ...]
+    noise: Array  # (p, p) covariance of e; of white noise on the samples where the model knows no other
+    errors: Array  # (samples, p) prediction errors at theta
+    lengths: tuple[int, ...]  # the samples of each of the records, which follow each other
     search: Ended
     start: Begun
     simulation: Simulation
-    prior: Agreement | None
+    prior: Agreement | None  # None without an earlier estimate
     tests: Tests
 
     def with_rivals(self, rivals: tuple[Rival, ...]) -> Estimate:
@@ -118,15 +103,13 @@ class BatchEstimate:
     """Prediction-error estimates of many records.
 
     Attributes:
-        theta: (runs, k).
-        noise: (runs, p, p) covariance of e, unbiased to first order.
         information: (runs, k, k) sum over the samples of psi noise^-1 psi^T; its inverse is the covariance of
             theta.
         converged, steps: (runs,) of the search.
     """
 
-    theta: Array
-    noise: NDArray[np.float64]
+    theta: Array  # (runs, k)
+    noise: NDArray[np.float64]  # (runs, p, p) covariance of e, unbiased to first order
     information: NDArray[np.float64]
     converged: NDArray[np.bool_]
     steps: NDArray[np.int64]

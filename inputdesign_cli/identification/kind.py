@@ -41,16 +41,14 @@ class Extension(NamedTuple):
     Attributes:
         model: the larger model, whose new parameter is zero. If the model has other parameters than its
             coefficients, this is the model of the coefficients.
-        kind: of the larger model; in place of `model`, it may be behind a hold.
         name: of the new parameter; `what` it is.
-        nested: whether that structure has no further freedom than the one parameter.
     """
 
     model: Listed
-    kind: Kind
+    kind: Kind  # of the larger model; in place of `model`, it may be behind a hold
     name: str
     what: str
-    nested: bool = True
+    nested: bool = True  # whether that structure has no further freedom than the one parameter
 
 
 @dataclass(frozen=True)

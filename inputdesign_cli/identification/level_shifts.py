@@ -41,26 +41,20 @@ class LevelShift:
     """The likeliest shift of an output.
 
     Attributes:
-        output: from zero.
-        sample: likely the first of it, counted through all records.
-        lag: the time constant by which it is smooth, in samples; zero of a step.
         begins, ends: between these samples it likely begins and has settled, the last left out.
-        rises: whether the output is larger after it.
         test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-        score: the statistic of the score, which is smaller; it is the largest of `looks` statistics.
-        alone: whether it explains more than a line through its record, or single samples next to it.
     """
 
-    output: int
-    sample: int
-    lag: float
+    output: int  # from zero
+    sample: int  # likely the first of it, counted through all records
+    lag: float  # the time constant by which it is smooth, in samples; zero of a step
     begins: int
     ends: int
-    rises: bool
+    rises: bool  # whether the output is larger after it
     test: ScoreTest
-    score: float
+    score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
     looks: int
-    alone: bool
+    alone: bool  # whether it explains more than a line through its record, or single samples next to it
 
     @property
     def refutes(self) -> bool:

@@ -30,20 +30,17 @@ class ResidualTest(NamedTuple):
     """A chi-squared test of residuals over several lags, all channels at once ([ljung-1999], Section 16.6).
 
     Attributes:
-        lags: (n,).
         correlation: (n, p, columns), normalised; entry (i, j) of lag tau is that of residual i and of
             residual or input j, tau samples earlier.
-        limit: a single correlation of white noise stays within +- limit with probability 0.99.
         statistic, freedom: chi-squared with this many degrees of freedom if the model is right.
-        probability: of a statistic at least as large if the model is right; small values refute it.
     """
 
-    lags: Array
+    lags: Array  # (n,)
     correlation: NDArray[np.float64]
-    limit: float
+    limit: float  # a single correlation of white noise stays within +- limit with probability 0.99
     statistic: float
     freedom: int
-    probability: float
+    probability: float  # of a statistic at least as large if the model is right; small values refute it
 
     @classmethod
     def of(cls, at: NDArray, correlation: NDArray, samples: int, statistic: float, freedom: int) -> Self:
@@ -117,24 +114,22 @@ class Tests:
     Attributes:
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
-        scores: of the structure, and `directed` of one additional parameter.
         shift: where an output most likely shifts, whatever the inputs do; None in too short records.
         shifts: all that refute the structure; `beside_shifts`, `scores` once they are taken off.
         coloured: whether the noise has more structure than its model; all tests except of past residuals are
             then made with whitened residuals.
-        future: in open loop, whether the future of each input explains errors.
         alike: of several experiments, the probability that each differs as much from the others.
     """
 
     whiteness: ResidualTest
     independence: ResidualTest
-    scores: tuple[ScoreTest, ...]
+    scores: tuple[ScoreTest, ...]  # of the structure, and `directed` of one additional parameter
     directed: tuple[Directed, ...]
     shift: LevelShift | None
     shifts: tuple[LevelShift, ...]
     beside_shifts: tuple[ScoreTest, ...]
     coloured: bool
-    future: tuple[ScoreTest, ...]
+    future: tuple[ScoreTest, ...]  # in open loop, whether the future of each input explains errors
     alike: tuple[float, ...]
 
     @property
