@@ -195,7 +195,7 @@ def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
 
 
 def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None) -> dict[str, str]:
-    """Return role -> column: of the channels of a plant, or of what a log calls u, y1, r, time, ..
+    """Return role -> column: of the channels of a plant, or of the columns that a log calls u, y1, r, ..
 
     Args:
         named: the columns that the user names, by role.

@@ -86,7 +86,7 @@ def test_what_another_excitation_could_tell_is_not_called_impossible():
     lines = ["limits={band: [0.01, 3.14]}", "spectrum={type: multisine, lines: 20}"]
     result = solve(parse_spec(NEAR, overrides=lines)).result
     assert result["status"] == "optimal"
-    assert "the slowest mode has a time constant of" in result["notes"][0]
+    assert result["findings"][0]["code"] == "experiment-short"
 
 
 @pytest.mark.parametrize(("pole", "told"), [(0.5, False), (0.99, False), (0.999, True)])
