@@ -182,9 +182,9 @@ def test_the_share_of_each_limit_that_single_samples_take():
     assert shares == pytest.approx({"amplitude.input": np.abs(u).max() / 1.6, "rate": moves.max() / 1.6})
     assert shares["rate"] == pytest.approx(2.0 * shares["amplitude.input"])
     assert 0.98 < shares["rate"] <= 1.0 + 1e-9
-    (note,) = [note for note in outcome.result["notes"] if "shortest record" in note]
+    (longer,) = [one for one in outcome.result["findings"] if one["code"] == "record-longer"]
     rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
-    assert note.endswith(f"the record takes {rate} of limits.rate")
+    assert f"{rate} of limits.rate" in longer["message"]
     (said,) = [value for name, value, _ in facts(outcome.outcome, "s") if name == "limits"]
     assert said.endswith(f"single samples take {rate} of rate, {values} of input amplitude")
     assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))

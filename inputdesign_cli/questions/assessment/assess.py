@@ -142,7 +142,7 @@ def _of_nominal(
     """Return a finding where the estimate is far from every plant that the design was made for."""
     if distance is None or distance.nominal.within_uncertainty:
         return []
-    far = far_from_nominal(task.header.units, distance)
+    far = far_from_nominal(distance)
     if first is None or not far:
         return far
     return of_first_part(distance) if first else []

@@ -106,11 +106,7 @@ def check_reach(spec: Spec, question: Question) -> Reach:
         hint = f"{add} {others}; or {avoid if question.basis.free else 'choose other lines'}"
         raise spec.complain(code, message, hint=hint, key=section)
     if unbounded or inside:
-        return Reach(
-            bounded=False,
-            note="the design is the best of its spectrum type, and there is no bound over every spectrum: "
-            f"{free}, so that {outcome}; with {others} there is one",
-        )
+        return Reach(bounded=False, note=f"{free}, so that {outcome}; with {others} there is one")
     inner = (lo + ends[0] * _OFF * hi, hi - ends[1] * _OFF * hi)
     if not question.basis.free:
         return Reach(attained=False, band=inner)
