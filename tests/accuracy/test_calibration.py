@@ -25,10 +25,9 @@ spectrum: {type: fir, order: 4}
 
 
 FEW = "{exact: 0.95, draws: 1000, runs: 0}"
-ASYMPTOTIC = "{exact: 0.95, runs: 0}"
 
 
-def spec(text, confidence=ASYMPTOTIC, *overrides):
+def spec(text, confidence, *overrides):
     return parse_spec(text.replace("CONFIDENCE", confidence), file="spec.yaml", overrides=list(overrides))
 
 
@@ -58,14 +57,14 @@ def test_of_a_finite_response_it_is_that_of_a_plain_simulation():
 
 
 def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
-    usual, exact = solve(spec(FIR, "0.95")).result, solve(spec(FIR)).result
+    usual, exact = solve(spec(FIR, "0.95")).result, solve(spec(FIR, FEW)).result
     share = (exact["model_error"]["alpha"] / usual["model_error"]["alpha"]) ** 2
     assert exact["cost"] / usual["cost"] == pytest.approx(share, rel=1e-6)
     told = exact["model_error"]["confidence"]
     assert told["chi_squared_alpha"] == pytest.approx(usual["model_error"]["alpha"], rel=1e-12)
     assert told["linear"] == told["exact"]
     low, high = told["exact_limits"]
-    assert low - 0.01 < 0.95 < high + 0.01
+    assert low - 0.02 < 0.95 < high + 0.02
     assert "confidence" not in usual["model_error"]
     assert exact["signal"]["confidence"]["exact"] > 0.93
 
@@ -156,6 +155,7 @@ def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
     assert share == pytest.approx(found["model_error"]["alpha"] / plain["model_error"]["alpha"], rel=0.15)
 
 
+@pytest.mark.slow
 def test_an_analysis_calibrates_as_the_design_does():
     runs = "{exact: 0.9, draws: 1000, runs: 500}"
     design = solve(spec(POLE, runs)).result
@@ -209,6 +209,7 @@ def test_runs_keep_the_bound_with_the_probability(name):
     assert kept == pytest.approx(0.95, abs=0.015)
 
 
+@pytest.mark.slow
 def test_a_limit_that_leaves_just_enough_is_no_conflict():
     free = solve(spec(FIR, FEW)).result["power"]["input"][0]
     within = solve(spec(FIR, FEW, f"limits={{input_power: {1.002 * free!r}}}")).result

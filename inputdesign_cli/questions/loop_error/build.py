@@ -21,7 +21,7 @@ from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries
-from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
+from inputdesign_cli.plant.polynomial import all_roots, roots_in_z
 from inputdesign_cli.questions.building.demand import check_effects, check_model, check_record
 from inputdesign_cli.questions.building.header import build_header
 from inputdesign_cli.questions.building.limits import build_power_limits, implied_limits
@@ -110,7 +110,7 @@ def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, k
             key=key,
         )
     made = MatrixPlant.of(channels)
-    poles = join_roots(roots_in_z(part) for part in (*made.A, *(f for row in made.F for f in row)))
+    poles = all_roots([*made.A, *(f for row in made.F for f in row)])
     if np.any(np.abs(poles - 1.0) < _INTEGRATES):
         raise bad_spec(
             "not-supported",
