@@ -64,7 +64,7 @@ def test_the_cost_of_a_linear_plant_falls_with_the_square_of_alpha():
     assert told["chi_squared_alpha"] == pytest.approx(usual["model_error"]["alpha"], rel=1e-12)
     assert told["linear"] == told["exact"]
     low, high = told["exact_limits"]
-    assert low - 0.02 < 0.95 < high + 0.02
+    assert low - 0.01 < 0.95 < high + 0.01
     assert "confidence" not in usual["model_error"]
     assert exact["signal"]["confidence"]["exact"] > 0.93
 

@@ -21,10 +21,8 @@ def real():
     return Spectral(paper_experiment(), PolynomialBasis(2, 3, (0.0, 2.0)))
 
 
-@pytest.mark.parametrize(
-    "criterion",
-    ["E", "T", pytest.param("A", marks=pytest.mark.slow), pytest.param("D", marks=pytest.mark.slow)],
-)
+@pytest.mark.first(2)
+@pytest.mark.parametrize("criterion", ["E", "T", "A", "D"])
 def test_climbs_and_stays_below_the_optimum(real, criterion):
     problem = design(real, criterion)
     found = hill_climb(problem, 2, starts=1, rng=np.random.default_rng(0))
