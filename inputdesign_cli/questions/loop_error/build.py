@@ -8,6 +8,7 @@ from typing import Protocol, cast
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.loop_error import (
     ControlLaw,
     InternalModel,
@@ -15,7 +16,6 @@ from inputdesign_cli.design.loop_error import (
     MatrixPlant,
     MinimumVariance,
     ModelReference,
-    PowerLimit,
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec
@@ -241,7 +241,7 @@ def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
         PowerLimit(
             "input" if one.kind == "excitation" else one.kind,
             one.bound,
-            one.channel or 0 if one.implied else one.channel,
+            channel=one.channel or 0 if one.implied else one.channel,
         )
         for one in (*stated, *implied_limits(spec))
     )

@@ -158,7 +158,7 @@ def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
     return tuple(
         ActivePower(
             limit.kind,
-            limit.most,
+            limit.bound,
             float(design.powers[index]),
             channel=None if limit.channel is None else limit.channel + 1,
             multiplier=None if design.multipliers is None else float(design.multipliers[index]),
