@@ -125,7 +125,7 @@ def test_a_prior_of_another_system_decides_nothing(lag_record):
     path = lag_record("a.csv", 700, 1, power=0.5)
     found = identify(parse_spec(LAG), path).result
     values = {name: 1.1 * value for name, value in found["identification"]["theta"].items()}
-    prior = json.dumps({"information": found["information"]["matrix"].tolist(), "parameters": values})
+    prior = json.dumps({"information": found["information"]["matrix"], "parameters": values})
     verdict = assess(parse_spec(LAG, overrides=[f"experiment.prior={prior}"]), path)
     assert verdict.verdict == "undecided"
     assert "contradict each other" in " ".join(verdict.results.result["assessment"]["undecided"])

@@ -9,6 +9,7 @@ from typing import Protocol, cast
 import numpy as np
 
 from inputdesign_cli.arrays import Array, Rows
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.loop_error import (
     ControlLaw,
     InternalModel,
@@ -16,13 +17,12 @@ from inputdesign_cli.design.loop_error import (
     MatrixPlant,
     MinimumVariance,
     ModelReference,
-    PowerLimit,
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.information import POWER_KINDS
 from inputdesign_cli.plant import Model, PolynomialModel, Rational, TransferMatrix, hold_entries
-from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
+from inputdesign_cli.plant.polynomial import all_roots, roots_in_z
 from inputdesign_cli.questions.building import system
 from inputdesign_cli.questions.building.demand import check_effects, check_model, check_record
 from inputdesign_cli.questions.building.header import build_header
@@ -82,7 +82,7 @@ def matrix_plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, k
     else:
         raise _refuse(key, "take a plant that is not sampled", "add sample: zoh to a continuous-time plant")
     made = MatrixPlant.of(channels)
-    poles = join_roots(roots_in_z(part) for part in (*made.A, *(f for row in made.F for f in row)))
+    poles = all_roots([*made.A, *(f for row in made.F for f in row)])
     if np.any(np.abs(poles - 1.0) < _INTEGRATES):
         hint = "move the pole into the unit circle, or state the accuracy as model_error"
         raise _refuse(key, "take a plant that integrates, whose outputs are not stationary", hint)

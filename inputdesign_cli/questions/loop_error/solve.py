@@ -116,7 +116,7 @@ def _limits(design: LoopErrorDesign) -> tuple[ActivePower, ...]:
     return tuple(
         ActivePower(
             limit.kind,
-            limit.most,
+            limit.bound,
             float(power),
             channel=None if limit.channel is None else limit.channel + 1,
             multiplier=multiplier,

@@ -85,6 +85,7 @@ def test_reference_values(case, goal, value):
     )
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_one_estimated_parameter_against_cvxpy(seed):
     rng = np.random.default_rng(seed)
@@ -95,7 +96,7 @@ def test_one_estimated_parameter_against_cvxpy(seed):
     assert 0.0 <= gap(found, found.split.total) <= 1.1e-6
 
 
-@pytest.mark.first(3)
+@pytest.mark.first(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_two_estimated_parameters_are_proved(seed):
     rng = np.random.default_rng(seed)
