@@ -76,7 +76,7 @@ def spec_of(case: Case) -> Spec:
         block = f"simulation={{plant: {json.dumps(truth.content['plant'])}}}"
         return parse_spec(case.text + COMMON, overrides=[case.wrong, block, f"campaign={case.campaign}"])
     planner = build_planner(truth)
-    power = ENERGY * planner.cheapest(planner.nominal.model) / SAMPLES
+    power = ENERGY * planner.knowing(planner.nominal.model)[0] / SAMPLES
     pilot = f"campaign={{block: 50, pilot: {{samples: {SAMPLES}, power: {power!r}}}}}"
     return parse_spec(case.text + COMMON, overrides=[pilot])
 

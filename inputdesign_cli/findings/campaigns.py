@@ -49,12 +49,6 @@ RECORD_FOLLOWS_IN_PART = note(
     "clipping or rounding. Estimates use the recorded signals.",
     "Compare the columns of the record with the plan.",
 )
-EARLIER_PICTURES = note(
-    "earlier-pictures",
-    "Pictures show the campaign before its last decision. `idesign next --no-figures` keeps the pictures. "
-    "They do not show the last record.",
-    "Give `idesign next DIR` without `--no-figures`: it draws them anew.",
-)
 NO_ESTIMATE_YET = note(
     "no-estimate-yet",
     "The records do not determine the model yet. The next part is planned without an estimate.",
@@ -265,12 +259,3 @@ def planned_otherwise(
         )
         found.append(PART_NOT_ROBUST.found(message, where=file))
     return found
-
-
-def earlier_pictures(names: Sequence[str]) -> list[Finding]:
-    """Return a finding that names pictures of an earlier decision."""
-    message = (
-        f"{', '.join(names)} show the campaign before this decision, which was made with --no-figures: "
-        "`idesign next` without it draws them anew"
-    )
-    return [EARLIER_PICTURES.found(message, files=list(names))] if names else []
