@@ -19,8 +19,7 @@ from pathlib import Path
 from inputdesign_cli import load_spec, parse_spec
 from inputdesign_cli.outcome import write_plain
 from inputdesign_cli.questions.campaign.build import build_campaign, build_planner
-from inputdesign_cli.questions.campaign.outcome import way_entry
-from inputdesign_cli.questions.campaign.study import oracle_of, tried, ways_of
+from inputdesign_cli.questions.campaign.study import oracle_of, tried, way_entry, ways_of
 from inputdesign_cli.specification import Spec
 
 ILL1 = (

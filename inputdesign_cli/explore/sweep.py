@@ -304,7 +304,8 @@ def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
     """Return C and D of one order, at least `least`, preferred by BIC for the longest errors (n,)."""
     v, tried = max(errors, key=len), list[tuple[float, Array, Array]]()
     for n in range(least, _MOST_NOISE + 1):
-        C, D = (reflected(np.append(1.0, p)) for p in (noise_polynomials(v, n, n) if n else ([], [])))
+        after = noise_polynomials(v, n, n) if n else (np.zeros(0), np.zeros(0))
+        C, D = (reflected(np.append(1.0, p)) for p in after)
         power = max(float(np.mean(filtered(D, C, v) ** 2)), 1e-300)
         tried.append((v.size * np.log(power) + 2 * n * np.log(v.size), C, D))
     return min(tried, key=lambda one: one[0])[1:]

@@ -7,7 +7,8 @@ which order they are computed: the same numbers on one process, on several and o
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, NamedTuple, TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -19,7 +20,8 @@ Answer = TypeVar("Answer")
 Seed = int | np.random.SeedSequence
 
 
-class _Batch(NamedTuple, Generic[Answer]):
+@dataclass(frozen=True)
+class _Batch(Generic[Answer]):
     """What a worker needs to know of a batch: the same function for all, a stream of its own."""
 
     index: int

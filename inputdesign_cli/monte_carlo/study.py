@@ -130,8 +130,8 @@ def _again_where_lost(
     again: Callable[[Array, Array], Estimate], u: Array, y: Array, found: BatchEstimate
 ) -> BatchEstimate:
     """The same, each run whose search did not settle estimated anew from several starts."""
-    fields = (found.theta, found.noise, found.information, found.converged, found.steps)
-    theta, noise, information, converged, steps = (values.copy() for values in fields)
+    theta, noise, information = found.theta.copy(), found.noise.copy(), found.information.copy()
+    converged, steps = found.converged.copy(), found.steps.copy()
     lost = np.flatnonzero(~converged).tolist()
     for done, run in enumerate(lost):
         tell(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))

@@ -114,8 +114,8 @@ class Planner:
         if known is None and done == 0 and rules.pilot_power is not None:
             return self._kept(self._pilot(rules.pilot_power, take, seed), rules, np.inf, None, earlier)
         cap = rules.cap(first)
-        if first is None and known is not None and rules.learns_first:
-            cap = _ELSEWHERE * self._unlearned
+        if first is None and known is not None and None not in (rules.pilot_power, rules.power_cap):
+            cap = _ELSEWHERE * self._unlearned  # the first plan after a pilot
         last = rules.schedule.last(done)
         change = Change(
             samples=rest,
@@ -131,9 +131,9 @@ class Planner:
             with suppress(IdesignError):
                 found = self._designed(model, replace(change, uncertainty="data"))
                 if found.cost <= cap * REACHED:
-                    return self._kept(found.planned.cut(take), rules, cap, known, earlier)
+                    return self._kept(replace(found.planned, take=take), rules, cap, known, earlier)
         try:
-            plan = self._affordable(model, change, cap, rules.end - done).cut(take)
+            plan = replace(self._affordable(model, change, cap, rules.end - done), take=take)
             # The first plan sets the cap, which its own part keeps as well.
             own = rules.cap(plan.cost) if first is None else np.inf
             return self._kept(plan, rules, min(cap, own), known, earlier)
@@ -142,7 +142,7 @@ class Planner:
                 raise
             # The estimate may be far off; the next part improves it, and nothing is decided by this one.
             cost = np.inf if first is None else min(cap, first)
-            gap = self._stopgap(rules, cost, rest, seed, error).cut(take)
+            gap = replace(self._stopgap(rules, cost, rest, seed, error), take=take)
             return self._kept(gap, rules, cap, None, earlier)
 
     @cached_property
