@@ -188,9 +188,3 @@ def planned_otherwise(
         *EARLIER_PARTS_COST.when(beyond, cost, where=file, cost=part_cost),
         *PART_NOT_ROBUST.when(fragile, file, where=file),
     ]
-
-
-@finding(NOTE, "earlier-pictures", "Give `idesign next DIR` without `--no-figures`: it draws them anew.")
-def earlier_pictures(kind: FindingKind, names: Sequence[str]) -> list[Finding]:
-    """Pictures show the campaign before its last decision. `idesign next --no-figures` keeps them."""
-    return kind.when(names, ", ".join(names), files=list(names))

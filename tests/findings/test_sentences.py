@@ -60,7 +60,6 @@ FOUND = {
     "record-shorter": campaigns.shorter("r.csv", "plan_01.csv", 59, 60),
     "record-without-excitation": campaigns.without_excitation("r.csv", "plan_01.csv"),
     "record-withdrawn": campaigns.withdrawn_record("r.csv", 2),
-    "earlier-pictures": campaigns.earlier_pictures(["signal.png"]),
     "no-estimate-yet": campaigns.no_estimate_yet("the input never moves"),
     "estimate-not-used": [
         *campaigns.estimate_not_used(0.4, ""),
@@ -117,7 +116,7 @@ def test_a_finding_has_its_code_and_short_sentences(code):
 def test_what_is_in_order_is_not_noted():
     good = replace(MADE, met=True, extra_power=0.1)
     assert planned() == planned(share=0.95) == followed() == campaigns.estimate_not_used(1.0, "") == []
-    assert campaigns.shorter("r.csv", "plan_01.csv", 60, 60) == campaigns.earlier_pictures([]) == []
+    assert campaigns.shorter("r.csv", "plan_01.csv", 60, 60) == []
     assert designs.inputs_without_power([1.0, 0.5]) == []
     assert designs.short_experiment(Experiment(MODEL, 1000)) == []
     assert unfinished.fewer_plants(120, 120) == unfinished.unstable_draws(40, 100) == []

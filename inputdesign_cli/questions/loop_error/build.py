@@ -149,7 +149,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
             PowerLimit(
                 "input" if one.kind == "excitation" else one.kind,  # in open loop they are the same
                 one.bound,
-                one.channel or 0 if one.implied else one.channel,
+                channel=one.channel or 0 if one.implied else one.channel,
             )
             for one in (*stated, *implied_limits(spec))
         ),
