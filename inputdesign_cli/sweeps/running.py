@@ -134,7 +134,7 @@ def run_sweep(
             replace_text(directory / SUMMARY, json_text(plan.summary(made_from, statuses)))
         if fail_fast and run.first_failure:
             raise run.first_failure
-        from inputdesign_cli.figures.sweep_figures import draw_sweep
+        from inputdesign_cli.figures.sweep import draw_sweep
         from inputdesign_cli.figures.sweep_table import read_sweep
 
         files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
