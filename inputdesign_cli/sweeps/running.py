@@ -128,7 +128,7 @@ class SweepRun:
                 replace_text(directory / SUMMARY, json_text(plan.summary(made_from, self.statuses)))
             if self.fail_fast and self.first_failure:
                 raise self.first_failure
-            from inputdesign_cli.figures.sweep_figures import draw_sweep
+            from inputdesign_cli.figures.sweep import draw_sweep
             from inputdesign_cli.figures.sweep_table import read_sweep
 
             self.files = [directory / name for name in (TABLE, SUMMARY, SPEC)]

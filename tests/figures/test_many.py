@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.trade import Trade, draw_trade
+from inputdesign_cli.figures.sweep import draw_trade
+from inputdesign_cli.figures.sweep_table import Trade
 from inputdesign_cli.outcome.curves import BoundCurves, BoundPanel, OrderCurves, ResponseCurves
 from tests.support.curves import SEEN, G, W, lines_by_label
 
