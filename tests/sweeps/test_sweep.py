@@ -243,6 +243,7 @@ class Points(list):
         super().__init__([("100",)])
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_process_gives(spec, tmp_path):
     settings = ["experiment.samples=50,100,-1", "spectrum.order=1,2"]
     run_sweep(spec, settings, directory=tmp_path / "one")
