@@ -199,6 +199,7 @@ def test_the_covariance_is_that_of_the_records_information(hold):
     np.testing.assert_allclose(found.covariance @ found.information, np.eye(12), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_instruments_alone_come_within_a_fraction_of_a_standard_deviation():
     rng = np.random.default_rng(9)
     u = excitation(800, 2, rng)
