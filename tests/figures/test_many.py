@@ -53,6 +53,7 @@ def test_every_amplitude_of_a_trade_is_drawn():
     assert apart(list(drawn.values()))
 
 
+@pytest.mark.slow
 def test_ratios_of_nine_entries_are_told_apart(page):
     panels = tuple(
         BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=entry) for entry in product(range(3), repeat=2)

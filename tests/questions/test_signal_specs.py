@@ -105,6 +105,10 @@ def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not
     moves = np.abs(np.diff(outcome.tables["signal"].columns["u1"], prepend=0.0))
     assert np.isclose(moves, 0.1).mean() > 0.5
     assert moves.max() <= 0.1
+
+
+@pytest.mark.slow
+def test_where_noise_does_not_fit_ramps_between_two_levels_are_named():
     with pytest.raises(InfeasibleError) as error:
         solve(parse_spec(SLOW + "signal: {type: filtered_noise}\n"))
     assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint

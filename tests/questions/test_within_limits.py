@@ -90,6 +90,7 @@ def test_what_is_bought_can_be_had_and_no_more(head, accuracy, fraction):
     assert still.details["factor"] == pytest.approx(1 / (1 - 1e-3), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_several_channels_name_the_entry_and_the_input():
     diagnostic = refused(TWO + ERROR.format(0.1))
     details = diagnostic.details

@@ -236,6 +236,7 @@ def test_a_number_has_the_fewest_digits_that_can_be_read_back():
     assert [found[name] for name in "abcn"] == ["0.1", "0.3333333333333333", "2", "7"]
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_process_gives(spec, tmp_path):
     settings = ["experiment.samples=50,100,-1", "spectrum.order=1,2"]
     run_sweep(spec, settings, directory=tmp_path / "one")

@@ -41,7 +41,7 @@ from inputdesign_cli.identification.periodic_response import (
 )
 from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
 from inputdesign_cli.outcome.curves import Curves, ResponseCurves
-from inputdesign_cli.outcome.response import SilentLine
+from inputdesign_cli.outcome.estimate import SilentLine
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.plant import Model

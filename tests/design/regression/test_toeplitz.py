@@ -97,7 +97,7 @@ def test_one_estimated_parameter_against_cvxpy(seed):
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 2])
 def test_two_estimated_parameters_are_proved(seed):
     rng = np.random.default_rng(seed)
     weights = rng.standard_normal(4 + seed % 2)
