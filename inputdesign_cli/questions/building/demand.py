@@ -168,13 +168,12 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     other = "spectrum: {type: free} with " if fir else ""
     what = f"gives infinite information about {grown}" if grown else "makes the outputs drift without bound"
     band = f"limits: {{band: [{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}"
-    raise spec.complain(
-        "infinite-information" if grown else "infinite-output",
-        f"the plant integrates: power at frequency zero {what}",
-        hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}{band}; or make the "
-        f"experiment in closed loop, under a controller{integrates}",
-        key="spectrum" if spec.spectrum is not None else "plant",
-    )
+    code = "infinite-information" if grown else "infinite-output"
+    avoid = f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}{band}"
+    hint = f"{avoid}; or make the experiment in closed loop, under a controller{integrates}"
+    key = "spectrum" if spec.spectrum is not None else "plant"
+    message = f"the plant integrates: power at frequency zero {what}"
+    raise spec.complain(code, message, hint=hint, key=key)
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:

@@ -145,13 +145,12 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
     if stated is None or not isinstance(admissible, accuracy.Sensitivity):
         return None
     peak, asked = float(np.max(admissible.nominal(made.grid))), stated.peak
-    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
-    return spec.complain(
-        "admissible-not-positive",
-        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most",
-        hint=f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}",
-        key=_LOOP,
+    message = (
+        f"|S| of the nominal loop reaches {peak:.4g} already, and the margin asks for {asked:.4g} at most"
     )
+    less = f"{stated.allowing(peak)} (the nearer, the longer), for example {stated.allowing(1.2 * peak)}"
+    hint = f"tune more slowly (a larger tau_c), or ask for less of a margin than {less}"
+    return spec.complain("admissible-not-positive", message, hint=hint, key=_LOOP)
 
 
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:

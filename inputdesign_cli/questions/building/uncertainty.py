@@ -216,10 +216,8 @@ class UncertainPlant:
             except SpecError as error:
                 raise _NoPlantError("no-stable-plant", error.diagnostics[0].message) from error
         if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
-            what = "the plant" if loop is None else "the loop"
-            raise _NoPlantError(
-                "no-stable-plant", f"{what} has a pole, or C a root, on or beyond the unit circle"
-            )
+            what = f"{'the plant' if loop is None else 'the loop'} has a pole, or C a root"
+            raise _NoPlantError("no-stable-plant", f"{what}, on or beyond the unit circle")
         return model, loop
 
     @cached_property

@@ -84,9 +84,8 @@ def delays(spec: Spec) -> Iterator[PathDiagnostic]:
     whole = spec.experiment.samples * spec.sample_time
     if "samples" in spec.experiment.model_fields_set and longest >= whole:
         message = f"{{key}} is {show(longest)} {spec.time_unit}, and the experiment lasts {show(whole)}"
-        yield PathDiagnostic(
-            "delay-beyond-record", message, "take more samples, or look at the time_unit", path
-        )
+        hint = "take more samples, or look at the time_unit"
+        yield PathDiagnostic("delay-beyond-record", message, hint, path)
     elif plant.sampled and longest > _LONGEST_DELAY * spec.sample_time:
         message = f"{{key}} is more than {_LONGEST_DELAY} samples: {show(longest)} {spec.time_unit}"
         yield PathDiagnostic("too-large", message, "sample more slowly", path)

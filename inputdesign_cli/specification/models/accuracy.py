@@ -200,10 +200,8 @@ class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("fr
     def check(self) -> Iterator[PathDiagnostic]:
         """A number of lines has a band."""
         if self.lines is not None and self.band is None:
-            message = "{key} is the number of lines in a band, and there is none"
-            yield PathDiagnostic(
-                "unsuitable-key", message, "add band: [low, high], or remove lines", ("lines",)
-            )
+            message, hint = "{key} is of a band, and there is none", "add band: [low, high], or remove lines"
+            yield PathDiagnostic("unsuitable-key", message, hint, ("lines",))
 
 
 class Accuracy(Section, not_both=(("model_error", "loop"),)):

@@ -164,10 +164,8 @@ class Section(BaseModel):
     @model_validator(mode="after")
     def _checked(self) -> Self:
         found = [*self.check()]
-        for rule, groups in zip(
-            (self.exactly_one, self.at_least_one, self.at_most_one), self.groups, strict=True
-        ):
-            found += [one for keys in groups for one in rule(*keys)]
+        rules = zip((self.exactly_one, self.at_least_one, self.at_most_one), self.groups, strict=True)
+        found += [one for rule, groups in rules for keys in groups for one in rule(*keys)]
         if found:
             raise carry(*found)
         return self
