@@ -37,8 +37,7 @@ from inputdesign_cli.explore.sweep import (
 )
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
-from inputdesign_cli.identification.estimate import factor_at, noise_of
-from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.estimators import estimator, factor_at, noise_of
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.identification.white import White
@@ -259,7 +258,7 @@ class _Records:
     ) -> tuple[Array, Array, float, bool, tuple[str, ...]]:
         """Return parameters (k,), deviations, variance of the errors, whether it settled, failing tests."""
         kind = estimator(structure, 1.0)
-        check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
+        check_length(sum(len(y) for _, y in parts), len(kind.model.names), kind.recent, outputs=1)
         records = Records(kind, tuple(centred(parts))).begun_freely(kind.lateness(start))
         found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
         point, white = found.point, White.of(records, found.point)
