@@ -337,16 +337,16 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
 
 
 def _simulation(records: Records, point: Point, y: Array) -> Simulation:
-    """Return the simulation of the inputs, and the part that unknown starts explain."""
-    kind, lengths = records.kind, records.lengths
-    model, every = kind.model.at(point.theta), records.from_rest(point.theta)[0] - point.begun
+    """Return what prediction errors leave of the outputs: what inputs and starts cause."""
+    kind, ends = records.kind, np.cumsum(records.lengths)[:-1]
+    model = kind.model.at(point.theta)
     with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
         noise = [
             model.simulate(0.0 * u, e, 1.0)[1]
-            for (u, _), e in zip(records.parts, np.split(every, np.cumsum(lengths)[:-1]), strict=True)
+            for (u, _), e in zip(records.parts, np.split(point.errors, ends), strict=True)
         ]
     outputs = y - np.concatenate(noise)
-    varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, np.cumsum(lengths)[:-1])])
+    varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, ends)])
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
         left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)
     able = kind.simulates(point.theta)

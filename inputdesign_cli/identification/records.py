@@ -44,7 +44,6 @@ class Point:
     all_errors: Array  # (N + M, p), what unknown starts explain taken off
     all_psi: NDArray[np.float64]  # (k, N + M, p) = -d errors / d theta, the starts following
     samples: int  # N
-    begun: Array  # (N, p), what levels and states at the start explain
     directions: Array  # ((N + M) p, m) orthonormal, errors in white units that unknown starts can explain
     towards: Array  # (k,), minus half the gradient of what the cost has beside the errors
     known: Array  # (k, k), half the Hessian of that, about
@@ -57,9 +56,8 @@ class Point:
     @classmethod
     def at_rest(cls, theta: Array, errors: Array, psi: NDArray[np.float64]) -> Point:
         """Return errors and gradient without unknown starts, not yet weighed."""
-        k, nothing, none = theta.size, np.zeros_like(errors), np.zeros((errors.size, 0))
-        towards, known, weights = np.zeros(k), np.zeros((k, k)), np.eye(errors.shape[1])
-        return cls(theta, errors, psi, len(errors), nothing, none, towards, known, weights)
+        k, none, weights = theta.size, np.zeros((errors.size, 0)), np.eye(errors.shape[1])
+        return cls(theta, errors, psi, len(errors), none, np.zeros(k), np.zeros((k, k)), weights)
 
     @property
     def errors(self) -> Array:
@@ -173,7 +171,6 @@ class Records:
             point,
             all_errors=np.concatenate([left, free.errors_of_past(coefficients)]),
             all_psi=flat.reshape(psi.shape) @ np.linalg.inv(root).T,
-            begun=free.combined(coefficients, free.starts, noise=False),
             directions=directions,
             towards=-slopes.sum(axis=1),
             known=slopes @ slopes.T,

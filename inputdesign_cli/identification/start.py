@@ -197,20 +197,12 @@ class FreeStarts:
         zeros = [float(start.zeros) for start in starts]
         return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
 
-    def combined(
-        self, coefficients: Sequence[Array], starts: Sequence[Start], *, noise: bool = True
-    ) -> Array:
-        """Return the responses (N, p) by the coefficients of all unknowns, or of the free ones.
-
-        Args:
-            starts: these, or their derivatives.
-        """
+    def combined(self, coefficients: Sequence[Array], starts: Sequence[Start]) -> Array:
+        """Return the responses (N, p) by the coefficients of all unknowns, to these starts or derivatives."""
         within = np.arange(max(self.lengths)) < np.array(self.lengths)[:, None]
-        found = []
-        for own, start in zip(coefficients, starts, strict=True):
-            every = np.concatenate([start.free, start.noise if noise else start.noise[:0]])
-            found.append((own[:, : len(every)] @ every)[within])
-        return np.stack(found, axis=1)
+        pairs = zip(coefficients, starts, strict=True)
+        each = [(own @ np.concatenate([start.free, start.noise]))[within] for own, start in pairs]
+        return np.stack(each, axis=1)
 
     def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
         """Return the unknowns of past noise as errors, of outputs that have fewer zero, (M, p)."""
