@@ -210,8 +210,8 @@ def identify(
             begin = Starts(start[None], 1)
         else:
             begin = kind.starting_points(centred(chosen) if records.free else chosen, start)
-        others = [theta[None] for theta in (known, earlier and earlier.theta) if theta is not None]
-        points = np.concatenate([begin.points, *others])
+        others = [] if earlier is None else [earlier.theta[None]]
+        points = np.concatenate([begin.points, *([] if known is None else [known[None]]), *others])
         tell(Counted("starting points followed to a minimum", 0, len(points)))
         return search(records, points, starts=begin.tried + (earlier is not None))
 

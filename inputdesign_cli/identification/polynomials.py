@@ -92,7 +92,7 @@ class PolynomialKind(Kind):
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """Each output estimated alone, then what outputs share weighed by how well each knows it."""
         listed = np.zeros((0, len(self.model.names))) if given is None else given[None]
-        points, tried = [], 0
+        points, tried = list[Array](), 0
         for u, y in parts:
             alone = [
                 np.concatenate([listed, starting_points(row, len(self.model.names), u, own)])
@@ -134,13 +134,13 @@ class PolynomialKind(Kind):
                 earlier[i, j] -= 1
                 sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
                 larger.append((sooner, "coefficient in B before the others"))
-        for letter, rows in (("A", model.A), ("C", model.C), ("D", model.D)):
-            for i, row in enumerate(rows):
-                more = {letter: (*rows[:i], np.append(row, 0.0), *rows[i + 1 :])}
-                if letter != "A":
-                    larger.append((replace(model, **more), f"coefficient in {letter}"))
-                elif row.size > 1:
-                    larger.append((replace(model, **more), "pole in A"))
+        for i, row in enumerate(model.A):
+            if row.size > 1:
+                larger.append((replace(model, A=_longer(model.A, i)), "pole in A"))
+        for i in range(len(model.C)):
+            larger.append((replace(model, C=_longer(model.C, i)), "coefficient in C"))
+        for i in range(len(model.D)):
+            larger.append((replace(model, D=_longer(model.D, i)), "coefficient in D"))
         found = []
         for one, what in larger:
             (name,) = set(one.names) - set(self.model.names)
@@ -173,3 +173,7 @@ def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )
+
+
+def _longer(rows: tuple[Array, ...], i: int) -> tuple[Array, ...]:
+    return (*rows[:i], np.append(rows[i], 0.0), *rows[i + 1 :])
