@@ -27,8 +27,7 @@ from inputdesign_cli.explore.search import Candidate, Chosen, Family, Ranges, ce
 from inputdesign_cli.explore.structures import process_models
 from inputdesign_cli.explore.sweep import lingering
 from inputdesign_cli.identification.checks import signal_name
-from inputdesign_cli.identification.estimate import Estimate
-from inputdesign_cli.identification.estimators import identify
+from inputdesign_cli.identification.estimators import Estimate, identify
 from inputdesign_cli.plant import Model, PolynomialModel
 
 _MOST_SAMPLES = 10_000

@@ -36,8 +36,7 @@ from inputdesign_cli.explore.sweep import (
 )
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
-from inputdesign_cli.identification.estimate import factor_at, noise_of
-from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.estimators import estimator, factor_at, noise_of
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
 from inputdesign_cli.identification.white import White
@@ -206,7 +205,7 @@ class _Records:
         if not shape.physical and near.delays != shape.delays:
             near = Regressed(parts, near.order).output_error(shape.delays, near.F)
         kind, start = estimator(shape.model(), 1.0), shape.start(near)
-        check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
+        check_length(sum(len(y) for _, y in parts), len(kind.model.names), kind.recent, outputs=1)
         records = Records(kind, tuple(centred(parts))).begun_freely(kind.lateness(start))
         found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
         point, theta, noise = found.point, found.point.theta, noise_of(records, found.point)

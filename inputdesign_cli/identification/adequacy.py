@@ -40,22 +40,16 @@ Fault = Literal["plant", "noise", "drift", "shift", "change", "nonlinear", "feed
 
 @dataclass(frozen=True)
 class ScoreTest:
-    """One chi-squared test.
-
-    Attributes:
-        probability: of a statistic as large, with `freedom` degrees of freedom, if the model is right; see
-            `White.probability`.
-        output: of which residuals are explained most; `source`, by which input or other residual.
-    """
+    """One chi-squared test."""
 
     name: str  # of the test
     fault: Fault  # what is wrong if it fails
     statistic: float
     freedom: int
-    probability: float
+    probability: float  # of a statistic as large if the model is right, see `White.probability`
     lag: int | None  # of past inputs or residuals, where they explain most; of trends None
-    output: int = 0
-    source: int = 0
+    output: int = 0  # of which residuals are explained most
+    source: int = 0  # by which input or other residual
 
 
 class Regressors(NamedTuple):
@@ -89,14 +83,10 @@ class Regressors(NamedTuple):
 
 
 class Score(NamedTuple):
-    """What regressors explain of residuals once estimated parameters and starts are taken off.
+    """What regressors explain of residuals once estimated parameters and starts are taken off."""
 
-    Attributes:
-        statistic: chi-squared where the model is right, along orthonormal `directions` ((N + M) p, freedom).
-    """
-
-    statistic: float
-    directions: Array
+    statistic: float  # chi-squared where the model is right
+    directions: Array  # ((N + M) p, freedom), orthonormal, of the regressors
     sizes: Array  # (m,), of each regressor alone, in standard deviations up to a common factor
 
 
@@ -132,7 +122,7 @@ def score_tests(
 
 
 def tested(white: White, tried: Regressors) -> ScoreTest | None:
-    """Return the test of regressors; None where the estimate explains all of them."""
+    """Return the test of regressors, or None if the estimate explains all of them."""
     found = score(white, tried.white(white), tried.means(white))
     freedom = found.directions.shape[1]
     if not freedom:

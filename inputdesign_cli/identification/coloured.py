@@ -68,7 +68,7 @@ class ColouredKind(Kind):
 
     def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
         """Return the parameters on which the starts depend: in the plant, and all of C and D."""
-        own = np.arange(self._first, len(self.names))
+        own = np.arange(self._first, len(self.model.names))
         return np.concatenate([self.plant.in_starts(late, free=free), own])
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:

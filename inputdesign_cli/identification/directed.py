@@ -41,40 +41,27 @@ _LEAST = 1e-300
 
 @dataclass(frozen=True)
 class Alternative:
-    """The model with one additional parameter, which is zero in the model.
+    """The model with one additional parameter, which is zero in the model."""
 
-    Attributes:
-        name: of the parameter; `phrase`, what it is, for a sentence.
-        slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
-            each state that a plant may be in.
-        echo: (lags, p, p), how `column` responds to past errors; None if it does not.
-        estimated: returns the larger model from the same data, and the statistic of its likelihood ratio;
-            None if no larger model is estimated.
-    """
-
-    name: str
-    phrase: str
+    name: str  # of the parameter
+    phrase: str  # what it is, for a sentence
     fault: Fault  # what is wrong if it is missing
     column: NDArray[np.float64]  # (N, p), minus the derivative of the prediction errors with respect to it
-    slopes: Callable[[Model, ArrayLike], ComplexArray]
+    slopes: Callable[[Model, ArrayLike], ComplexArray]  # dG by it at (n,), of each state, (states, n, p, r)
     lag: bool = False  # whether it is a pole or a dead time of the plant
-    echo: NDArray[np.float64] | None = None
-    estimated: Callable[[], tuple[Model, float]] | None = None
+    echo: NDArray[np.float64] | None = None  # (lags, p, p), how `column` responds to past errors, if it does
+    estimated: Callable[[], tuple[Model, float]] | None = None  # larger model, its likelihood ratio
 
 
 @dataclass(frozen=True)
 class Directed:
-    """One parameter more than the model has.
-
-    Attributes:
-        alternatives: the parameters that act alike on these data where they are small, the likeliest first.
-        size: the first of them, to first order; `deviation`, its standard deviation.
-    """
+    """One parameter more than the model has."""
 
     test: ScoreTest  # whether these data ask for it
+    # That act alike on these data where they are small, the likeliest first.
     alternatives: tuple[Alternative, ...]
-    size: float
-    deviation: float
+    size: float  # of the first of them, to first order
+    deviation: float  # its standard deviation
     following: Array  # (k,), how the parameters of the model change with it, to first order
     larger: Model | None = None  # the estimate of the larger model, where it was looked for
 
@@ -193,7 +180,7 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
     point, others = evaluate(records, theta), np.arange(theta.size) != index
     slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
     cost = point.cost - float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
-    ratio = float(point.near.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
+    ratio = float(point.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
     return model.at(found.theta[0]), ratio
 
 

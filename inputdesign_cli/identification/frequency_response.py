@@ -51,16 +51,12 @@ _Found = tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[n
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """An estimate of G at n frequencies.
-
-    Attributes:
-        radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
-        noise: (n, p): the spectrum of the unexplained part of y; for white noise it is the variance.
-    """
+    """An estimate of G at n frequencies."""
 
     frequency: Array  # (n,), rad/sample
     G: ComplexArray  # (n, p, r)
-    radius: NDArray[np.float64]
+    radius: NDArray[np.float64]  # (n, p, r): of the disc about G that holds the true one with 95 %
+    # (n, p): the spectrum of the unexplained part of y, for white noise its variance.
     noise: NDArray[np.float64]
     coherence: NDArray[np.float64]  # (n, p): the share of the spectrum of y that the inputs explain
     method: Method  # how it was estimated
@@ -183,28 +179,28 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
     if last > _MOST_FREQUENCIES:
         lines = np.unique(np.geomspace(1, last, _MOST_FREQUENCIES).round())
     frequency = np.asarray(2.0 * np.pi * lines / longest)
-    found = []
+    found: list[_Found] = []
     for w in frequency:
         one = _at(w, transformed, window, u.shape[1], _PARABOLA)
         if one is None:
             unknown, each = np.full((y.shape[1], u.shape[1]), np.nan), np.full(y.shape[1], np.nan)
             found.append((unknown + 0j, unknown, each, each))
             continue
-        G, radius, *more = one
+        G, radius, noise, coherence = one
         # What a parabola may be off where G bends: as much as a line is off it, beyond the noise.
         straight = _at(w, transformed, window, u.shape[1], _PARABOLA - 1)
         apart = 0.0 if straight is None else np.abs(G - straight[0]) ** 2
-        found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), *more))
-    each = (np.array(values) for values in zip(*found, strict=True))
-    return FrequencyResponse(frequency, *each, "local_polynomial")
+        found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), noise, coherence))
+    responses, discs, spectra, shares = (np.array(values) for values in zip(*found, strict=True))
+    return FrequencyResponse(frequency, responses, discs, spectra, shares, "local_polynomial")
 
 
 def _usable(found: FrequencyResponse | None) -> FrequencyResponse | None:
     """Return the response where it is a number; None if it is nowhere."""
     if found is None or not np.any(at := np.all(np.isfinite(found.noise), axis=1)):
         return None
-    every = (found.frequency, found.G, found.radius, found.noise, found.coherence)
-    return FrequencyResponse(*(values[at] for values in every), found.method)
+    G, radius, noise, coherence = found.G[at], found.radius[at], found.noise[at], found.coherence[at]
+    return FrequencyResponse(found.frequency[at], G, radius, noise, coherence, found.method)
 
 
 def _window(records: _Records) -> int:
@@ -228,8 +224,8 @@ def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse 
         turned = np.exp(-1j * np.outer(one.frequency, late))[:, None]
         found.append((one.G * turned, one.radius, one.noise, one.coherence))
         frequency = one.frequency
-    each = (np.concatenate(values, axis=1) for values in zip(*found, strict=True))
-    return FrequencyResponse(frequency, *each, "local_polynomial")
+    G, radius, noise, coherence = (np.concatenate(values, axis=1) for values in zip(*found, strict=True))
+    return FrequencyResponse(frequency, G, radius, noise, coherence, "local_polynomial")
 
 
 def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> _Found | None:

@@ -20,6 +20,8 @@ Part = tuple[Array, Array]
 
 # Of a parameter, or of one, for central differences.
 _STEP = 1e-6
+FADED = 2000
+"""Samples after which noise that fades has faded."""
 
 
 class Starts(NamedTuple):
@@ -36,18 +38,12 @@ class Starts(NamedTuple):
 
 
 class Extension(NamedTuple):
-    """An additional parameter of a structure.
+    """An additional parameter of a structure."""
 
-    Attributes:
-        model: the larger model, whose new parameter is zero. If the model has other parameters than its
-            coefficients, this is the model of the coefficients.
-        name: of the new parameter; `what` it is.
-    """
-
-    model: Listed
+    model: Listed  # the larger model, whose new parameter is zero, by its coefficients
     kind: Kind  # of the larger model; in place of `model`, it may be behind a hold
-    name: str
-    what: str
+    name: str  # of the new parameter
+    what: str  # it is
     nested: bool = True  # whether that structure has no further freedom than the one parameter
 
 
@@ -60,16 +56,6 @@ class Kind(ABC):
     """
 
     model: Model
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names (k,) of the parameters."""
-        return self.model.names
-
-    @property
-    def outputs(self) -> int:
-        """Return the number of outputs p."""
-        return self.model.outputs
 
     @property
     def continuous(self) -> bool:
@@ -133,7 +119,7 @@ class Kind(ABC):
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
-        return np.repeat(signals[None], self.outputs, axis=0)
+        return np.repeat(signals[None], self.model.outputs, axis=0)
 
     @abstractmethod
     def stabilised(self, theta: Array, samples: int) -> Array:
@@ -156,18 +142,19 @@ class Kind(ABC):
         return ()
 
     def echoes(self, theta: Array, samples: int) -> NDArray[np.float64]:
-        """Return how gradients respond to past errors (k, samples, p, p), by parameter, lag, output, error.
+        """Return how gradients respond to past errors (k, lags, p, p), by parameter, lag, output, error.
 
-        They are zero of parameters of the plant alone, and where the response does not fade: it is not the
-        noise model that holds such a plant.
+        They are zero of parameters of the plant alone. They count as zero if the response does not fade: it
+        is not the noise model that holds this plant.
         """
-        found = np.zeros((theta.size, samples, self.outputs, self.outputs))
+        samples = min(samples, FADED)
+        found = np.zeros((theta.size, samples, self.model.outputs, self.model.outputs))
         if not np.any(self.whitening):
             return found
         u = np.zeros((samples, self.model.inputs))
         with np.errstate(over="ignore", invalid="ignore"):
-            for j in range(self.outputs):
-                e = np.outer(np.arange(samples) == 0, np.arange(self.outputs) == j).astype(float)
+            for j in range(self.model.outputs):
+                e = np.outer(np.arange(samples) == 0, np.arange(self.model.outputs) == j).astype(float)
                 y = sum(self.model.at(theta).simulate(u, e, 1.0))
                 found[..., j] = self.errors_and_gradient(theta, u, np.asarray(y))[1]
             early, late = (np.abs(part) for part in np.array_split(found, 2, axis=1))
@@ -176,7 +163,7 @@ class Kind(ABC):
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs are stable, so that they can be simulated."""
-        return (True,) * self.outputs
+        return (True,) * self.model.outputs
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:

@@ -38,20 +38,15 @@ _SETTLED, _UNSURE = 3.0, 0.5
 
 @dataclass(frozen=True)
 class LevelShift:
-    """The likeliest shift of an output.
-
-    Attributes:
-        begins, ends: between these samples it likely begins and has settled, the last left out.
-        test: of the likelihood ratio; its probability counts every sample, lag and output that was tried.
-    """
+    """The likeliest shift of an output."""
 
     output: int  # from zero
     sample: int  # likely the first of it, counted through all records
     lag: float  # the time constant by which it is smooth, in samples; zero of a step
-    begins: int
-    ends: int
+    begins: int  # likely not before this sample
+    ends: int  # likely settled from this sample on
     rises: bool  # whether the output is larger after it
-    test: ScoreTest
+    test: ScoreTest  # of the likelihood ratio, which counts every sample, lag and output that was tried
     score: float  # the statistic of the score, which is smaller; it is the largest of `looks` statistics
     looks: int
     alone: bool  # whether it explains more than a line through its record, or single samples next to it
@@ -115,7 +110,7 @@ def level_shift(records: Records, point: Point, white: White) -> LevelShift | No
     # The likelihood ratio to second order: a large shift has made the noise look larger than it is.
     power = float(white.residuals @ white.residuals) / outputs
     share = min(score * white.variance / power, _MOST_EXPLAINED)
-    statistic = -float(np.log1p(-share)) * point.near.freedom / outputs
+    statistic = -float(np.log1p(-share)) * point.freedom / outputs
     looks = sum(length for _, length in stretches) * outputs * len(lags)
     test = ScoreTest("level_shift", "shift", statistic, 1, _by_chance([statistic], looks), None, output)
     begin, length = next(one for one in stretches if sample < sum(one))

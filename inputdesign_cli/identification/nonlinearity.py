@@ -33,17 +33,13 @@ _OF_THE_SHARE = 9.0 / 6.0 * 3.0 / 2.0
 
 @dataclass(frozen=True)
 class SilentLines:
-    """The power of p outputs at `lines` lines without excitation.
-
-    Attributes:
-        beyond: (lines, p) mean squares of the transforms that are beyond the noise, over neighbouring lines.
-    """
+    """The power of p outputs at `lines` lines without excitation."""
 
     lines: int
     over_noise: Array  # (p,) mean of the power there over that of the noise; about one for noise alone
     probability: Array  # (p,) that noise alone has as much, by an F test over all lines
     rms: Array  # (p,) of the part beyond the noise
-    beyond: NDArray[np.float64]
+    beyond: NDArray[np.float64]  # (lines, p) mean squares beyond the noise, over neighbours
 
 
 def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> SilentLines | None:
@@ -64,10 +60,7 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
     # Over the shape of the noise all lines count alike.
     ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
     freedom = 2 * blocks * lines
-    # Where strong noise at some lines hides the sum, what is beyond it is taken to have its shape.
-    like_noise = (ratio - 1.0) * np.mean(noise / even, axis=0) * np.sum(even, axis=0)
-    plain = np.sum(level - noise, axis=0)
-    beyond = np.where(plain > 0.0, plain, np.maximum(like_noise, 0.0))
+    beyond = np.maximum(np.sum(level - noise, axis=0), 0.0)
     return SilentLines(
         lines,
         np.asarray(ratio),

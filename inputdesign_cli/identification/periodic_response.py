@@ -7,6 +7,7 @@ their phases, so that the matrix U of inputs by blocks has an inverse at every l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -66,15 +67,11 @@ class Periods:
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """G (L, p, r) at harmonics, with its uncertainty from the scatter of the periods.
-
-    Attributes:
-        deviation: (L, p, r): standard deviations of the entries, |error|^2 being their variance.
-    """
+    """G (L, p, r) at harmonics, with its uncertainty from the scatter of the periods."""
 
     harmonics: NDArray[np.int_]
     G: ComplexArray
-    deviation: NDArray[np.float64]
+    deviation: NDArray[np.float64]  # (L, p, r): of the entries, |error|^2 being their variance
     noise: NDArray[np.float64]  # (L, p): the spectrum of the noise; for white noise it is the variance
     explained: NDArray[np.float64]  # (L, p): mean squares of the part that the inputs explain, per line
     freedom: int  # degrees of freedom of each variance, counted as complex numbers
@@ -140,8 +137,7 @@ def periodic_response(
     return PeriodicResponse(harmonics, G, np.sqrt(variance), periods.period * scatter, explained, freedom)
 
 
-@dataclass(frozen=True)
-class PeriodDrift:
+class PeriodDrift(NamedTuple):
     """Polynomials in time that outputs (N, p) drift along.
 
     A ramp is the same in every period, but for its level, so that their scatter does not show it. It adds to
@@ -170,11 +166,10 @@ def period_drift(
     rare = 0.5 * _CERTAIN / (_MOST_DEGREE * repeats * y.shape[1])
     far = -float(scipy.special.ndtri(rare)) * np.sqrt(noise / periods.period)
     for one, at in zip(np.split(y, repeats), np.split(time, repeats), strict=True):
-        powers, triangle, along = _along(one, at, periods, _MOST_DEGREE)
-        beyond = np.abs(along[1:]) > far
-        degree = np.max(beyond * np.arange(1, len(along))[:, None], axis=0, initial=0)
-        kept = np.where(np.arange(len(along))[:, None] <= degree, along, 0.0)
-        curves.append(_curve(powers, triangle, kept))
+        polynomials, along = _along(one, at, periods, _MOST_DEGREE)
+        order = np.arange(len(along))[:, None]
+        degree = np.max((np.abs(along) > far) * order, axis=0)
+        curves.append(polynomials @ np.where(order <= degree, along, 0.0))
         degrees.append(degree)
     most = np.max(degrees, axis=0)
     return PeriodDrift(np.concatenate(curves), most) if np.any(most) else None
@@ -182,23 +177,20 @@ def period_drift(
 
 def line_of_periods(y: Array, periods: Periods) -> Array:
     """Return the lines (N, p) about zero that fit the means of the periods of outputs (N, p)."""
-    return _curve(*_along(y, np.arange(float(len(y))), periods, 1))
+    polynomials, along = _along(y, np.arange(float(len(y))), periods, 1)
+    return np.asarray(polynomials @ along)
 
 
-def _along(y: Array, time: Array, periods: Periods, most: int) -> tuple[Array, Array, Array]:
-    """Powers of time (N, m), the triangle (m, m) that orthogonalises their means, and what y has of each."""
+def _along(y: Array, time: Array, periods: Periods, most: int) -> tuple[Array, Array]:
+    """Return polynomials of time (N, m), with orthonormal means up to a level, and how much y has of each."""
     scaled = (time - time.mean()) / max(float(np.ptp(time)), np.finfo(float).tiny)
     count = periods.blocks * periods.kept(len(y))
     powers = scaled[:, None] ** np.arange(min(most + 1, count))
-    basis, triangle = np.linalg.qr(_means(powers, periods))
-    return powers, triangle, np.asarray(basis.T @ _means(y, periods))
 
+    def means(signals: Array) -> Array:
+        return np.asarray(periods.parts(signals).mean(axis=2).reshape(-1, signals.shape[1]))
 
-def _means(signals: Array, periods: Periods) -> Array:
-    """(blocks * kept, channels)."""
-    return np.asarray(periods.parts(signals).mean(axis=2).reshape(-1, signals.shape[1]))
-
-
-def _curve(powers: Array, triangle: Array, along: Array) -> Array:
-    weights = np.linalg.solve(triangle, along)
-    return np.asarray(powers[:, 1:] @ weights[1:])
+    basis, triangle = np.linalg.qr(means(powers))
+    weights = np.linalg.inv(triangle)
+    weights[0] = 0.0
+    return powers @ weights, np.asarray(basis.T @ means(y))

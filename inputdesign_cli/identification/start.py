@@ -71,7 +71,12 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
         [np.pad(p, (before, 2 * n + 1 - before - p.size)) for before in (0, n)] for p in (C, D)
     )
     past = c[1 + i + j] @ below[n + j - i] - d[1 + i + j] @ above[n + j - i]
-    r = past @ _autoregression(d[: n + 1])[::-1]
+    # Values in a row of e / D, oldest first, made of independent ones of the variance of e.
+    predictors, variances = _step_down(d[: n + 1])
+    onto = np.eye(n)
+    for order, predictor in enumerate(predictors):
+        onto[order, :order] = predictor[:0:-1]
+    r = past @ np.linalg.solve(onto, np.diag(np.sqrt(variances)))[::-1]
     return np.asarray(r.T @ each_later(filtered([1.0], C, np.eye(1, samples)[0]), n))
 
 
@@ -92,15 +97,6 @@ def density(C: Array) -> float:
     return 2.0 * float(np.log(_step_down(C)[1][0]))
 
 
-def _autoregression(d: Array) -> NDArray:
-    """(n, n): n values in a row of e / D, oldest first, made of independent ones of the variance of e."""
-    predictors, variances = _step_down(d)
-    onto = np.eye(d.size - 1)
-    for order, predictor in enumerate(predictors):
-        onto[order, :order] = predictor[:0:-1]
-    return np.asarray(np.linalg.solve(onto, np.diag(np.sqrt(variances))))
-
-
 def _step_down(d: Array) -> tuple[list[Array], NDArray]:
     """Return the predictors of the orders 0 to n - 1 of e / D, and the variances (n,) of their errors.
 
@@ -115,33 +111,15 @@ def _step_down(d: Array) -> tuple[list[Array], NDArray]:
     return [p for p, _ in found[::-1]], np.array([v for _, v in found[::-1]])
 
 
-class Elimination(NamedTuple):
-    """What the starts are likely to be, of records of N samples and M independent unknowns of past noise.
-
-    Attributes:
-        coefficients: output by output of its unknowns in each record, (records, m + n), free ones first.
-    """
-
-    coefficients: list[Array]
-    root: Array  # R (p, p), R^T R being the weights of the errors up to a factor
-    directions: Array  # ((N + M) p, K) orthonormal, the errors in units of R that the starts can explain
-
-
 class _Basis(NamedTuple):
-    """Orthonormal directions (N + n, K) of all errors that one start of N samples can explain.
-
-    Attributes:
-        coefficients: (m + n, K), of its unknowns for each direction; `free`, how many are not of past noise.
-        determinant: log det Z^T Z, Z being the responses to orthonormal disturbances and to past noise;
-            `gradient`, half of its gradient in the blocks of a start; `of_noise`, the one of past noise.
-    """
+    """Orthonormal directions (N + n, K) of all errors that one start of N samples can explain."""
 
     directions: Array
-    coefficients: Array
-    free: int
-    determinant: float
-    gradient: Start
-    of_noise: float
+    coefficients: Array  # (m + n, K), of its unknowns for each direction
+    free: int  # how many of these are not of past noise
+    determinant: float  # log det Z^T Z, Z being the responses to orthonormal disturbances and past noise
+    gradient: Start  # half of its gradient in the blocks of a start
+    of_noise: float  # the determinant of past noise
 
     @classmethod
     def of(cls, start: Start, samples: int) -> _Basis:
@@ -219,20 +197,12 @@ class FreeStarts:
         zeros = [float(start.zeros) for start in starts]
         return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
 
-    def combined(
-        self, coefficients: Sequence[Array], starts: Sequence[Start], *, noise: bool = True
-    ) -> Array:
-        """Return the responses (N, p) by the coefficients of all unknowns, or of the free ones.
-
-        Args:
-            starts: these, or their derivatives.
-        """
+    def combined(self, coefficients: Sequence[Array], starts: Sequence[Start]) -> Array:
+        """Return the responses (N, p) by the coefficients of all unknowns, to these starts or derivatives."""
         within = np.arange(max(self.lengths)) < np.array(self.lengths)[:, None]
-        found = []
-        for own, start in zip(coefficients, starts, strict=True):
-            every = np.concatenate([start.free, start.noise if noise else start.noise[:0]])
-            found.append((own[:, : len(every)] @ every)[within])
-        return np.stack(found, axis=1)
+        pairs = zip(coefficients, starts, strict=True)
+        each = [(own @ np.concatenate([start.free, start.noise]))[within] for own, start in pairs]
+        return np.stack(each, axis=1)
 
     def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
         """Return the unknowns of past noise as errors, of outputs that have fewer zero, (M, p)."""
@@ -241,8 +211,16 @@ class FreeStarts:
             found[:, : len(start.noise), i] = -own[:, len(start.free) :]
         return found.reshape(-1, len(self.starts))
 
-    def eliminated(self, errors: Array, weights: Array | None) -> Elimination:
-        """The likeliest starts of errors (N, p), weighed by W (p, p); None: as the covariance left asks."""
+    def eliminated(self, errors: Array, weights: Array | None) -> tuple[list[Array], Array, Array]:
+        """Return the likeliest starts of errors (N, p), the root of the weights, and what starts can explain.
+
+        These are, output by output, the coefficients of all unknowns in each record, (records, m + n), free
+        ones first; R (p, p), R^T R being the weights up to a factor; and orthonormal directions
+        ((N + M) p, K) of the errors in units of R.
+
+        Args:
+            weights: W (p, p); None: as the covariance left asks.
+        """
         errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
         plain, of = self._plain
 
@@ -269,12 +247,17 @@ class FreeStarts:
                 if weights is not None or abs(size - previous) <= 1e-14 * size:
                     break
                 previous = size
-            directions = _orthogonal((plain[:, None] * scaled[:, of]).reshape(-1, of.size), gram)
+            # An orthonormal basis of columns of unit length, whose products are known.
+            directions = (plain[:, None] * scaled[:, of]).reshape(-1, of.size)
+            if of.size and np.linalg.eigvalsh(gram)[0] < _ALIKE:
+                directions = np.linalg.qr(directions)[0]
+            else:
+                directions = directions @ np.linalg.inv(np.linalg.cholesky(gram)).T
         coefficients = [np.zeros((len(self.lengths), len(x.free) + len(x.noise))) for x in self.starts]
         ends = np.cumsum([basis.directions.shape[1] for _, _, basis in self._blocks])[:-1]
         for (record, i, basis), own in zip(self._blocks, np.split(shares, ends), strict=True):
             coefficients[i][record] = basis.coefficients @ own
-        return Elimination(coefficients, root, directions)
+        return coefficients, root, directions
 
     @property
     def _past(self) -> int:
@@ -306,13 +289,6 @@ class FreeStarts:
             found[past : past + rows - length, own] = basis.directions[length:]
             column += wide
         return found, of
-
-
-def _orthogonal(columns: Array, gram: Array) -> Array:
-    """Return an orthonormal basis of columns (n, m) of unit length, `gram` being their products."""
-    if np.linalg.eigvalsh(gram)[0] < _ALIKE:
-        return np.asarray(np.linalg.qr(columns)[0])
-    return np.asarray(columns @ np.linalg.inv(np.linalg.cholesky(gram)).T)
 
 
 def _root(errors: Array, weights: Array | None) -> Array:

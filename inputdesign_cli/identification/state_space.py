@@ -44,8 +44,7 @@ class StateSpaceKind(Kind):
         (_, early, late), m, n, p = model.held, model.matrices, model.order, y.shape[1]
         u0, u1, direct = (shifted(u, lag, (len(u),)) for lag in (model.lag, model.lag + 1, model.direct_lag))
         at_once, slopes, closed = direct @ m.D.T, model.slopes, self._closed(model)
-        onward = np.kron(np.eye(1 + len(slopes)), closed)
-        read = np.kron(np.eye(1 + len(slopes)), m.C)
+        onward, read = (np.asarray(np.kron(np.eye(1 + len(slopes)), x), dtype=float) for x in (closed, m.C))
         driven, found = [u0 @ early.T + u1 @ late.T + (y - at_once) @ m.K.T], [at_once]
         for k, d in enumerate(slopes, start=1):
             onward[k * n : (k + 1) * n, :n] = d.A - m.K @ d.C - d.K @ m.C
@@ -66,7 +65,7 @@ class StateSpaceKind(Kind):
         """
         coloured, nothing = self._coloured, np.zeros((0, samples))
         if not (free or coloured):
-            return (Start.white(nothing),) * self.outputs
+            return (Start.white(nothing),) * self.model.outputs
         model = self.model.at(theta)
         m, n, p = model.matrices, model.order, model.outputs
         A, early, later = model.held
@@ -146,7 +145,7 @@ class StateSpaceKind(Kind):
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return whether the plant is stable or integrates."""
-        return (bool(np.all(np.abs(self.model.at(theta).poles) < 1.0 + _MARGIN)),) * self.outputs
+        return (bool(np.all(np.abs(self.model.at(theta).poles) < 1.0 + _MARGIN)),) * self.model.outputs
 
     @staticmethod
     def _closed(model: StateSpaceModel) -> Array:

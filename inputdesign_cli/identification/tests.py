@@ -27,19 +27,14 @@ _BAND = 2.5758293035489004
 
 
 class ResidualTest(NamedTuple):
-    """A chi-squared test of residuals over several lags, all channels at once ([ljung-1999], Section 16.6).
-
-    Attributes:
-        correlation: (n, p, columns), normalised; entry (i, j) of lag tau is that of residual i and of
-            residual or input j, tau samples earlier.
-        statistic, freedom: chi-squared with this many degrees of freedom if the model is right.
-    """
+    """A chi-squared test of residuals over several lags and all channels at once ([ljung-1999], 16.6)."""
 
     lags: Array  # (n,)
+    # (n, p, columns), normalised, of residuals with residuals or inputs that much earlier.
     correlation: NDArray[np.float64]
     limit: float  # a single correlation of white noise stays within +- limit with probability 0.99
-    statistic: float
-    freedom: int
+    statistic: float  # chi-squared if the model is right
+    freedom: int  # of that
     probability: float  # of a statistic at least as large if the model is right; small values refute it
 
     @classmethod
@@ -109,27 +104,19 @@ def _most_lags(samples: int, pairs: int, lags: int, fitted: int) -> int:
 
 @dataclass(frozen=True)
 class Tests:
-    """Tests of an estimate against its own records.
+    """Tests of an estimate against its own records."""
 
-    Attributes:
-        whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
-            their correlations are (lags, p, p) and (lags, p, r).
-        shift: where an output most likely shifts, whatever the inputs do; None in too short records.
-        shifts: all that refute the structure; `beside_shifts`, `scores` once they are taken off.
-        coloured: whether the noise has more structure than its model; all tests except of past residuals are
-            then made with whitened residuals.
-        alike: of several experiments, the probability that each differs as much from the others.
-    """
-
-    whiteness: ResidualTest
-    independence: ResidualTest
+    whiteness: ResidualTest  # of the residuals, all channels at once, correlations (lags, p, p)
+    independence: ResidualTest  # of residuals and past inputs, correlations (lags, p, r)
     scores: tuple[ScoreTest, ...]  # of the structure, and `directed` of one additional parameter
     directed: tuple[Directed, ...]
-    shift: LevelShift | None
-    shifts: tuple[LevelShift, ...]
-    beside_shifts: tuple[ScoreTest, ...]
+    shift: LevelShift | None  # where an output most likely shifts; None in too short records
+    shifts: tuple[LevelShift, ...]  # all that refute the structure
+    beside_shifts: tuple[ScoreTest, ...]  # `scores` once these are taken off
+    # Whether the noise is refuted: tests, but of past residuals, are then of whitened residuals.
     coloured: bool
     future: tuple[ScoreTest, ...]  # in open loop, whether the future of each input explains errors
+    # Of several experiments, the probability that each differs as much from the others.
     alike: tuple[float, ...]
 
     @property
@@ -217,7 +204,7 @@ def tests_of(
         whiteness(errors, fitted=int(np.sum(kind.whitening)), lengths=kept),
         cross_correlations(errors, u, fitted=int(np.sum(kind.explaining)), feedback=feedback, lengths=kept),
         scores(white, robust),
-        directed_tests(robust or white, alternatives, records.size),
+        directed_tests(robust or white, alternatives, len(records.kind.model.names)),
         shift,
         shifts,
         scores(less if robust is None else white, less) if shifts else (),

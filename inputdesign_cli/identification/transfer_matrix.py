@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -36,14 +36,11 @@ _LEAST_DELAY = 1e-12
 
 @dataclass(frozen=True)
 class TransferKind(Kind):
-    """A transfer matrix in s, of inputs that are held or band-limited; see `Kind`.
-
-    Attributes:
-        held: known dead times of entries, which starting points keep.
-    """
+    """A transfer matrix in s, of inputs that are held or band-limited; see `Kind`."""
 
     model: ContinuousModel
     between: Intersample
+    # Known dead times of entries, which starts keep.
     held: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
     @property
@@ -56,7 +53,7 @@ class TransferKind(Kind):
         model = self.model.at(theta)
         errors, psi = y.copy(), np.zeros((theta.size, *y.shape))
         for i, j in model.active:
-            entry = self._entry(model, i, j)
+            entry = model.held(i, j, self.between.sample_time)
             columns = self.between.responses(entry, u[:, j], hold=self.between.hold)
             errors[:, i] -= columns @ entry.gain
             for index, parameter in enumerate(model.parameters):
@@ -72,9 +69,9 @@ class TransferKind(Kind):
         time move the states, sample by sample, as if from anywhere.
         """
         if not free:
-            return (Start.white(np.zeros((0, samples))),) * self.outputs
+            return (Start.white(np.zeros((0, samples))),) * self.model.outputs
         model = self.model.at(theta)
-        found = [[np.ones((1, samples))] for _ in range(self.outputs)]
+        found = [[np.ones((1, samples))] for _ in range(self.model.outputs)]
         for i, j in model.active:
             a = tuple(model.denominator[i][j].tolist())
             found[i].append(_begun(a, self.between.sample_time, samples, late))
@@ -157,16 +154,25 @@ class TransferKind(Kind):
         return replace(self, held=held)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions by a further zero or a dead time."""
+        """Return the extensions by a zero more in a proper entry, or a dead time if it has none."""
+        model = self.model.at(theta)
+        none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
+        model, larger = replace(model, delay=model.delay or none), []
+        for i, j in model.active:
+            above = model.numerator[i][j]
+            if above.size + int(feedback) < model.denominator[i][j].size:
+                more = with_entry(model.numerator, i, j, np.append(above, 0.0))
+                larger.append((replace(model, numerator=more), "coefficient in the numerator"))
+            shared = model.active if model.common_delay else [(i, j)]
+            if not any(model.delay[o][n].size for o, n in shared):
+                late = with_entry(model.delay, i, j, np.zeros(1))
+                larger.append((replace(model, delay=late), "dead time or fast pole"))
         found = []
-        for larger, what in _larger(self.model.at(theta), feedback=feedback):
-            (name,) = set(larger.names) - set(self.names)
-            shown = SampledModel(larger, self.between.sample_time) if self.between.hold else larger
-            found.append(Extension(shown, TransferKind(larger, self.between), name, what))
+        for one, what in larger:
+            (name,) = set(one.names) - set(self.model.names)
+            shown = SampledModel(one, self.between.sample_time) if self.between.hold else one
+            found.append(Extension(shown, TransferKind(one, self.between), name, what))
         return tuple(found)
-
-    def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
-        return model.held(i, j, self.between.sample_time)
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:
@@ -186,21 +192,3 @@ def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int)
     entering = np.concatenate([impulses, np.ones((int(entry.order > 0), samples))])
     poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
     return filtered([1.0], poles, entering)
-
-
-def _larger(model: ContinuousModel, *, feedback: bool) -> Iterator[tuple[ContinuousModel, str]]:
-    """Yield models with a zero more in a proper entry, or a dead time if it has none, and its name.
-
-    Args:
-        feedback: whether u(t) depends on y(t), so that it cannot act at once.
-    """
-    none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
-    model = replace(model, delay=model.delay or none)
-    for i, j in model.active:
-        above = model.numerator[i][j]
-        if above.size + int(feedback) < model.denominator[i][j].size:
-            more = with_entry(model.numerator, i, j, np.append(above, 0.0))
-            yield replace(model, numerator=more), "coefficient in the numerator"
-        shared = model.active if model.common_delay else [(i, j)]
-        if not any(model.delay[o][n].size for o, n in shared):
-            yield replace(model, delay=with_entry(model.delay, i, j, np.zeros(1))), "dead time or fast pole"

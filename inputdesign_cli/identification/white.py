@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.kind import FADED
 from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.records import Point, Records, shifted
 from inputdesign_cli.identification.stability import reflected
@@ -41,19 +42,17 @@ def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Nois
     Args:
         lengths: of the records that follow each other; the longest determines the polynomials.
     """
-    at = int(np.argmax(lengths))
+    at, best, largest = int(np.argmax(lengths)), [], []
     begin = sum(lengths[:at])
-    tried = [[_fitted(v, c, d) for c, d in _ORDERS] for v in errors[begin : begin + lengths[at]].T]
-    best = [int(np.argmin([value for value, _ in one])) for one in tried]
-    chosen = [[own[k][1] for own, k in zip(tried, best, strict=True)], [own[-1][1] for own in tried]]
-    return chosen[: 1 if all(k == len(_ORDERS) - 1 for k in best) else 2]
-
-
-def _fitted(v: Array, c: int, d: int) -> tuple[float, Noise]:
-    """Return BIC of noise (n,) of these orders, and its C and D."""
-    C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
-    left = filtered(D, C, v)
-    return float(v.size * np.log(np.mean(left**2)) + (c + d) * np.log(v.size)), (C, D)
+    for v in errors[begin : begin + lengths[at]].T:
+        tried = []
+        for c, d in _ORDERS:
+            C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
+            criterion = v.size * np.log(np.mean(filtered(D, C, v) ** 2)) + (c + d) * np.log(v.size)
+            tried.append((float(criterion), (C, D)))
+        best.append(min(tried, key=lambda one: one[0])[1])
+        largest.append(tried[-1][1])
+    return [best] if all(a is b for a, b in zip(best, largest, strict=True)) else [best, largest]
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ class Whitening:
 
     def echoes(self) -> NDArray[np.float64]:
         """Return how these respond to past errors that are white, (m, lags, p, p); see `Kind.echoes`."""
-        samples, p = max(self.lengths), len(self.filters)
+        samples, p = min(max(self.lengths), FADED), len(self.filters)
         alone, impulse = replace(self, lengths=(samples,)), np.eye(1, samples)[0]
         coloured = np.stack([filtered([1.0], filter, impulse) for filter in self.filters], axis=1)
         return alone.slopes(coloured)[:, :, :, None] * np.eye(p)
@@ -113,23 +112,17 @@ def _autoregression(v: Array, lengths: Sequence[int]) -> Array:
 
 @dataclass(frozen=True)
 class White:
-    """An estimate in units of the covariance of its residuals, outputs interleaved.
-
-    Attributes:
-        lengths: of the records, N samples; errors of noise before them, M of every output, follow.
-        explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
-        whitening: filters of residuals that are not white; their coefficients come after the k parameters.
-    """
+    """An estimate in units of the covariance of its residuals, outputs interleaved."""
 
     root: Array  # R (p, p), which makes residuals white
-    lengths: tuple[int, ...]
+    lengths: tuple[int, ...]  # of the records, N samples; M errors of noise before them follow
     residuals: Array  # ((N + M) p,)
     variance: float  # of the noise, in these units: residuals lack what unknown starts explain
     starts: Array  # ((N + M) p, m), orthonormal, what m unknown starts explain
-    explained: Array
-    basis: Array
+    explained: Array  # ((N + M) p, m + k), what they and the k parameters explain
+    basis: Array  # of that, orthonormal
     echoes: NDArray[np.float64]  # (k, lags, p, p), see `Kind.echoes`, in the units of residuals
-    whitening: Whitening | None = None
+    whitening: Whitening | None = None  # filters of residuals that are not white, estimated along
 
     @classmethod
     def of(cls, records: Records, point: Point, whitening: Whitening | None = None) -> White:
@@ -139,25 +132,25 @@ class White:
             whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
                 estimated along; of the parameters of that noise model nothing is known then.
         """
-        near, starts = point.near, point.near.directions
-        errors, psi = near.all_errors, np.where(_held(records, point)[:, None, None], 0.0, near.all_psi)
-        root = _root(errors, near.samples)
+        starts = point.directions
+        errors, psi = point.all_errors, np.where(_held(records, point)[:, None, None], 0.0, point.all_psi)
+        root = _root(errors, point.samples)
         if whitening is None:
             echoes = records.kind.echoes(point.theta, records.longest)
         else:
             free = starts.T.reshape(-1, *errors.shape) @ np.linalg.inv(root).T
-            own = np.pad(whitening.slopes(near.errors), ((0, 0), (0, len(errors) - near.samples), (0, 0)))
+            own = np.pad(whitening.slopes(point.errors), ((0, 0), (0, len(errors) - point.samples), (0, 0)))
             errors, free, psi = (whitening.through(x) for x in (errors, free, psi))
             echoes = whitening.echoes()
             echoes = np.concatenate([np.zeros((len(psi), *echoes.shape[1:])), echoes])
-            psi, root = np.concatenate([psi, own]), _root(errors, near.samples)
+            psi, root = np.concatenate([psi, own]), _root(errors, point.samples)
             starts = _orthonormal(_scaled((free @ root.T).reshape(len(free), errors.size).T))
         explained = np.column_stack([starts, (psi @ root.T).reshape(len(psi), -1).T])
         return cls(
             root,
             records.lengths,
             (errors @ root.T).ravel(),
-            near.errors.size / max(near.freedom, 1),
+            point.errors.size / max(point.freedom, 1),
             starts,
             explained,
             _orthonormal(_scaled(explained)),
@@ -264,7 +257,8 @@ class White:
 
 def _traces(echoes: NDArray[np.float64], correlations: NDArray[np.float64]) -> Array:
     """tr(D^T T D) of directions with these correlations (lags, p, p), for T (m, lags, p, p)."""
-    return np.asarray(np.tensordot(echoes, correlations[: echoes.shape[1]], axes=3))
+    lags = min(echoes.shape[1], len(correlations))
+    return np.asarray(np.tensordot(echoes[:, :lags], correlations[:lags], axes=3))
 
 
 def _held(records: Records, point: Point) -> NDArray[np.bool_]:
