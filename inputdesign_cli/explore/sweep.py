@@ -314,6 +314,8 @@ def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
 def whitening(errors: Sequence[Array]) -> Array:
     """Return the autoregression (m,) that makes errors (n,) of records white."""
     whole = np.concatenate(errors)[:, None]
+    if not np.all(np.isfinite(whole)):
+        return np.ones(1)
     return Whitening.of(whole, tuple(map(len, errors))).filters[0]
 
 
