@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from inputdesign_cli.cli.completion import error_codes, spec_keys
+from inputdesign_cli.cli.options import error_codes, spec_keys
 from inputdesign_cli.cli.sweep import pace
 from inputdesign_cli.compute.executor import ONE_THREAD
 from inputdesign_cli.sweeps.running import Progress

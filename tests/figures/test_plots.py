@@ -23,7 +23,7 @@ from tests.support.outcomes import typed
 
 
 @cache
-def drawn(name, narrow=False):
+def drawn(name, width="page"):
     """The picture of curves, the box of its page, and its texts with theirs; drawn once for all tests."""
     found = []
 
@@ -32,7 +32,7 @@ def drawn(name, narrow=False):
         texts = [(t.get_text(), t.get_window_extent(renderer)) for t in headings(page)]
         found.append((page.bbox.padded(1.0), texts))
 
-    return rendered(painter(CURVES[name]), narrow=narrow, seen=seen), *found[0]
+    return rendered(painter(CURVES[name]), width=width, seen=seen), *found[0]
 
 
 @pytest.mark.first(18)
@@ -102,10 +102,10 @@ def test_text_has_one_size_and_symbols_of_ours_alone_are_typeset_and_no_legend_h
 
 
 @pytest.mark.first(18)
-@pytest.mark.parametrize("narrow", [False, True])
+@pytest.mark.parametrize("width", ["page", "column", "phone"])
 @pytest.mark.parametrize("name", CURVES)
-def test_no_text_leaves_the_page_or_lies_on_another(name, narrow):
-    _, page, texts = drawn(name, narrow)
+def test_no_text_leaves_the_page_or_lies_on_another(name, width):
+    _, page, texts = drawn(name, width)
     (left, bottom), (right, top) = page.min, page.max
     for text, box in texts:
         assert left <= box.x0, text

@@ -181,6 +181,16 @@ def _pair(value: object) -> object:
 Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of two parameter names")]
 
 
+class Figures(Section):
+    """The form of the figures of a run."""
+
+    width: Literal["column", "page"] = Field(
+        default="page",
+        description="column: 89 mm with smaller text, as in a paper; page: 178 mm (default page).",
+    )
+    format: Literal["png", "pdf", "svg"] = Field(default="png", description="Of the files (default png).")
+
+
 class Report(Section):
     """The contents of the figures."""
 
