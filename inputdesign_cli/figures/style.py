@@ -34,10 +34,20 @@ from inputdesign_cli.outcome.results import Array
 FileType = Literal["png", "svg", "pdf"]
 FILE_TYPES: dict[str, FileType] = {"png": "png", "svg": "svg", "pdf": "pdf"}
 
-SIZE = (7.0, 4.5)  # inches
-NARROW = (5.0, 3.7)  # of a page, where text is to be as large on a phone
 DPI = 150
 TYPE_SIZE = 9.5  # points
+Width = Literal["page", "column", "phone"]
+# Width and height in inches, and the size of the text in points: of a page, of a column in a paper, and of a
+# page that may be read on a phone, where text is larger beside the curves.
+_SIZES: dict[Width, tuple[float, float, float]] = {
+    "page": (7.0, 4.5, TYPE_SIZE),
+    "column": (3.5, 2.6, 0.7 * TYPE_SIZE),
+    "phone": (5.0, 3.7, TYPE_SIZE),
+}
+_SIZES_OF_TEXT = (
+    *("font.size", "axes.titlesize", "axes.labelsize", "figure.titlesize"),
+    *("xtick.labelsize", "ytick.labelsize", "legend.fontsize"),
+)
 
 # Okabe and Ito's palette, which stays apart for colour-blind readers.
 BLACK = "#000000"
@@ -66,13 +76,6 @@ _RC: dict[Any, Any] = {
     "svg.fonttype": "none",  # text stays text
     "pdf.fonttype": 42,  # TrueType, as journals ask for
     "mathtext.default": "regular",
-    # One size for all text: titles, ticks and legends alike.
-    "font.size": TYPE_SIZE,
-    "axes.titlesize": TYPE_SIZE,
-    "axes.labelsize": TYPE_SIZE,
-    "figure.titlesize": TYPE_SIZE,
-    "xtick.labelsize": TYPE_SIZE,
-    "ytick.labelsize": TYPE_SIZE,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -81,7 +84,6 @@ _RC: dict[Any, Any] = {
     "axes.axisbelow": True,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
-    "legend.fontsize": TYPE_SIZE,
     # Names and units are the user's: no $ begins a formula; our symbols are typeset one by one.
     "text.parse_math": False,
 }
@@ -133,19 +135,18 @@ def rendered(
     paint: Callable[[Figure], object],
     file_type: FileType = "png",
     *,
-    narrow: bool = False,
+    width: Width = "page",
     seen: Callable[[Figure], object] | None = None,
 ) -> bytes:
     """Return the file of a figure that `paint` draws on an empty page; the same figure gives the same file.
 
-    A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves. `seen`
-    gets the page as it was laid out.
+    `seen` gets the page as it was laid out.
     """
     buffer = io.BytesIO()
-    with mpl.rc_context(_RC), warnings.catch_warnings():
+    with mpl.rc_context(_look(width)), warnings.catch_warnings():
         # A box stands for a letter of the user's that the font lacks; tables and pages have it.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        page = painted(paint, NARROW if narrow else SIZE)
+        page = painted(paint, width)
         for axes in page.axes:
             _strokes(axes)
         # Without a date and with ids that do not change, the same figure is the same file.
@@ -163,10 +164,15 @@ def rendered(
     return buffer.getvalue()
 
 
-def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE) -> Figure:
+def _look(width: Width) -> dict[Any, Any]:
+    """Return the settings of a page, with one size for all text: titles, ticks and legends alike."""
+    return _RC | dict.fromkeys(_SIZES_OF_TEXT, _SIZES[width][2])
+
+
+def painted(paint: Callable[[Figure], object], width: Width = "page") -> Figure:
     """The figure that `paint` draws on an empty page."""
-    with mpl.rc_context(_RC):
-        page = Page(figsize=size, dpi=DPI, layout="constrained")
+    with mpl.rc_context(_look(width)):
+        page = Page(figsize=_SIZES[width][:2], dpi=DPI, layout="constrained")
         paint(page)
         _typeset(page)
     return page
@@ -330,7 +336,7 @@ def _form(handles: Sequence[Artist], page: Figure) -> dict[str, Any]:
 
 def _columns(labels: Sequence[str], inches: float) -> int:
     """The most columns of a legend, filled one after the other, that a page so wide has room for."""
-    room = inches * _LETTERS_PER_INCH
+    room = inches * _LETTERS_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
     for columns in range(len(labels), 1, -1):
         shared = np.array_split([_width(label) for label in labels], columns)
         widest = [float(max(widths)) for widths in shared]
@@ -351,7 +357,8 @@ def title_above(page: Figure, title: str) -> None:
 
 
 def _wrapped(page: Figure, title: str) -> str:
-    return textwrap.fill(title, max(int(page.get_figwidth() * _TITLE_PER_INCH), 1))
+    letters = page.get_figwidth() * _TITLE_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
+    return textwrap.fill(title, max(int(letters), 1))
 
 
 def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str = "") -> None:

@@ -73,6 +73,6 @@ def _highest(error: Array | None, admitted: Array | None) -> float:
 def chart(paint: Callable[[Figure], object], caption: str) -> Chart:
     """Return the chart that `paint` draws on an empty page; in an image its ids meet no others of a page."""
     panels: list[dict[str, object]] = []
-    content = rendered(paint, "svg", narrow=True, seen=lambda page: panels.extend(readings(page)))
+    content = rendered(paint, "svg", width="phone", seen=lambda page: panels.extend(readings(page)))
     uri = "data:image/svg+xml;base64," + base64.b64encode(content).decode()
     return Chart(uri, caption, json.dumps(panels, separators=(",", ":")) if panels else "")

@@ -155,6 +155,16 @@ Pair = Annotated[
 ]
 
 
+class Figures(Section):
+    """The form of the figures of a run."""
+
+    width: Literal["column", "page"] = Field(
+        default="page",
+        description="column: 89 mm with smaller text, as in a paper; page: 178 mm (default page).",
+    )
+    format: Literal["png", "pdf", "svg"] = Field(default="png", description="Of the files (default png).")
+
+
 class Report(Section):
     """The contents of the figures."""
 

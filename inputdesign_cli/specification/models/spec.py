@@ -24,7 +24,7 @@ from inputdesign_cli.specification.models.experiment import (
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
-from inputdesign_cli.specification.models.realisation import Report, Signal, Simulation, Solver
+from inputdesign_cli.specification.models.realisation import Figures, Report, Signal, Simulation, Solver
 from inputdesign_cli.specification.models.section import Section, optional
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
@@ -89,6 +89,7 @@ class Spec(Section):
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")
     simulation: Simulation | None = optional("Monte Carlo study on the true system.")
     report: Report = Field(default=Report(), description="What the figures show.")
+    figures: Figures = Field(default=Figures(), description="Width and format of the figures of a run.")
     sweep: Sweep | None = optional("What `idesign sweep` varies.")
 
     phrase: ClassVar[str] = "a spec"
