@@ -221,6 +221,7 @@ def test_runs_keep_the_bound_with_the_probability(name):
     assert kept == pytest.approx(0.95, abs=0.015)
 
 
+@pytest.mark.slow
 def test_a_limit_that_leaves_just_enough_is_no_conflict():
     few = FEW.replace("1000", "200")
     free = solve(spec(FIR, few)).result["power"]["input"][0]

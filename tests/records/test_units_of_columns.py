@@ -162,6 +162,7 @@ def test_the_unit_of_a_column_counts_however_it_is_named(column, tmp_path):
     assert [one["code"] for one in seconds.result["findings"]] == ["unit-not-converted"]
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize(
     ("one", "other", "same"),
     [
