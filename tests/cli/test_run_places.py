@@ -165,6 +165,7 @@ def computing(monkeypatch):
     return begun
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_place_that_cannot_be_is_refused_before_anything_is_computed(
     run, computing, monkeypatch, tmp_path, command

@@ -10,7 +10,7 @@ from inputdesign_cli.identification import identify, information_begun_anywhere
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
 
-GAIN, LAG, N, BEFORE = 2.0, 10.0, 300, 200
+GAIN, LAG, N, BEFORE = 2.0, 10.0, 500, 200
 IN_S = "{{continuous: {{gain: 2, time_constant: 10, dead_time: {delay}}}, sample: zoh}}"
 IN_STATES = (
     "{{parameters: {{K: 2, T: 10, L: {delay}}}, sample: zoh, "
@@ -28,30 +28,37 @@ def model_of(words, delay, colour=""):
     return build_model(parse_spec(text, design=False))
 
 
-def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
+def cut_out(delay, seed, *, colour=0.0, before=BEFORE, samples=N):
     """u, y of a running experiment; the plant by its closed form behind a hold, the noise through 1/D.
 
     Args:
         before: samples that nobody recorded; 0: from rest.
     """
     rng = np.random.default_rng(seed)
-    u = np.repeat(rng.choice([-1.0, 1.0], (N + before) // 5), 5)
+    u = np.repeat(rng.choice([-1.0, 1.0], (samples + before) // 5), 5)
     whole, rest = divmod(delay, 1.0)
     pole, early = np.exp(-1.0 / LAG), 1.0 - np.exp(-(1.0 - rest) / LAG)
     B = np.concatenate([np.zeros(int(whole) + 1), GAIN * np.array([early, 1.0 - pole - early])])
-    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(N + before))
+    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(samples + before))
     y = scipy.signal.lfilter(B, [1.0, -pole], u) + noise
     return u[before:, None], y[before:, None]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.4, 12.3])
-@pytest.mark.parametrize("words", [IN_S, IN_STATES])
-def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
+@pytest.mark.parametrize(
+    ("words", "delay", "records", "samples"),
+    [
+        (IN_S, 0.4, 1, 300),
+        *(
+            pytest.param(*one, 3, N, marks=pytest.mark.slow)
+            for one in ((IN_S, 0.4), (IN_S, 12.3), (IN_STATES, 0.4), (IN_STATES, 12.3))
+        ),
+    ],
+)
+def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay, records, samples):
     """The first dead time of the record holds what nobody recorded."""
     model, failed, deviations, variances = model_of(words, delay), 0, [], []
     for seed in range(records):
-        found = identify(model, *cut_out(delay, seed), start=model.theta)
+        found = identify(model, *cut_out(delay, seed, samples=samples), start=model.theta)
         failed += bool(found.tests.failed)
         deviations.append((found.theta - model.theta) / np.sqrt(np.diag(found.covariance)))
         variances.append(found.noise[0, 0])
