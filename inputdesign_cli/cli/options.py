@@ -35,7 +35,7 @@ def declared(command: Callable[..., None], name: str) -> Callable[..., None]:
     positions are arguments of the command line.
     """
     hints = get_type_hints(command)
-    groups = {one: kind for one, kind in hints.items() if is_dataclass(kind)}
+    groups = {one: kind for one, kind in hints.items() if isinstance(kind, type) and is_dataclass(kind)}
     parameters: list[Parameter] = []
     for one in signature(command).parameters.values():
         if one.name not in groups:
