@@ -46,7 +46,7 @@ class Design:
 
 
 class UnfinishedDesignError(OutOfTimeError):
-    """The time limit has passed; `design` is the best so far, with what is proved of it."""
+    """Raised when the time limit has passed; `design` is the best so far, with what is proved of it."""
 
     design: Design
 
@@ -118,13 +118,13 @@ def solve_design(
 
 
 def _cheaper(problem: Problem, start: Array, even: Array) -> Array:
-    """The better of two spectra to begin with: an unfinished design costs no more than even white input."""
+    """Return the cheaper of two spectra to begin with, so that no design costs more than even white input."""
     tried = [scaled_up(problem, _FAR_BELOW * x, 0.0, []) for x in (start, even)]
     return min(tried, key=lambda candidate: candidate.objective).z
 
 
 def _begins_flat(basis: Basis) -> bool:
-    """Whether its first function is the flat spectrum of power one, so that its integrals are known."""
+    """Return whether its first function is the flat spectrum of power one, whose integrals are known."""
     return basis.has_density and basis.even[0] == 1.0 and not np.any(basis.even[1:])
 
 
@@ -162,7 +162,7 @@ def _white(question: Question, flat: Problem, power: float) -> Candidate:
 
 
 def _nothing(problem: Problem) -> ExchangeResult:
-    """The answer when what is known already meets every requirement: no excitation at all."""
+    """Return a design without excitation, for when the known information meets every requirement."""
     none = Certificate(0.0, np.zeros_like(problem.baselines), np.zeros(0), np.zeros(len(problem.limits)))
     return ExchangeResult(
         basis=problem.basis,
