@@ -38,7 +38,7 @@ class UnreachableError(IdesignError):
 
 @dataclass(frozen=True)
 class ResponseLines:
-    """Holds G (L, p, r), the noise Phi_v (L, p) and r_adm (L, p, r) at L lines.
+    """Holds G (L, p, r), the noise spectrum Phi_v (L, p) and r_adm (L, p, r) at L lines.
 
     `share`: r_adm is this much of |G|; None if it does not depend on G.
     """
@@ -80,7 +80,7 @@ class ResponseLines:
 
 @dataclass(frozen=True)
 class ResponseProblem:
-    """Powers x of n lines (each of one input), where x = 1 just meets r_adm in N samples: x >= 1.
+    """The powers x of n lines (each of one input) with x >= 1, where x = 1 just meets r_adm in N samples.
 
     Attributes:
         needed: (n,) the power that just meets r_adm.

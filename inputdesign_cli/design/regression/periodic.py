@@ -28,7 +28,7 @@ _HEAVY = 1e3  # weight of the equation that the powers add up to one
 
 @dataclass(frozen=True)
 class PeriodicDesign:
-    """Shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
+    """Holds the shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
 
     `exact` says whether the Gram matrix is the one that was asked for.
     """
@@ -42,7 +42,7 @@ class PeriodicDesign:
 def design_periodic(
     regression: Regression, rho: Array, energy: float, period: int, *, target: float | None
 ) -> PeriodicDesign:
-    """The shape rho on the lines of a period, or the nearest good design on them.
+    """Return the shape rho on the lines of a period, or the nearest good design on them.
 
     Args:
         target: the error to be met with the least energy; None: the energy stays, the error follows.
@@ -77,14 +77,14 @@ def design_periodic(
 
 
 def _fit(rho: Array, lines: Array) -> Array:
-    """Nonnegative powers, one in sum, whose autocorrelations are nearest to rho."""
+    """Return nonnegative powers, one in sum, whose autocorrelations are nearest to rho."""
     A = np.vstack([np.cos(np.arange(rho.size)[:, None] * lines), np.full(lines.size, _HEAVY)])
     powers, _ = scipy.optimize.nnls(A, np.append(rho, _HEAVY))
     return powers / powers.sum()
 
 
 def _candidates(shares: Array) -> NDArray[np.intp]:
-    """Indices of all lines if they are few; else those around the lines in use, and some everywhere."""
+    """Return indices of all lines if they are few; else around the used lines, and some everywhere."""
     count = shares.size
     if count <= _ALL_LINES:
         return np.arange(count)
