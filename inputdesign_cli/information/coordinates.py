@@ -25,7 +25,7 @@ _TAKES_PART = 0.05
 
 
 class Coordinates:
-    """What every experiment does with its `factor`, its `prior` and the `names` and `theta` of its model."""
+    """Converts between raw parameters and the coordinates of an experiment (`factor`, `prior`)."""
 
     factor: Array | None
     prior: Array | None
@@ -34,11 +34,11 @@ class Coordinates:
 
         @property
         def model(self) -> Model:
-            """What is to be identified."""
+            """Return the model to be identified."""
 
     @cached_property
     def size(self) -> int:
-        """Number of parameters k."""
+        """Return the number of parameters k."""
         return len(self.model.names)
 
     @cached_property
@@ -49,7 +49,7 @@ class Coordinates:
         return self.whiten_matrix(self.prior)
 
     def whiten_matrix(self, information: Array) -> Array:
-        """An information matrix (k, k) of raw parameters in these coordinates."""
+        """Return an information matrix (k, k) of raw parameters in these coordinates."""
         return self.whiten_rows(self.whiten_rows(information).T)
 
     @property
@@ -63,37 +63,37 @@ class Coordinates:
         return np.asarray(inverse)
 
     def to_raw(self, information: Array) -> Array:
-        """An information matrix of these coordinates in raw parameters."""
+        """Return an information matrix of these coordinates in raw parameters."""
         if self.factor is None:
             return information
         return self.factor @ information @ self.factor.T
 
     def raw_covariance(self, information: Array) -> Array:
-        """P = M^-1 in raw parameters, from an information matrix of these coordinates."""
+        """Return P = M^-1 in raw parameters, from an information matrix of these coordinates."""
         half = scipy.linalg.solve_triangular(np.linalg.cholesky(information), np.eye(self.size), lower=True)
         if self.factor is not None:
             half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
         return half.T @ half
 
     def raw_steps(self, steps: Array) -> Array:
-        """Differences (n, k) of parameters in these coordinates as such of raw parameters."""
+        """Return differences (n, k) of parameters in these coordinates as differences of raw parameters."""
         return steps if self.factor is None else steps @ self._inverse_factor
 
     def whiten_rows(self, rows: NDArray) -> NDArray:
-        """Gradients (n, k) of raw parameters in these coordinates."""
+        """Return gradients (n, k) of raw parameters in these coordinates."""
         if self.factor is None:
             return rows
         return rows @ self._inverse_factor.T
 
     def unexcited(self, directions: Array) -> str:
-        """The names of the parameters that take part in some `directions` (k, m) of these coordinates."""
+        """Return the names of the parameters in some `directions` (k, m) of these coordinates."""
         raw = directions if self.factor is None else self._inverse_factor.T @ directions
         size = np.abs(self.model.theta)
         return taking_part(self.model.names, raw / np.maximum(size, 1e-3 * size.max())[:, None])
 
 
 def taking_part(names: Sequence[str], directions: Array) -> str:
-    """The names of the parameters that take part in a space, whatever vectors span it.
+    """Return the names of the parameters that take part in a space, whatever vectors span it.
 
     Args:
         names: of the k parameters.

@@ -31,7 +31,7 @@ Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array]
 
 
 def jointly_whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
-    """Each in coordinates where M = I by this power, see `Experiment.whitened`."""
+    """Return each experiment in coordinates where M = I by this power, see `Experiment.whitened`."""
     return [whitened for group in _groups(experiments) for whitened in _whitened(group, power)]
 
 
@@ -77,7 +77,7 @@ def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -
 def mean_cost(
     experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
 ) -> NDArray:
-    """(n,) or (n, r, r): the mean over plants of one structure of the density of a weighted sum of powers.
+    """Return the mean over plants of the density of a weighted sum of powers, (n,) or (n, r, r).
 
     Args:
         weights: each of a kind and of a channel or all.
@@ -90,7 +90,7 @@ def mean_cost(
 def _cost(
     experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
 ) -> NDArray:
-    """The sum over the plants."""
+    """Return the sum over the plants."""
     first, total = experiments[0], np.zeros(())
     loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
     y, u = excited(loops, w) if loops else (None, None)
@@ -129,7 +129,7 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
     entries[first_of, second_of] = entries[second_of, first_of] = np.arange(first_of.size)
 
     def density(w: Array) -> NDArray[np.float64]:
-        """(n, S, k (k + 1) / 2): products are symmetric."""
+        """Return the products (n, S, k (k + 1) / 2), which are symmetric."""
         columns = whiteners @ _excitation_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
         real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
         products = real[:, first_of] * real[:, second_of]

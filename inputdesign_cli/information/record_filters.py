@@ -44,7 +44,7 @@ class RecordFilters:
         return self.signals(of, weights[::-1])[::-1]
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
-        """(n, k, 1): psi of the prediction, in the coordinates of the experiment, noise whitened to 1."""
+        """Return psi (n, k, 1), the gradient of the prediction, in these coordinates, noise whitened to 1."""
         sources, samples = self._sources(record), len(record)
         raw = np.zeros((samples, self.experiment.size))
         for column, parameter in enumerate(self.model.parameters):
