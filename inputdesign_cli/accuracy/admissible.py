@@ -36,7 +36,7 @@ class AdmissibleError(Protocol):
 
     @property
     def kept(self) -> Sensitivity | None:
-        """Return the closed loop whose margins the bound preserves, or None if it is about no loop."""
+        """Return the closed loop whose margins the bound preserves, or None if there is no loop."""
 
     @property
     def floored(self) -> Floored | None:
@@ -131,7 +131,7 @@ class Sensitivity:
 
     @property
     def kept(self) -> Sensitivity:
-        """Return this requirement itself, which is about a loop."""
+        """Return this requirement itself, since it concerns a loop."""
         return self
 
     def nominal(self, w: ArrayLike) -> Array:

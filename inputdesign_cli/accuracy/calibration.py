@@ -39,11 +39,11 @@ class Coverage:
 class Calibration:
     """Requires max over w of |G(theta) - G| / r_adm <= 1 with this probability.
 
-    The same `draws` serve every information matrix, so that alpha is a smooth function of it. A new set of as
-    many draws estimates the coverage.
+    The same `draws` serve every information matrix, so that alpha is a smooth function of it. A new set of
+    equally many draws estimates the coverage.
 
     Attributes:
-        excess: the quantile of the estimates of such records over that of the draws, which are asymptotic.
+        excess: the quantile of estimates from such records over the quantile of the asymptotic draws.
     """
 
     probability: float
@@ -67,8 +67,7 @@ class Calibration:
         return replace(self, excess=found / self._drawn(errors, information))
 
     def coverage(self, errors: Sequence[ModelError], information: Array, within: float = 1.0) -> Coverage:
-        """Count the fresh draws with errors of at most `within` times r_adm, as the best accuracy reaches it.
-        """
+        """Count fresh draws with errors of at most `within` times r_adm; the best accuracy sets `within`."""
         steps = self._steps(information, fresh=True)
         exact, linear = largest_error(errors, _raw(errors, steps)), _to_first_order(errors, steps)
         return Coverage(self.draws, int(np.sum(exact <= within)), int(np.sum(linear <= within)))
@@ -114,7 +113,7 @@ def _raw(errors: Sequence[ModelError], steps: Array) -> Array:
 
 
 def _to_first_order(errors: Sequence[ModelError], steps: Array) -> Array:
-    """Return the same by the gradient of G, (draws,)."""
+    """Return the largest error of each draw by the gradient of G, (draws,)."""
     w, largest = _frequencies(errors), np.zeros(len(steps))
     for error in errors:
         rows = error.plant_rows(w) / _admissible(error, w)[:, None, None]

@@ -57,12 +57,12 @@ class ConcaveFunction:
 class Cut(Protocol):
     """A convex set of information matrices (k, k) that contains every admissible one.
 
-    `frequency` (rad/sample) is where the requirement asks for it, None when it has no frequency.
+    `frequency` (rad/sample) is where the requirement needs it, None when it has no frequency.
     """
 
     @property
     def frequency(self) -> float | None:
-        """Return the frequency at which the requirement asks for the cut."""
+        """Return the frequency (rad/sample) at which the requirement needs the cut, if it has one."""
 
     def transformed(self, congruence: Array) -> Cut:
         """Return the same set for K M K^T, K = `congruence` (k, k) nonsingular."""
@@ -82,7 +82,7 @@ class Cut(Protocol):
         """Return (Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.
 
         Args:
-            multipliers: one array a block, suggestions of a solver; the inequality holds whatever they are.
+            multipliers: one array a block, suggestions of a solver; the inequality holds for any.
         """
 
     def implied(self, weight: Array) -> tuple[Array, float]:

@@ -50,8 +50,9 @@ class MatrixCut:
 class VarianceCut:
     """The cut tr(V^T M^-1 V) <= 1, V = `directions` (k, q): a sum of variances.
 
-    By a Schur complement ([boyd-vandenberghe-2004], A.5.5) [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The
-    inequality is that of Cauchy and Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear norm.
+    By a Schur complement ([boyd-vandenberghe-2004], A.5.5) it is [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The
+    inequality is the one of Cauchy and Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear
+    norm.
     """
 
     directions: Array
@@ -106,9 +107,9 @@ class VarianceCut:
 class DeterminantCut:
     """The cut (det M)^{1/k} >= `level`.
 
-    M >= T diag(T)^-1 T^T with T lower triangular, so that log det M >= sum of log diag(T), each bounded
-    from below by an exponential cone. The inequality is that of the arithmetic and geometric means,
-    tr(Y M) >= k (det Y)^{1/k} (det M)^{1/k}.
+    M >= T diag(T)^-1 T^T with T lower triangular, so that log det M >= sum of log diag(T). Exponential cones
+    bound each term from below. The inequality is the one of the arithmetic and geometric means, tr(Y M) >= k
+    (det Y)^{1/k} (det M)^{1/k}.
     """
 
     level: float = 1.0
@@ -270,11 +271,10 @@ class EllipsoidCut:
     def implied(self, weight: Array) -> tuple[Array, float]:
         """Return the implied tr(Z_11 M) / alpha^2 >= Z_22 for any Z >= 0 (k + 1, k + 1) with tr(Z Q) >= 0.
 
-        Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0, whatever nu is.
-        The solver's Z is made positive semidefinite first, and rounding may leave tr(Z Q) a little below
-        zero. Two changes of Z mend that and keep it positive semidefinite: to shrink its last row and
-        column, or to add to Z_11 the direction in which Q_11 is largest. The first proves more, where it
-        is possible.
+        Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0 for any nu. The
+        solver's Z is made positive semidefinite first, and rounding may make tr(Z Q) slightly negative. Two
+        changes of Z mend that and keep it positive semidefinite: to shrink its last row and column, or to add
+        to Z_11 the direction in which Q_11 is largest. The first proves more, where it is possible.
         """
         Z = positive_part(weight)
         missing = -float(np.sum(Z * self.form))

@@ -27,8 +27,8 @@ _FLOOR = 1e-150  # its square is a number still
 class EllipsoidError(OnModelError):
     """The requirement for one entry of G that is a fraction affine in theta (`Model.bends`).
 
-    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. The
-    ellipsoid is that of the parameters of all entries, which share it.
+    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. All
+    entries share the ellipsoid of the parameters.
     """
 
     against: Literal["relative", "absolute"] = "relative"
@@ -55,8 +55,8 @@ class EllipsoidError(OnModelError):
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """Return alpha over the radius at which the ellipsoid first touches |z^T d| = |1 + c^T d|.
 
-        That squared radius is the minimum of |y|^2 subject to a quadratic inequality in t = half y, and
-        equals the maximum of its concave dual in one multiplier, which is found by bisection.
+        The squared radius is the minimum of |y|^2 subject to a quadratic inequality in t = half y. It equals
+        the maximum of its concave dual in one multiplier, which is found by bisection.
         """
         left, scale, _ = np.linalg.svd(half, full_matrices=False)
         root = left * scale[:, None, :]

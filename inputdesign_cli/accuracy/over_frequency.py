@@ -26,7 +26,7 @@ _KEPT = 8  # sets of frequencies whose rows are remembered at a time
 
 
 class _LastLook:
-    """Holds the last results of a requirement, since later calls often ask for the same."""
+    """Holds the last results of a requirement, since later calls often need them again."""
 
     def __init__(self) -> None:
         self.looked: tuple[Array, Array, Array] | None = None  # an information matrix, and what it gives
@@ -46,9 +46,9 @@ class _LastLook:
 class OverFrequency(Requirement):
     """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
 
-    It is about one `entry` of G, or about all of them together; `band` is in the unit of the experiment.
-    Subclasses give `rows`, often `measure`, and the points of the frequency plane near which they change
-    fast (`own_singularities`) or have a kink (`knots`).
+    It concerns one `entry` of G, or all of them together; `band` is in the unit of the experiment. Subclasses
+    give `rows`, often `measure`, and the points of the frequency plane near which they change fast
+    (`own_singularities`) or have a kink (`knots`).
     """
 
     experiment: Experiment
@@ -63,7 +63,7 @@ class OverFrequency(Requirement):
     @property
     @abstractmethod
     def own_singularities(self) -> ComplexArray:
-        """Return the singularities besides the ones of the plant and its loop."""
+        """Return the singularities other than from the plant and its loop."""
 
     @property
     def knots(self) -> Array:

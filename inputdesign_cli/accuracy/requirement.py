@@ -37,12 +37,12 @@ class Requirement(ABC):
 
     @property
     def entry(self) -> Entry | None:
-        """Return the entry (output, input) of G that it is about, from zero; None for G as a whole."""
+        """Return the entry (output, input) of G that it concerns, from zero; None for G as a whole."""
         return None
 
     @property
     def of_the_norm(self) -> bool:
-        """Return whether it is about the Frobenius norm of all entries of G."""
+        """Return whether it concerns the Frobenius norm of all entries of G."""
         return False
 
     @property

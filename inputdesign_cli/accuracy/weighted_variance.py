@@ -24,7 +24,7 @@ _REAL = 1e-12
 class WeightedVariance(OverFrequency):
     """The requirement on the weighted variance of one entry of G.
 
-    With `relative` the variance is that of G relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
+    With `relative` it is the variance relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
     """
 
     weight: ScalarTransfer

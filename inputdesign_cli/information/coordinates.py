@@ -54,7 +54,7 @@ class Coordinates:
 
     @property
     def from_raw(self) -> Array:
-        """Return what takes the gradient with respect to raw parameters to these coordinates, (k, k)."""
+        """Return the matrix (k, k) from the gradient for raw parameters to these coordinates."""
         return np.eye(self.size) if self.factor is None else self._inverse_factor
 
     @cached_property
@@ -93,7 +93,7 @@ class Coordinates:
 
 
 def taking_part(names: Sequence[str], directions: Array) -> str:
-    """Return the names of the parameters that take part in a space, whatever vectors span it.
+    """Return the names of the parameters that take part in a space, for any vectors that span it.
 
     Args:
         names: of the k parameters.
@@ -143,7 +143,7 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
 def triangular_factor(rows: NDArray[np.float64]) -> tuple[Array, Array]:
     """Return L (k, k), lower triangular, with rows^T rows = L L^T, and its null directions (k, m).
 
-    Rank is judged with every column of the rows (number, k) at norm one, whatever its units.
+    Rank is judged with every column of the rows (number, k) at norm one, in any units.
     """
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0.0] = 1.0

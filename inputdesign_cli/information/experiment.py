@@ -132,7 +132,7 @@ class Experiment(Coordinates):
         return self._whiten(np.einsum("pq,nkqr->nkpr", self.noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Return what white e of covariance I contributes, noise whitened to I, (n, k, p, p)."""
+        """Return the gradient for white e of covariance I, noise whitened to I, (n, k, p, p)."""
         K = self.noise_whitener
         gradient = self._source.noise_gradient(w)
         if len(K) == 1:
@@ -175,7 +175,7 @@ class Experiment(Coordinates):
         return self.valued(self.products(np.atleast_1d(np.asarray(w, dtype=float))), weight)
 
     def products(self, w: Array) -> WeightedProducts:
-        """Return the part of `value_density` that depends on the frequencies only, whatever the weight."""
+        """Return the part of `value_density` that depends on the frequencies, not on the weight."""
         return WeightedProducts.of(self.excitation_gradient, w)
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
@@ -199,7 +199,7 @@ class Experiment(Coordinates):
         return kind == "output" or (kind in ("input", "moves") and self.loop is not None)
 
     def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
-        """Return from x to the outputs, the inputs, their moves or x itself, (n, p or r, r)."""
+        """Return the response to x of the outputs, inputs, their moves or x itself, (n, p or r, r)."""
         if kind == "moves":
             return self._moving(w)[:, None, None] * self.response("input", w)
         if not self.depends_on_plant(kind):
@@ -210,7 +210,7 @@ class Experiment(Coordinates):
         return y if kind == "output" else u
 
     def _moving(self, w: ArrayLike) -> ComplexArray:
-        """Return 1 - q^-1, of samples that are held, (n,)."""
+        """Return 1 - q^-1 at the frequencies, for held samples, (n,)."""
         return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
     def squeezed(self, density: NDArray) -> NDArray:
@@ -227,7 +227,7 @@ class Experiment(Coordinates):
 
     @property
     def baseline_information(self) -> Array:
-        """Return what is known without any excitation, by the noise and by `prior`, (k, k)."""
+        """Return the information (k, k) without any excitation, by the noise and by `prior`."""
         return self.noise_information + self.prior_information
 
     def of_length(self, information: Array, samples: int) -> Array:
@@ -289,7 +289,7 @@ class Experiment(Coordinates):
 
 
 def _real_products(F: ComplexArray) -> NDArray[np.float64]:
-    """Return Re sum over channels of F_l F_m^*: (n, k, p, r) -> (n, k, k)."""
+    """Return Re sum over channels of F_l F_m^* (n, k, k), for F (n, k, p, r)."""
     if F.shape[2:] == (1, 1):
         columns = F[:, :, 0, 0].T
         real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
@@ -302,7 +302,7 @@ def _real_products(F: ComplexArray) -> NDArray[np.float64]:
 
 
 def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
-    """Return sqrt(weight) F as real rows: (n, k, p, r) -> (2 n p r, k)."""
+    """Return sqrt(weight) F as real rows (2 n p r, k), for F (n, k, p, r)."""
     flat = F.transpose(0, 2, 3, 1) * np.sqrt(weights)[:, None, None, None]
     flat = flat.reshape(-1, F.shape[1])
     return np.concatenate([flat.real, flat.imag])
@@ -324,7 +324,7 @@ def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.
     """Return the information (S, k, k) of a sample of each of S plants without any excitation.
 
     Args:
-        gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.
+        gradients: (n, S, k, p, p) at frequencies (n,): the gradient for white e of covariance I.
         singularities: of all of them.
     """
 

@@ -62,7 +62,7 @@ class FiniteRecord:
         return self.experiment.prior_information + share * self.experiment.noise_information
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return what the samples (n, r) alone cause at inputs or outputs, from rest, (n, channels)."""
+        """Return the response of inputs or outputs to the samples (n, r) alone, from rest, (n, channels)."""
         return record if self._is_record(of) else self._answers.signals(of, record)
 
     def mean_squares(self, of: PowerKind, record: Array) -> Array:
@@ -97,18 +97,18 @@ class FiniteRecord:
 class FiniteRecords(FiniteRecord):
     """Evaluates a record at several plants at once; information matrices are stacked.
 
-    Signals are computed at the first plant, which is that of `experiment`; the `others` follow it.
+    Signals are computed at the first plant, which `experiment` has; the `others` follow it.
     """
 
     others: tuple[Experiment, ...] = ()
 
     def information(self, record: Array) -> NDArray[np.float64]:
-        """Return each as in `FiniteRecord` (1 + others, k, k)."""
+        """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
         return np.array([plant.information(record) for plant in self.each])
 
     @cached_property
     def known(self) -> NDArray[np.float64]:
-        """Return each as in `FiniteRecord` (1 + others, k, k)."""
+        """Return the information of each plant as in `FiniteRecord` (1 + others, k, k)."""
         return np.array([plant.known for plant in self.each])
 
     @cached_property

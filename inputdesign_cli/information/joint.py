@@ -51,7 +51,7 @@ def _whitened(experiments: Sequence[Experiment], power: float | Array) -> list[E
 
 
 def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
-    """Return `noise_information` of each (S, k, k)."""
+    """Return `noise_information` of each experiment (S, k, k)."""
     return np.concatenate([_noise(group) for group in _groups(experiments)])
 
 
@@ -140,14 +140,14 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
 
 
 def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
-    """Return what x contributes to the gradients of the predictions, in raw parameters, (S, n, k, p, r)."""
+    """Return the part of x in the gradients of the predictions, in raw parameters, (S, n, k, p, r)."""
     if experiments[0].loop is not None:
         return excitation_gradients([e.loop for e in experiments if e.loop is not None], w)
     return input_gradients(experiments[0].model, [e.model for e in experiments], w)
 
 
 def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
-    """Return what e contributes (S, n, k, p, p)."""
+    """Return the part of e in the gradients of the predictions (S, n, k, p, p)."""
     if experiments[0].loop is not None:
         return disturbance_gradients([e.loop for e in experiments if e.loop is not None], w)
     return noise_gradients(experiments[0].model, [e.model for e in experiments], w)

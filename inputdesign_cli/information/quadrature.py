@@ -125,9 +125,9 @@ def integrate(
 ) -> NDArray[np.float64]:
     """Return `sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
-    Halving gains twelve digits or none. Where it gains none and the change is already small, what
-    is left is rounding of the integrand (gradients in the whitened coordinates of a plant whose
-    parameters are nearly indistinguishable), which no rule can mend.
+    Halving gains twelve digits or none. Where it gains none and the change is already small, only rounding of
+    the integrand remains, which no rule can mend. It occurs in whitened coordinates of a plant whose
+    parameters are nearly indistinguishable.
 
     Args:
         several: values are large, as for several channels: they are computed at few nodes at a time.

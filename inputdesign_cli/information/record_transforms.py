@@ -35,7 +35,7 @@ class RecordTransforms:
     step: float
 
     def signals(self, of: PowerKind, record: Array) -> Array:
-        """Return what the samples (n, r) alone cause at inputs or outputs, (n, channels)."""
+        """Return the response of inputs or outputs to the samples (n, r) alone, (n, channels)."""
         answer = np.einsum("ncr,nr->nc", self._responses(of), self._transform(record))
         return self._back(answer)
 

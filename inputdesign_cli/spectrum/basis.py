@@ -21,8 +21,8 @@ Factor = Callable[[Array], NDArray]
 class Functional:
     """A linear functional of the spectrum, (1 / 2 pi) integral of density(w) Phi(w) dw.
 
-    `vector` (n,) are its values on the n basis functions; `density` maps frequencies to (number,).
-    A `concentrated` functional also picks up Phi at single frequencies, which its density leaves out.
+    `vector` (n,) are its values on the n basis functions; `density` maps frequencies to (number,). A
+    `concentrated` functional also picks up Phi at single frequencies, which its density does not contain.
     """
 
     vector: Array
@@ -87,8 +87,8 @@ class Face:
 class Pricing:
     """The price of a dual point: `scale` is the largest s with price - s value >= 0 on the whole cone.
 
-    `directions` are the members of the cone (in the basis' own record) at which that is tightest:
-    the ones to add to a face when the dual point came from a face alone.
+    `directions` are the members of the cone (in the basis' own record) where the inequality is tightest. They
+    are added to a face when the dual point came from a face alone.
     """
 
     scale: float

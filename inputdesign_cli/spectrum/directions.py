@@ -104,9 +104,9 @@ def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
 def directed_scale(price: Functional, value: Functional, grid: Array) -> tuple[float, Array]:
     """Return the largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
 
-    Valid for every spectrum whatever on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of
-    some direction across the channels. What a price picks up at single frequencies only adds to it and is
-    left out; a value that does proves nothing (s = 0).
+    It is valid for every spectrum on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of some
+    direction across the channels. A price that is concentrated at single frequencies only adds to it and is
+    ignored; such a value proves nothing (s = 0).
 
     Returns:
         s, and the frequencies of the local maxima of the largest generalised eigenvalue.

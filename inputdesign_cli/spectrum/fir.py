@@ -25,9 +25,9 @@ _OF_ONE_INPUT = FaceSizes(whole=12, first=12, kept=14)
 class FirBasis(GramBasis):
     """The unknowns are the upper triangle of c_0 by columns, then c_1 .. c_m (r, r) row by row.
 
-    `inputs` r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with
-    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 ([fejer-riesz-1916]; for several inputs
-    [dritschel-rovnyak-2010]); c_t is the sum of the blocks (s + t, s) of Q.
+    `inputs` is r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with a real
+    Q >= 0 ([fejer-riesz-1916]; for several inputs [dritschel-rovnyak-2010]). Here V(w) = [I, e^{-jw} I, ..,
+    e^{-jwm} I]; c_t is the sum of the blocks (s + t, s) of Q.
     """
 
     @property
@@ -116,8 +116,8 @@ class FirBasis(GramBasis):
     def products(self, generators: NDArray) -> Array:
         """Return x of (v_a v_b^* + v_b v_a^*) / 2 for each pair of generators (n, q), (size, q (q + 1) / 2).
 
-        A generator v holds the taps v(0) .. v(m), (r,) each, of a filter, and c_t of a pair is the sum over s
-        of v_a(s + t) v_b(s)^T made symmetric in a and b: a correlation along the lags, done by FFT.
+        A generator v holds the taps v(0) .. v(m), (r,) each, of a filter. c_t of a pair is the sum over s of
+        v_a(s + t) v_b(s)^T made symmetric in a and b: a correlation along the lags, computed by FFT.
         """
         r, number = self.inputs, generators.shape[1]
         length = 2 * (self.order + 1)

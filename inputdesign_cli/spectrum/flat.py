@@ -26,7 +26,7 @@ class FlatBasis(DensityFamily):
     degree = 0
 
     def spread(self, powers: Array) -> Array:
-        """Return their sum (1,); what a channel has alone is not of this family."""
+        """Return the sum of the powers (1,), since this family has one power for all channels."""
         return np.array([np.sum(powers)])
 
     def moving_average(self, x: Array) -> Array | None:

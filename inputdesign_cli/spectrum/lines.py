@@ -116,7 +116,7 @@ class LinesBasis:
     def integrals(
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
-        """Return v^* D(w) v, what an atom of power one picks up, (L, ...)."""
+        """Return v^* D(w) v, the functional of an atom of power one, (L, ...)."""
         if factor is not None and self.inputs > 1:
             return self._products(factor)
         values = density(self.frequencies)
@@ -166,7 +166,7 @@ class LinesBasis:
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
         """Return the atoms so far and the new ones; x of the old basis is the head of x of the new.
 
-        Of very many atoms the ones of least power leave the face. They come back when they pay.
+        Of very many atoms the faintest are dropped from the face. They come back when they pay.
         """
         number = face.generators
         power = np.zeros(self.size)

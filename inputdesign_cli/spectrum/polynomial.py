@@ -30,11 +30,11 @@ BasisName = Literal["legendre", "chebyshev", "monomial"]
 class PolynomialBasis(GramBasis):
     """The unknowns are S (n, n), n = r (m + 1), as svec (real) or hvec (`hermitian`, complex).
 
-    `inputs` r, `order` m <= 40, `band` in the unit of frequency of the experiment. All computing is done
-    in Legendre polynomials orthonormal on the band, (1/2 pi) integral of p_a p_b = 1 if a = b, so that
-    the power of u is tr(S) / 2. Chebyshev polynomials and monomials span the same spectra; bringing
-    their S to this form is the congruence with the Cholesky factor of their Gram matrix, without which
-    monomials (condition 1e9 at m = 13) give wrong answers. `coefficients` converts back.
+    `inputs` is r, `order` m <= 40, `band` in the unit of frequency of the experiment. All computing is done
+    in Legendre polynomials orthonormal on the band: (1/2 pi) integral of p_a p_b = 1 if a = b. So the power
+    of u is tr(S) / 2. Chebyshev polynomials and monomials span the same spectra. A congruence with the
+    Cholesky factor of their Gram matrix brings their S to this form. Without it monomials (condition 1e9 at m
+    = 13) give wrong answers. `coefficients` converts back.
     """
 
     band: tuple[float, float] = (0.0, np.pi)

@@ -43,10 +43,10 @@ _TINY = np.finfo(float).tiny
 class Certificate:
     """Holds a proved lower bound on the objective, and the dual point that proves it.
 
-    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that
-    price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
-    the spectra for which that is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of
-    which the largest is paid.
+    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
+    on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
+    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of which the
+    largest is paid.
     """
 
     bound: float

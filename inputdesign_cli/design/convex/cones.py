@@ -148,7 +148,7 @@ class Cone(ABC):
         return float(np.sum((self.S + up * self.dS) * (self.Z + down * self.dZ)))
 
     def move(self, up: float, down: float) -> None:
-        """Take the step."""
+        """Move S and Z along dS and dZ by these lengths."""
         self.S = self.S + up * self.dS
         self.Z = self.Z + down * self.dZ
 

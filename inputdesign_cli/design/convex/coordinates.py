@@ -33,7 +33,7 @@ _UNSUITED = 1e8  # a condition beyond which coordinates do not suit
 def white_power(question: Question) -> float:
     """Return the white power that answers the question at the nominal plant, 0 where none is needed.
 
-    Where the nominal plant needs none it is that of the first scenario that does.
+    Where the nominal plant needs none, the first scenario that needs power sets it.
     """
     if question.goal == "cost":
         powers = (least_white_power(one.experiment, one.requirements) for one in question.plants)

@@ -33,7 +33,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Asked:
-    """One requirement of all, of the scenario with this number; `side` as in `Problem`."""
+    """A requirement with the number of its scenario; `side` as in `Problem`."""
 
     scenario: int
     requirement: Requirement
@@ -101,7 +101,7 @@ class Demands:
 
     @cached_property
     def noise_informations(self) -> NDArray[np.float64]:
-        """Return the information (S, k, k) of the noise alone for each scenario, whatever is asked."""
+        """Return the information (S, k, k) of the noise alone for each scenario."""
         return joint_noise([scenario.experiment for scenario in self.scenarios])
 
     def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:

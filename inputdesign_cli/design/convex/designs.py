@@ -28,13 +28,13 @@ _FAR_BELOW = 1e-12
 
 @dataclass(frozen=True)
 class Design:
-    """A design and the designs it is compared with.
+    """Holds a design and the designs it is compared with.
 
     `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even over
     the inputs and meets the same requirements (or exhausts the same limits). `white_power` is its power;
-    `white_within` says whether it keeps to the limits.
-    `any_spectrum` solves the same problem over all spectra. Its certificate bounds every excitation whatever
-    (limits on the density left out). It is None if it was not asked for or if time ran out.
+    `white_within` says whether it keeps to the limits. `any_spectrum` solves the same problem over all
+    spectra. Its certificate bounds every excitation (limits on the density left out). It is None if it was
+    not requested or if time ran out.
     """
 
     problem: Problem
@@ -232,9 +232,9 @@ _ROUNDING, _FAINT = 1e-12, 1e-9
 def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:
     """Return the design without the sinusoids that together hardly change its information.
 
-    The solver leaves a little power everywhere. Power alone does not show which lines can go. In a loop with
-    integral action, power near frequency zero costs almost nothing and far exceeds that of lines that matter.
-    If the cost is minimised, the other lines make up for the removed ones.
+    The solver keeps a little power everywhere. Power alone does not show which lines can go. In a loop with
+    integral action, power near frequency zero costs almost nothing and far exceeds the power of lines that
+    matter. If the cost is minimised, the other lines make up for the removed ones.
     """
     if found.basis.has_density or problem.has_floors or not found.x.any():
         return found

@@ -36,8 +36,8 @@ class UnreachableError(Exception):
 
     `nearest` solves `problem` (goal "factor"), the best accuracy within the limits: the least s > 1 for which
     s times its information meets them, so that every error must be loosened by sqrt(s), with its certificate.
-    `within` keeps to all limits with room to spare, where some are lower ones. With `limits_alone` it is the
-    lower limits that contradict the upper ones, whatever the accuracy.
+    `within` keeps to all limits with room to spare, where some are lower ones. With `limits_alone` the lower
+    limits contradict the upper ones at any accuracy.
     """
 
     def __init__(

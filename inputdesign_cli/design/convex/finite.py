@@ -200,7 +200,7 @@ def by_interior(program: FiniteProgram, *, tolerance: float) -> tuple[FiniteSolu
 def _seen(program: FiniteProgram, matrix: MatrixPart) -> tuple[Seen, list[int]]:
     """Return the cones of one matrix, the entries they see, and the cut that each multiplier belongs to.
 
-    Seen are the entries of M that anything may change or ask for, and s.
+    The cones see s and the entries of M that some unknown may change or some cut may need.
     """
     seen = np.abs(matrix.gains).max(axis=1) + np.abs(matrix.offset)
     kept = np.flatnonzero(seen > 1e-14 * seen.max())

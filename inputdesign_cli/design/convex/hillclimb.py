@@ -32,7 +32,7 @@ class QuadraticDesign:
     """The problem for a factor: M_lm = baseline_lm + tr(A_lm H H^*), tr(P H H^*) <= cap for each limit.
 
     `maps` (k, k, n, n) holds the A_lm and `limits` pairs (P, cap), Hermitian where H may be complex.
-    `scale` L (k, k): the criterion is that of L M L^T (raw or relative parameters).
+    `scale` is L (k, k): the criterion is of L M L^T (raw or relative parameters).
     """
 
     maps: NDArray

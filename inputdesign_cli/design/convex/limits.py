@@ -17,8 +17,8 @@ class PowerLimit:
     """A limit: a power of input, output, excitation or moves is at most (`upper`) or at least `bound`.
 
     `channel` counts from 0; None is the sum over the channels. `scenario` is the number of the plant at which
-    the power is taken. `implied` says that a limit on single samples
-    stands behind it: |u| <= a leaves u no more power than a^2, moves of at most r leave theirs r^2.
+    the power is taken. `implied` says whether a limit on single samples implies it: |u| <= a bounds the power
+    of u by a^2, moves of at most r have at most r^2.
     """
 
     kind: PowerKind
@@ -82,8 +82,8 @@ class DensityPlace:
 class DensityBreach:
     """The use of a density limit at a place.
 
-    `ratio` is v^* Phi v over the level, or for a lower limit two minus that, so that it exceeds one where the
-    limit is missed and is affine in Phi.
+    `ratio` is v^* Phi v over the level, or two minus it for a lower limit. It exceeds one where the limit is
+    missed, and is affine in Phi.
     """
 
     place: DensityPlace

@@ -50,7 +50,7 @@ class Row:
 
 @dataclass(frozen=True)
 class PlacedCut:
-    """A cut with the scenario whose M' it is about; of a `side` requirement s multiplies its constants."""
+    """A cut on the M' of a scenario; s multiplies its constants if the requirement is a `side` one."""
 
     cut: Cut
     scenario: int = 0
@@ -71,8 +71,9 @@ class Implied:
 class Proof:
     """Holds the multipliers of one round, in the problem's own units.
 
-    `cuts` holds what each cut implies, whatever the solver did. `rows` (number of rows,) are nonnegative
-    weights of the limits. `costs` are weights, with the sum one, of the costs of which the largest is paid.
+    `cuts` holds the inequality that each cut implies, valid for any multipliers. `rows` (number of rows,) are
+    nonnegative weights of the limits. `costs` are weights, with the sum one, of the costs of which the
+    largest is paid.
     """
 
     cuts: tuple[Implied, ...]
@@ -82,7 +83,7 @@ class Proof:
 
 @dataclass(frozen=True)
 class MasterSolution:
-    """The optimum of the finite program: y on the face, the spectrum z = columns y, s, and its proof.
+    """Holds the optimum of the finite program: y on the face, the spectrum z = columns y, s, and its proof.
 
     Without `converged` it is the last iterate of a solver that gave up: often good enough to scale the
     next attempt by, and the proof holds as always.
@@ -225,9 +226,7 @@ def _in_cone(face: Face, y: Array) -> Array:
 def _congruence(information: Array, *, definite: bool) -> Array:
     """Return K with K M K^T = I, or nearly so where M is close to singular.
 
-    It is a Cholesky factor, so that parameters which M keeps apart stay apart.
-
-    By the Cholesky factor, which leaves apart what M keeps apart.
+    It is a Cholesky factor, which does not mix parameters that M keeps apart.
     """
     if definite:
         with suppress(np.linalg.LinAlgError):

@@ -51,11 +51,11 @@ class Problem:
     "samples": the least number of samples N within the limits; the experiment's own number must be
     one. In (N x, N) this is linear: M' = prior + N noise information + sum z_i M_i, limits times N.
 
-    `requirements` are made for the coordinates of `experiment`, that of the nominal plant. `side`
-    requirements (goal "factor") must be met by M(x) itself. `others` are the scenarios besides, of the same
-    structure and length: each M_s meets the requirements of its own. A spectrum causes other powers at each
-    of them: limits name theirs, and `paid` says whether the cost is that of the nominal plant, the mean over
-    all, or that of the dearest.
+    `requirements` are made for the coordinates of `experiment`, which has the nominal plant. `side`
+    requirements (goal "factor") must be met by M(x) itself. `others` are the other scenarios, of the same
+    structure and length: each M_s meets its own requirements. A spectrum causes other powers at each of them:
+    limits name theirs, and `paid` selects the cost at the nominal plant, the mean over all, or the cost at
+    the dearest.
 
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which

@@ -32,10 +32,10 @@ class Alternative:
 class Question:
     """A design question in raw parameters: requirements are made for the coordinates of a design.
 
-    `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
-    `side` must hold besides. The other goals meet all of them. All of that is asked of the nominal plant,
-    that of `experiment`, and of each of the `others`; `paid` as in `Problem`. `anywhere` is the band of every
-    spectrum, where the best is only approached at an end of that of the experiment.
+    The goal "factor" improves on `goal_requirements` (a criterion, or all requirements); `side` must also
+    hold. The other goals meet all of them. They hold at the nominal plant, which `experiment` has, and at
+    each of the `others`; `paid` is as in `Problem`. `anywhere` is the band of every spectrum, for a best
+    design only approached at an end of the experiment's band.
     """
 
     experiment: Experiment

@@ -49,7 +49,7 @@ class ResponseLines:
     share: float | None = None
 
     def at(self, G: ComplexArray) -> ResponseLines:
-        """Return the lines with another G (L, p, r); an error without a bound has none there."""
+        """Return the lines with another G (L, p, r); an unbounded error stays unbounded."""
         if self.share is None:
             return replace(self, G=G)
         return replace(self, G=G, admitted=np.where(np.isinf(self.admitted), np.inf, self.share * np.abs(G)))

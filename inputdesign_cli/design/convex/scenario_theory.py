@@ -45,8 +45,8 @@ def risk_before(scenarios: int, beta: float, unknowns: int) -> float:
 def risk_after(scenarios: int, beta: float, support: int) -> float:
     """Return the risk once the number of support constraints is known: wait and judge.
 
-    1 - t with t in (0, 1) the root of beta / (N + 1) sum_{m=k}^{N} C(m, k) t^(m - k) = C(N, k) t^(N - k)
-    [campi-garatti-2018], Theorem 2. It holds for programs that are not degenerate.
+    The risk is 1 - t, t in (0, 1) the root of beta / (N + 1) sum_{m=k}^{N} C(m, k) t^(m - k) = C(N, k) t^(N -
+    k) [campi-garatti-2018], Theorem 2. It holds for programs that are not degenerate.
     """
     if support >= scenarios:
         return 1.0

@@ -166,7 +166,7 @@ class State:
         return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
 
     def tight(self) -> State:
-        """Return the state, its best design with just the s it needs: an interior one has room to spare."""
+        """Return the state with the least s for its best design, which has room to spare if interior."""
         if self.problem.goal != "factor":
             return self
         worst = self.problem.demands.largest(self.best.informations, default=1.0)
@@ -198,7 +198,7 @@ class State:
 
 
 def first_state(problem: Problem, start: Array, interior: Array | None, known: Sequence[Place]) -> State:
-    """Return the state before the first round; the arguments are the ones of `exchange`."""
+    """Return the state before the first round; the arguments are as in `exchange`."""
     size, inner = problem.basis.size, None
     if interior is not None:
         inner = _inner(problem, interior[:size])
@@ -247,7 +247,7 @@ def _inner(problem: Problem, x: Array) -> Candidate:
 def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: list[Place]) -> list[Place]:
     """Return the worst places that have no cut yet, to cut next (a flat ratio has hundreds of maxima).
 
-    Of many scenarios the worst few: what serves them serves most of the others.
+    Of many scenarios only the worst few are cut: their cuts help most of the others.
     """
     most = 2 * problem.experiment.size + _MORE_CUTS
     ranked = [

@@ -33,7 +33,7 @@ def best_spectrum(A: ComplexArray, M: ComplexArray) -> ComplexArray:
 
 
 def error_of(A: ComplexArray, Phi: ComplexArray) -> Array:
-    """Return tr(A Phi^-1), zero where A is, infinite where A acts on the null space of Phi, (K,)."""
+    """Return tr(A Phi^-1), zero where A is zero, infinite where A acts on the null space of Phi, (K,)."""
     values, vectors = eigen(Phi)
     share = np.einsum("kai,kab,kbi->ki", np.conj(vectors), A, vectors).real
     negligible = share <= 1e-14 * np.abs(share).max(initial=0.0)
@@ -50,9 +50,9 @@ def adjoint(matrix: ComplexArray) -> ComplexArray:
 def weight(propagation: ComplexArray, entering: ComplexArray, noise: ComplexArray) -> ComplexArray:
     """Return the weight Z of the variance of the plant estimate at a frequency in the error of the loop.
 
-    [rojas-asymptotic] (13), (17) and (19) without the factor n/(2 pi N), so that N E||y - y0||^2 is the mean
-    over frequency of tr(Z Phi^-T) for n = 1: Z (K, n, n) from d vec(S G Delta C S) / d vec G (K, n^2, n^2),
-    see `laws.propagation`.
+    [rojas-asymptotic] (13), (17) and (19) without the factor n/(2 pi N): for n = 1, N E||y - y0||^2 is the
+    mean over frequency of tr(Z Phi^-T). Z (K, n, n) follows from d vec(S G Delta C S) / d vec G (K, n^2,
+    n^2), see `laws.propagation`.
 
     The middle factor of (13) is split as (S^T (x) S G)^* (Phi^* (x) I) (S^T (x) S G), which squares no
     condition numbers.

@@ -29,7 +29,7 @@ class WhiteInput:
 
     Attributes:
         level: of its flat spectrum.
-        value: N E||y - y0||^2 of the covariance that was asked for.
+        value: N E||y - y0||^2 of the requested covariance.
         information: (k, k) for one sample.
     """
 
@@ -46,7 +46,7 @@ class LoopErrorDesign:
         frequencies: (K,) nodes of the rule, or lines, in rad/sample.
         spectrum: (K, n, n) density there, or power matrices of the lines.
         weights: (K,) with which a sum over them is a mean over frequency; one for lines.
-        value, lower_bound: N E||y - y0||^2 of the covariance that was asked for, J_o included.
+        value, lower_bound: N E||y - y0||^2 of the requested covariance, J_o included.
         noise_part: J_o, which no input changes.
         information: (k, k) for one sample.
         powers: (p,) mean tr(M_i Phi) of the limits.

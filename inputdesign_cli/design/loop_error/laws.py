@@ -71,9 +71,9 @@ class ControlLaw(Protocol):
 
 
 def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-    """Return d vec(S G Delta C S) / d vec G, what an error of the model does to the loop, (K, n^2, n^2).
+    """Return d vec(S G Delta C S) / d vec G, the effect of a model error on the loop, (K, n^2, n^2).
 
-    Equal to (S^T (x) S G) (d vec C / d vec G), but finite where S has a zero and C a pole.
+    It equals (S^T (x) S G) (d vec C / d vec G), but is finite where S has a zero and C a pole.
     """
     T = law.complementary(w)
     S = sensitivity(T)

@@ -137,7 +137,7 @@ class LossTheory:
 
 
 def loss_theory(criterion: ParametricCriterion, information: Array) -> LossTheory:
-    """Return the theory for the model structure; `information` (k, k) is that of one sample."""
+    """Return the theory for the model structure; `information` (k, k) is of one sample."""
     covariance = np.asarray(np.linalg.inv(information))
     return LossTheory(criterion.value(information), *root_moments(error_eigenvalues(criterion.W, covariance)))
 

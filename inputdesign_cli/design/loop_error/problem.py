@@ -33,7 +33,7 @@ _WHITE = Rational(np.ones(1))
 
 
 def metric(limit: PowerLimit, w: ArrayLike, G: ComplexArray) -> ComplexArray:
-    """Return M (K, n, n) with mean tr(M Phi) the limited power; G is that of the plant at `w`."""
+    """Return M (K, n, n) with mean tr(M Phi) the limited power; G is the plant at `w`."""
     size = G.shape[1] if limit.kind == "output" else G.shape[2]
     picked = np.eye(size) if limit.channel is None else np.diag(np.eye(size)[limit.channel])
     if limit.kind == "output":
@@ -105,7 +105,7 @@ class LoopErrorProblem:
         return graded_quadrature(self.singularities, lo=lo, hi=hi, refine=refine)
 
     def settled(self, compute: Callable[[Quadrature], float]) -> tuple[Quadrature, float]:
-        """Return the coarsest rule whose mean agrees with that of halved panels, and the relative change."""
+        """Return the coarsest rule whose mean agrees with halved panels, and the relative change."""
         rule = self.rule(0)
         value, change = compute(rule), np.inf
         for refine in range(1, _HALVINGS + 1):

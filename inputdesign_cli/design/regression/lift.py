@@ -83,7 +83,7 @@ class NodeBound:
 
 @dataclass(frozen=True)
 class Lift:
-    """The relaxation of a problem; one object serves all boxes and weights.
+    """The relaxation of a problem; one object is used for all boxes and weights.
 
     Whatever is affine in the unknowns is an array whose first axis holds the constant, then the derivative
     with respect to each unknown: the Y_ij (but E[rho_0] = 1, the constant), then svec of B >= E[b b^T].
@@ -98,7 +98,7 @@ class Lift:
 
     @cached_property
     def _unknowns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return Y_ij by lag (t, m + 1, m + 1, n). (t, biases, biases): B."""
+        """Return Y_ij by lag (t, m + 1, m + 1, n), and B (t, biases, biases)."""
         n, size = self.problem.n, self.problem.m + 1
         first, second = np.triu_indices(size)
         rows, columns, scale = svec_layout(self.biases)
@@ -182,8 +182,9 @@ class Lift:
         """Return the value of a dual point made feasible from the solver's multipliers.
 
         q^T x >= residual^T x - sum offset_i^T z_i with the residual q - sum matrix_i^T z_i, whenever every
-        z_i lies in its cone. Each is projected, that of the Gram matrix with exactly the `weight` of B, so
-        that B has no residual. No E[(1, w)_i (1, w)_j rho_k] exceeds the limit on |w|^2, or its root, or one.
+        z_i lies in its cone. Each is projected. The multiplier of the Gram matrix keeps exactly the `weight`
+        of B, so that B has no residual. No E[(1, w)_i (1, w)_j rho_k] exceeds the limit on |w|^2, or its
+        root, or one.
         """
         z, many = list(multipliers), len(self.products)
         z[many] = self._with_weight(z[many], weight)

@@ -137,7 +137,7 @@ def alternate(
 ) -> Autocorrelations:
     """Run the alternation of [eckhard-mse], Section 4.2: fix R11 and solve, fix Z and solve, repeat.
 
-    With Z = R11^-1 R12 fixed, R is generally only free to scale: for m >= 2 the shape of R11 never leaves its
+    With Z = R11^-1 R12 fixed, R is generally only free to scale: for m >= 2 the shape of R11 stays as at its
     start. It is here so that one can see that; its gap comes from the proof of the others.
 
     A target that the present shape misses is approached by reducing the bias alone.

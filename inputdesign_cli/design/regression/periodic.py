@@ -30,7 +30,7 @@ _HEAVY = 1e3  # weight of the equation that the powers add up to one
 class PeriodicDesign:
     """Holds the shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
 
-    `exact` says whether the Gram matrix is the one that was asked for.
+    `exact` says whether the Gram matrix is the requested one.
     """
 
     shares: Array
@@ -46,7 +46,7 @@ def design_periodic(
 
     Args:
         target: the error to be met with the least energy; None: the energy stays, the error follows.
-            A target that the lines cannot meet leaves the energy as it is, too.
+            If the lines cannot meet the target, the energy stays, too.
     """
     problem = ToeplitzProblem.of(regression)
     lines = 2.0 * np.pi * np.arange(period // 2 + 1) / period

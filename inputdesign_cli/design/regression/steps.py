@@ -83,8 +83,8 @@ def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | Non
 def rescale(problem: ToeplitzProblem, weight: Weight, at: Autocorrelations) -> Array | None:
     """Return the best rho with the same Z = R11^-1 R12 as `at`: the second half of the alternation.
 
-    Z fixed makes R11 Z = R12 linear, n - m equations for each of the m rows. Where they leave no
-    freedom but the scale, which no shape has, `at` itself is returned.
+    Z fixed makes R11 Z = R12 linear, n - m equations for each of the m rows. Where only the scale is then
+    free, which no shape has, `at` itself is returned.
     """
     m = problem.m
     P = scipy.linalg.toeplitz(at.rho)
@@ -112,7 +112,7 @@ def _solve(
     """Minimise t + kappa q over (x, q, t), t >= |bias|^2, q at least the variance where that varies.
 
     Args:
-        bias: (n - m, 1 + size), its value at x = 0 and its derivatives; `near` of what is at most `radius`.
+        bias: (n - m, 1 + size), its value at x = 0 and its derivatives; `near` is limited to `radius`.
 
     Returns:
         rho and the value of the model; None when the solver found nothing.

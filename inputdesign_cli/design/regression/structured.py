@@ -104,11 +104,11 @@ def design_toeplitz(
     """Design by sequential convex programming from several starts, then branch and bound.
 
     Args:
-        target: the error that is allowed; the energy is minimised. Or
+        target: the error that is allowed; the energy is minimised. Or else
         energy: the trace of R; the error is minimised.
         tolerance: the relative gap to be proved; larger gaps are proved where it cannot be.
-        most_nodes: how many boxes the proof may bound; None: what takes seconds.
-        alternating: that of [eckhard-mse], run from white, in place of sequential convex programming;
+        most_nodes: the number of boxes that the proof may bound; None: a number that takes seconds.
+        alternating: run the alternation of [eckhard-mse] from white, not sequential convex programming;
             its design is kept as it is and only the bound comes from here.
 
     Raises:
@@ -164,8 +164,8 @@ def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorr
 def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Autocorrelations:
     """Return the design on lines at multiples of 15 degrees, if it is no worse for it.
 
-    An optimum is flat, so a search knows rho only to the root of its tolerance; a constant or
-    alternating signal, for one, is recognised here.
+    An optimum is flat, so a search finds rho only to the root of its tolerance. A constant or alternating
+    signal, for example, is recognised here.
     """
     lines = np.pi * np.arange(13) / 12
     columns = np.cos(np.arange(problem.n)[:, None] * lines)
@@ -252,7 +252,7 @@ def _out_of_reach(
 def least_variance(problem: ToeplitzProblem) -> float:
     """Return a lower bound on v = L1^T P11^-1 L1 over all shapes.
 
-    v >= (y^T L1)^2 / (y^T P11 y) for every y, and y^T P11 y is a mean of |sum_i y_i e^{-jiw}|^2 over the
+    For every y, v >= (y^T L1)^2 / (y^T P11 y). Here y^T P11 y is a mean of |sum_i y_i e^{-jiw}|^2 over the
     spectrum of the shape. The y of the least v that is found is taken.
     """
     head = ToeplitzProblem(problem.first, np.zeros(0), biased=False)

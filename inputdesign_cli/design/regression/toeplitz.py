@@ -73,7 +73,7 @@ class ToeplitzProblem:
 
     @cached_property
     def lags(self) -> NDArray[np.float64]:
-        """Return lags[k] has ones where |i - j| = k, (n, n, n)."""
+        """Return matrices lags[k] with ones where |i - j| = k, (n, n, n)."""
         i = np.arange(self.n)
         distance = np.abs(i[:, None] - i[None, :])
         return (distance[None] == i[:, None, None]).astype(float)
@@ -127,9 +127,9 @@ class ToeplitzProblem:
 
 @dataclass(frozen=True)
 class Weight:
-    """Minimise |b|^2 + kappa v: the error for a given energy in the units of `ToeplitzProblem`.
+    """Weighs |b|^2 + kappa v: the error for a given energy in the units of `ToeplitzProblem`.
 
-    error = unit (|b|^2 + kappa v) with unit = alpha^2 |L1|^2; without bias (alpha = 0) it is kappa v alone.
+    The error is unit (|b|^2 + kappa v) with unit = alpha^2 |L1|^2; without bias (alpha = 0) kappa v alone.
     """
 
     kappa: float
