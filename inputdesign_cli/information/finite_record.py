@@ -71,7 +71,7 @@ class FiniteRecord:
 
     @property
     def each(self) -> list[FiniteRecord]:
-        """Return one record for every plant."""
+        """Return one `FiniteRecord` for every plant."""
         return [self]
 
     def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
@@ -113,6 +113,6 @@ class FiniteRecords(FiniteRecord):
 
     @cached_property
     def each(self) -> list[FiniteRecord]:
-        """Return one record for every plant, the first for the plant of `experiment`."""
+        """Return one `FiniteRecord` for every plant, the first for the plant of `experiment`."""
         plants = (self.experiment, *self.others)
         return [FiniteRecord(plant, self.samples, self.step) for plant in plants]
