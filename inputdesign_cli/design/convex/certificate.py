@@ -41,12 +41,12 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class Certificate:
-    """A proved lower bound on the objective, and the dual point that proves it.
+    """Holds a proved lower bound on the objective, and the dual point that proves it.
 
-    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that
-    price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
-    the spectra for which that is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of
-    which the largest is paid.
+    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that price - value >= 0
+    on the cone of spectra. Both are the functionals of the module's text. `directions` are the spectra where
+    the inequality is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of which the
+    largest is paid.
     """
 
     bound: float
@@ -59,14 +59,14 @@ class Certificate:
 
     @property
     def shares(self) -> Array:
-        """(S,): the part that each scenario takes in the proof, by what it requires or by what it costs."""
+        """Return the part (S,) that each scenario takes in the proof, by its requirements or by its cost."""
         required = np.trace(self.weights, axis1=1, axis2=2)
         shares = required / max(float(required.sum()), _TINY)
         return np.maximum(shares, self.costs) if self.costs.size > 1 else shares
 
 
 def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certificate:
-    """The bound that these multipliers prove for the spectra of the problem.
+    """Prove a lower bound with these multipliers for the spectra of the problem.
 
     Args:
         rows: the limits that the weights `proof.rows` belong to.
