@@ -35,7 +35,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One thing that is wrong: a code to look up, what is wrong, how to mend it, and where it stands.
+    """One error or warning: its code to look up, its message, its remedy, and its place.
 
     `details` are the figures of the message for programs: plain data, ready for JSON.
     """
@@ -64,39 +64,39 @@ class IdesignError(Exception):
     def because(
         cls, code: str, message: str, hint: str = "", key: str = "", location: Location | None = None
     ) -> Self:
-        """An error with a single diagnostic."""
+        """Return an error with a single diagnostic."""
         return cls(Diagnostic(code, message, hint, key, location))
 
 
 class SpecError(IdesignError):
-    """The spec cannot be read, or what it says is not well posed."""
+    """Raised where the spec cannot be read, or states a problem that is not well posed."""
 
 
 class DataError(IdesignError):
-    """A data file (table of r_adm, recorded signals) cannot be used."""
+    """Raised where a data file (table of r_adm, recorded signals) cannot be used."""
 
 
 class OutputError(IdesignError):
-    """The results cannot be written."""
+    """Raised where the results cannot be written."""
 
 
 class InfeasibleError(IdesignError):
-    """No excitation can meet what the spec asks for."""
+    """Raised where no excitation can meet the requirements of the spec."""
 
     exit_code = EXIT_INFEASIBLE
 
 
 class InaccurateError(IdesignError):
-    """The solver stopped before the accuracy that the spec asks for was proved."""
+    """Raised where the solver stopped before the accuracy that the spec asks for was proved."""
 
     exit_code = EXIT_INACCURATE
 
 
 def bad_spec(code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
-    """A `SpecError` with a single diagnostic."""
+    """Return a `SpecError` with a single diagnostic."""
     return SpecError.because(code, message, hint, key)
 
 
 def refuse(key: str, what: str, hint: str, *, who: str = "this version") -> SpecError:
-    """`not-supported`: `who` does not do `what`, said plainly rather than ignored."""
+    """Return the error `not-supported`: `who` does not do `what`."""
     return bad_spec("not-supported", f"{who} does not {what}", hint=hint, key=key)

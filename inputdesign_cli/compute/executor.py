@@ -19,14 +19,14 @@ ONE_THREAD = dict.fromkeys(
 
 
 def use_one_thread() -> None:
-    """Ask for one thread, unless the environment asks for something else."""
+    """Ask for one thread, unless the environment asks for another number."""
     for name, value in ONE_THREAD.items():
         os.environ.setdefault(name, value)
 
 
 @dataclass(frozen=True)
 class Finished(Generic[Job, Answer]):
-    """One job with its answer, or with the error that stands in its place."""
+    """Holds one job with its answer, or with the error that stands in its place."""
 
     job: Job
     answer: Answer | None
@@ -43,18 +43,18 @@ class Executor(Protocol):
 
     @property
     def shares_files(self) -> bool:
-        """Whether the function sees the file system of the caller."""
+        """Return whether the function sees the file system of the caller."""
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer. `function` is importable by name; everything can be pickled."""
 
 
 class WorkerLostError(Exception):
-    """A worker ended in the middle of a job, and so did the second one that was given it."""
+    """Raised where a worker ended in the middle of a job, and so did the second one with that job."""
 
 
 class InProcess:
-    """The calling process itself, one job after the other."""
+    """Computes in the calling process itself, one job after the other."""
 
     shares_files = True
 

@@ -26,7 +26,7 @@ _ATTEMPTS = 2
 
 @dataclass(frozen=True)
 class Processes:
-    """`count` processes; a job whose process is killed is tried again, in a process of its own."""
+    """Computes in `count` processes; a job whose process is killed is tried again, in its own process."""
 
     count: int
     shares_files: bool = field(default=True, init=False)

@@ -111,7 +111,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def early_answers(parts: Parts) -> list[ScoreTest]:
-    """Return the outputs that what is new in a future input helps to predict, up to eight samples ahead.
+    """Return the outputs that the news in a future input helps to predict, up to eight samples ahead.
 
     Args:
         parts: records u (n, r), y (n, p) of an open loop.
@@ -179,7 +179,7 @@ def _by_chance(own: Array, more: Array, target: Array, *, held: bool = True) -> 
 
 
 def _left(*regression: Array) -> float:
-    """Return the sum of squares that columns (n, m) leave of a target (n,)."""
+    """Return the sum of squares of the residual of a target (n,) regressed on columns (n, m)."""
     (errors,) = residuals(*([one] for one in regression))
     return float(errors @ errors)
 
@@ -195,7 +195,7 @@ def _centred(parts: Parts, shortest: int) -> list[tuple[Array, Array]]:
 
 
 def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
-    """Return what past inputs and outputs do not explain of inputs and of outputs, (n - lags, ..) each."""
+    """Return the residuals of inputs and outputs regressed on their pasts, (n - lags, ..) each."""
     rows = [np.column_stack([past(u, lags), past(y, lags)]) for u, y in parts]
     return residuals(rows, [u[lags:] for u, _ in parts]), residuals(rows, [y[lags:] for _, y in parts])
 
@@ -246,14 +246,14 @@ def _idle(signals: Sequence[tuple[Array, Array]], lags: int) -> bool:
 
 @dataclass(frozen=True)
 class UnstablePole:
-    """The pole farthest from the origin, and the standard deviation of its radius."""
+    """Holds the pole farthest from the origin, and the standard deviation of its radius."""
 
     pole: complex
     deviation: float
 
     @property
     def denominator(self) -> Array:
-        """(2,), or (3,) with its conjugate: in q^-1, ascending."""
+        """Return the denominator in q^-1, ascending: (2,), or (3,) with the conjugate pole."""
         both = [self.pole] if self.pole.imag == 0.0 else [self.pole, self.pole.conjugate()]
         return np.asarray(np.poly(both).real)
 
@@ -261,7 +261,7 @@ class UnstablePole:
 def unstable_pole(parts: Parts, output: int) -> UnstablePole | None:
     """Return the unstable pole of one output y (n, p), at the order that BIC prefers; None: it has none.
 
-    A loop that holds an unstable plant excites it, and what ARX models predict does not care where their
+    A loop that holds an unstable plant excites it, and the predictor of an ARX model is stable wherever its
     poles are ([ljung-1999], Section 13.4).
     """
     long = [(u, y[:, output : output + 1]) for u, y in _centred(parts, 4 * _HIGHEST)]

@@ -22,7 +22,7 @@ Seed = int | np.random.SeedSequence
 
 @dataclass(frozen=True)
 class _Batch(Generic[Answer]):
-    """What a worker needs to know of a batch: the same function for all, a stream of its own."""
+    """Holds all that a worker needs for a batch: the same function for all, a stream of its own."""
 
     index: int
     function: Callable[[int, np.random.Generator], Answer]
@@ -42,7 +42,7 @@ def run_batches(
 
     Args:
         function: draws all that is random from `rng`; it can be pickled, with what all batches share.
-        seed: of the streams of all batches.
+        seed: the seed of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 
     Raises:

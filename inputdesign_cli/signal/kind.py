@@ -17,7 +17,7 @@ LimitedResponses = Callable[[Array], Sequence[LimitedResponse]]
 
 @dataclass(frozen=True)
 class Draft:
-    """What a period of a signal is drawn from.
+    """Holds what a period of a signal is drawn from.
 
     Args:
         lines: the sinusoids of one of its blocks, with the wanted powers, in rad per value.
@@ -54,11 +54,11 @@ class SignalKind:
 
     @property
     def of_levels(self) -> bool:
-        """Whether it is made from few levels."""
+        """Return whether it is made from few levels."""
         return self.few_levels or self.slewed
 
     def blocks(self, settings: SignalSettings, inputs: int) -> int:
-        """Return how many blocks, each with all lines, a period has."""
+        """Return the number of blocks, each with all lines, in a period."""
         return 1
 
     def draw(self, draft: Draft, rng: np.random.Generator) -> Array:

@@ -54,7 +54,7 @@ class FewLevels(SignalKind):
 def few_levels(
     lines: Lines, samples: int, rng: np.random.Generator, nearest: Callable[[Array], Array]
 ) -> Array:
-    """(samples, r): `lines.inputs` blocks of a period each, every input of few levels of its own.
+    """Return `lines.inputs` blocks of a period, every input of few levels of its own, (samples, r).
 
     The inputs have the powers of the lines. What remains beyond the last period continues it.
     """
@@ -87,7 +87,7 @@ def few_levels(
 def _alternate(
     start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
 ) -> Array:
-    """The best signal of few levels that is met on the way between the two things wanted."""
+    """Return the best signal of few levels that is met on the way between the two requirements."""
     levels = nearest(start)
     best, least = levels, np.inf
     for _ in range(_ROUNDS):
@@ -102,7 +102,7 @@ def _alternate(
 
 
 def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> ComplexArray:
-    """(L, r, r): the matrices of the wanted powers nearest to the transforms of the blocks (columns)."""
+    """Return the matrices (L, r, r) of the wanted powers nearest to the blocks' transforms (columns)."""
     line = np.full(len(roots), np.sqrt(0.5))
     line[0] = 1.0
     if period % 2 == 0:
@@ -113,7 +113,7 @@ def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> Comp
 
 
 def _unitary(matrices: ComplexArray) -> ComplexArray:
-    """Return the unitary factors of their polar decompositions, (L, r, r)."""
+    """Return the unitary factors of the polar decompositions of matrices, (L, r, r)."""
     if matrices.shape[-1] == 1:
         return np.exp(1j * np.angle(matrices))
     left, _, right = np.linalg.svd(matrices)
@@ -121,12 +121,12 @@ def _unitary(matrices: ComplexArray) -> ComplexArray:
 
 
 def signs(record: Array) -> Array:
-    """The nearest multiple of a signal of -1 and 1."""
+    """Return the nearest multiple of a signal of -1 and 1."""
     return np.where(record >= 0.0, 1.0, -1.0)
 
 
 def signs_and_zeros(record: Array) -> Array:
-    """The nearest multiple of a signal of -1, 0, 1: the m largest values are kept, m the best of all."""
+    """Return the nearest multiple of a signal of -1, 0, 1: the m largest values are kept, m the best."""
     size = np.abs(record)
     order = np.sort(size)[::-1]
     kept = np.argmax(np.cumsum(order) / np.sqrt(np.arange(1, size.size + 1)))
@@ -134,7 +134,7 @@ def signs_and_zeros(record: Array) -> Array:
 
 
 def _each(values: Array, nearest: Callable[[Array], Array], rms: Array) -> Array:
-    """Input by input the nearest levels, of the wanted root mean square."""
+    """Return the nearest levels input by input, of the wanted root mean square."""
     columns = []
     for column, size in zip(values.T, rms, strict=True):
         levels = nearest(column) if size > 0.0 else np.zeros_like(column)

@@ -65,13 +65,13 @@ def joint_peak(lines: Sinusoids, phases: Array, gains: ComplexArray | None = Non
 
 
 def crest_factor(record: Array) -> float:
-    """Largest modulus over root mean square; one for a record that is zero."""
+    """Return the crest factor, largest modulus over root mean square; one for a record that is zero."""
     peak = float(np.abs(record).max())
     return peak / float(np.sqrt(np.mean(record**2))) if peak > 0.0 else 1.0
 
 
 def _log_norm(phases: Array, lines: Sinusoids, gains: ComplexArray | None, p: int) -> tuple[float, Array]:
-    """log of the p-norm (a mean) of all the signals, and its gradient with respect to the phases."""
+    """Return the log of the p-norm (a mean) of all the signals, and its gradient in the phases."""
     seconds_left()
     records = lines.record(phases, gains)
     peak = np.abs(records).max()
@@ -113,7 +113,7 @@ def low_peak_phases(
 
     Args:
         samples: of the whole record, in as many periods as there are inputs.
-        limited: what is kept low; each input relative to its root mean square when nothing is limited.
+        limited: the signals to keep low; each input relative to its root mean square when nothing is limited.
     """
     rms = np.sqrt(lines.mean_squares)
     unit = np.eye(lines.inputs)
@@ -130,7 +130,7 @@ def low_peak_phases(
 
 
 def _common(lines: Lines, samples: int, powers: Array) -> Sinusoids:
-    """One period of sinusoids of these powers at the frequencies of the lines."""
+    """Return one period of sinusoids of these powers at the frequencies of the lines."""
     period, w = samples // lines.inputs, lines.frequencies
     repeats = period if lines.period == period else _repeats(w)
     if repeats is None or repeats > period:
@@ -139,7 +139,7 @@ def _common(lines: Lines, samples: int, powers: Array) -> Sinusoids:
 
 
 def _repeats(frequencies: Array) -> int | None:
-    """Return the samples after which sinusoids repeat that are evenly spaced harmonics, otherwise None."""
+    """Return the samples after which evenly spaced harmonics repeat, otherwise None."""
     steps = np.diff(np.unique(frequencies), prepend=0.0)
     repeats = 2.0 * np.pi / np.min(steps[steps > 0.0], initial=np.inf)
     if not 1.0 <= repeats < np.inf:

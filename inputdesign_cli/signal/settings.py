@@ -27,12 +27,12 @@ class Quantiser:
 
     @property
     def step(self) -> float:
-        """The least significant bit, in the unit of u."""
+        """Return the least significant bit, in the unit of u."""
         return 2.0 * self.span / 2.0**self.bits
 
     @property
     def operating_point(self) -> float:
-        """The value of the converter nearest to the offset."""
+        """Return the value of the converter nearest to the offset."""
         return self.step * self._centre
 
     @property
@@ -41,12 +41,12 @@ class Quantiser:
         return float(np.clip(np.floor(self.offset / self.step + 0.5), -half, half - 1))
 
     def reach(self) -> float:
-        """The largest deviation that the converter reaches to both sides."""
+        """Return the largest deviation that the converter reaches to both sides."""
         half = 2.0 ** (self.bits - 1)
         return self.step * min(half - 1 - self._centre, self._centre + half)
 
     def steps(self, deviation: Array) -> Array:
-        """The nearest deviations that the converter has, in steps."""
+        """Return the nearest deviations that the converter has, in steps."""
         half = 2.0 ** (self.bits - 1)
         nearest = np.floor(deviation / self.step + 0.5)
         return np.clip(nearest, -half - self._centre, half - 1 - self._centre)
@@ -54,7 +54,7 @@ class Quantiser:
 
 @dataclass(frozen=True)
 class SignalSettings:
-    """What is generated.
+    """The settings of the signal to generate.
 
     Args:
         method: the name of a kind, see `kinds.py`.
@@ -87,16 +87,16 @@ class SignalSettings:
 
     @property
     def block(self) -> int:
-        """The length of a record is a multiple of this."""
+        """Return the number of samples of which the length of a record is a multiple."""
         return self.periods * self.hold
 
     @property
     def vectors(self) -> LineVectors:
-        """Return how lines of a multisine are distributed over the inputs, see `multisine_record`."""
+        """Return the distribution of lines of a multisine over the inputs, see `multisine_record`."""
         return "random" if self.phases == "random" else "orthogonal"
 
     def period(self, samples: int) -> int:
-        """Values a period."""
+        """Return the number of values in a period."""
         return samples // self.block
 
     def taper(self, values: int) -> Array:

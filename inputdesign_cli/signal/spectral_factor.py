@@ -21,7 +21,7 @@ _MATRIX_SETTLED = 1e-12
 
 @dataclass(frozen=True)
 class SpectralFactor:
-    """The taps a (m + 1,), and `residual`, the largest error of their autocovariances relative to c_0."""
+    """Holds taps a (m + 1,), and `residual`, the largest error of their autocovariances relative to c_0."""
 
     taps: Array
     residual: float
@@ -33,7 +33,7 @@ class SpectralFactor:
 
 
 def spectral_factor(autocovariances: Array) -> SpectralFactor:
-    """The minimum-phase factor of c_0 .. c_m.
+    """Return the minimum-phase factor of c_0 .. c_m.
 
     Each step solves a o delta + delta o a = c + a o a (correlations o), Newton's method for
     a o a = c. From a minimum-phase start all iterates stay so; at zeros on the unit circle it
@@ -67,7 +67,7 @@ def spectral_factor(autocovariances: Array) -> SpectralFactor:
 
 
 def autocorrelation(taps: Array) -> Array:
-    """sum_i a_i a_{i+r} for r = 0 .. m."""
+    """Return the autocorrelation sum_i a_i a_{i+r} for r = 0 .. m."""
     return np.correlate(taps, taps, mode="full")[taps.size - 1 :]
 
 
@@ -80,7 +80,7 @@ class MatrixFactor:
     """Taps (L, n, n) of a causal factor, Phi = psi psi^*. Shares are of the largest value of the spectrum.
 
     `residual` is the largest error of psi psi^* on a grid twice as fine as that of the factorisation;
-    `floor` what had to be added at the frequencies where the spectrum vanishes.
+    `floor` the amount added at the frequencies where the spectrum vanishes.
     """
 
     taps: Array

@@ -18,10 +18,10 @@ _QUANTITIES = ("signal.worst_ratio", "objective.value")
 
 
 def trade_settings(spec: Spec, words: Sequence[str]) -> list[str]:
-    """Return what `sweep` varies and holds for the best accuracy at several lengths and amplitudes.
+    """Return the settings of `sweep` for the best accuracy at several lengths and amplitudes.
 
     Args:
-        spec: of the experiment that a quarter to twice the length and half to twice the amplitude replace.
+        spec: the experiment, tried at a quarter to twice its length and half to twice its amplitude.
         words: "samples", "amplitude" or both.
 
     Raises:
