@@ -1,4 +1,4 @@
-"""Explain the codes of errors: `error_codes.yaml`, read when somebody asks."""
+"""Explain the codes of errors by `error_codes.yaml`, which is read at the first question."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from inputdesign_cli.errors import bad_spec
 
 @dataclass(frozen=True)
 class Explanation:
-    """A code in full: a title, what it means, and what to do."""
+    """Explains a code in full: its title, its meaning, and its remedy."""
 
     title: str
     text: str

@@ -1,7 +1,7 @@
 """The few error types of the house.
 
 Every error that a user can cause is a `Diagnostic`: a stable code (which `idesign explain CODE`
-documents, see `error_codes.yaml`), one sentence that says what is wrong, and a hint that says how to mend it.
+documents, see `error_codes.yaml`), one sentence that states the error, and a hint that says how to mend it.
 The mathematics knows nothing of files: it names the key (`plant.F`), and the spec adds file, line and
 column where it is at hand.
 """
@@ -51,7 +51,7 @@ class Diagnostic:
 class IdesignError(Exception):
     """An error that the user can understand and mend; carries one or more diagnostics.
 
-    `exit_code` is what the command line returns for it.
+    `exit_code` is the exit code of the command line for it.
     """
 
     exit_code = EXIT_BAD_INPUT

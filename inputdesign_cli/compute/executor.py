@@ -1,4 +1,4 @@
-"""Where the pieces of a study are computed: the contract that every executor keeps, and the simplest one."""
+"""The place where the pieces of a study are computed: the contract of all executors, and the simplest one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Executor(Protocol):
     """Computes a function of many jobs.
 
     Jobs are drawn from the iterable as workers become free, never all at once; answers come in the order
-    in which they are finished. What a job answers must depend on nothing but the job (a random stream
+    in which they are finished. The answer to a job must depend on nothing but the job (a random stream
     travels as its seed), so that every executor gives the same answers to the last digit.
     """
 

@@ -1,4 +1,4 @@
-"""Interruptions reach the caller unchanged, although compiled modules lose them or make other errors."""
+"""Let interruptions reach the caller unchanged, although compiled modules lose them or make other errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long an answer may take: set once where a task begins, asked wherever work is repeated."""
+"""Limit the time of an answer: the limit is set where a task begins, and read wherever work is repeated."""
 
 from __future__ import annotations
 

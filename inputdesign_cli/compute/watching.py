@@ -1,4 +1,4 @@
-"""How far a long computation is, for a watcher."""
+"""Report the progress of a long computation to a watcher."""
 
 from __future__ import annotations
 

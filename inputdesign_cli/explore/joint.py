@@ -39,7 +39,7 @@ _MOST_LINES = 3
 
 @dataclass(frozen=True)
 class Found:
-    """The model that a record supports.
+    """Holds the model that a record supports.
 
     Attributes:
         outputs: the result for each; `taken` is the candidate that the model is made of, `ranges` has of
@@ -84,7 +84,7 @@ class Found:
 
     @property
     def wanders(self) -> tuple[bool, ...]:
-        """Return of each output whether its noise does not fade within the record, as if it integrated."""
+        """Return for each output whether its noise does not fade within the record, as if it integrated."""
         longest = max(len(y) for _, y in self.used)
         named = dict(zip(self.model.names, self.model.theta.tolist(), strict=True))
         suffixes = [f"[{i + 1}]" for i in range(self.model.outputs)] if self.model.outputs > 1 else [""]

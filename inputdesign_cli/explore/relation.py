@@ -86,7 +86,7 @@ def only_answers(parts: Parts) -> list[int]:
 
 
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
-    """Return of each input the probability, by chance, that it answers y(t) between jumps of its own.
+    """Return for each input the probability, by chance, that it answers y(t) between jumps of its own.
 
     Past inputs hold all that a controller has made of past outputs between two steps of its reference. News
     of u and of y goes together there. If y answered u at once, it would do so at the jumps as well.
@@ -203,7 +203,7 @@ def _new(parts: Parts, lags: int) -> tuple[list[Array], list[Array]]:
 def unhelpful(model: Model, parts: Parts) -> list[int]:
     """Return the outputs (from zero) whose prediction the simulated effect of the inputs does not improve.
 
-    An output is predicted from its own past, a level and a line, and besides from what the model simulates
+    An output is predicted from its own past, a level and a line, and besides from the simulation of the model
     (F-test). With no parameter more, the error of the simulation is predicted from its own past as well.
 
     Args:

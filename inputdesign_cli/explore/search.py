@@ -97,12 +97,12 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Chosen:
-    """The result of the search for one output.
+    """Holds the result of the search for one output.
 
     Attributes:
         candidates: the best come first; the `good` explain the record about as well as any.
         estimated: the records of the first part, `swept` its regressions, `least` their shortest delay.
-        dropped: families of which no structure could be estimated.
+        dropped: families without a structure that could be estimated.
     """
 
     candidates: tuple[Candidate, ...]
@@ -170,7 +170,7 @@ def ranked(
 
 @dataclass(frozen=True)
 class _Records:
-    """The records by which structures are estimated and judged.
+    """Holds the records by which structures are estimated and judged.
 
     Attributes:
         first, judging: records of one output; the first `late` samples of each that judges are left out.

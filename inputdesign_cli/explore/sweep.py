@@ -120,7 +120,7 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
 
 @dataclass(frozen=True)
 class Regressed:
-    """Regressions of order n of one output.
+    """Computes regressions of order n of one output.
 
     Attributes:
         parts: records u (n, r), y (n, 1).
@@ -320,7 +320,7 @@ def whitening(errors: Sequence[Array]) -> Array:
 
 
 def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:
-    """Return the records through A (p + 1,), without the samples that need what was before."""
+    """Return the records filtered by A (p + 1,), without the samples that lack a past."""
     lost = A.size - 1
     return [
         (filtered(A, [1.0], u, axis=0)[lost:], filtered(A, [1.0], y, axis=0)[lost:])

@@ -33,7 +33,7 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class Expression:
-    """A text that has been checked, or an expression composed of others, and its value.
+    """A checked text, or an expression composed of others, and its value.
 
     It is a list of steps without duplicates. The list is as long as its parts, however often they are used.
     It is worked through without recursion, however deep it is.
@@ -75,7 +75,7 @@ class Expression:
     def present(self) -> bool:
         """Return whether a coefficient is present as written: it names parameters, or is not zero.
 
-        What a plant consists of is read off its words: it does not change with the nominal parameters.
+        The structure of a plant is read off its words: it does not change with the nominal parameters.
         """
         return bool(self.names) or self.at((), np.zeros(0))[0] != 0.0
 
@@ -94,7 +94,7 @@ class Expression:
     def at(self, symbols: Sequence[str], values: Array) -> tuple[float, Array]:
         """Return the value and its gradient (m,) where the `symbols` have these `values` (m,).
 
-        Both are not a number where it is not defined, as one over zero or the root of a negative number.
+        Both are not a number where the value is not defined, as one over zero or the root of minus one.
         Raises `KeyError`: a name is not among the symbols.
         """
         here = evaluated((self,), symbols, values)

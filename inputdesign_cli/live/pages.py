@@ -1,6 +1,6 @@
 """The pages that follow a spec, and the files whose changes they follow.
 
-A page shows the new design beside the last good one, and what is wrong, at its line.
+A page shows the new design beside the last good one, and each error at its line.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ def run_batches(
         executor: where the batches are computed (default: in this process).
 
     Raises:
-        IdesignError: `worker-lost`; otherwise what `function` and the executor raise.
+        IdesignError: `worker-lost`; otherwise the errors of `function` and the executor.
     """
     root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
     batches = (

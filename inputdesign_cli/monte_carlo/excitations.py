@@ -18,7 +18,7 @@ from inputdesign_cli.spectrum import Basis, LinesBasis, TabulatedSpectrum
 
 
 class Excitation(Protocol):
-    """The excitation that the runs apply."""
+    """An excitation that the runs apply."""
 
     @property
     def name(self) -> str:
@@ -33,7 +33,7 @@ class Excitation(Protocol):
 
 @dataclass(frozen=True)
 class Recorded:
-    """One record (samples, r), `step` apart, that all runs apply."""
+    """Holds one record (samples, r), `step` apart, that all runs apply."""
 
     name: str
     record: Array
@@ -50,7 +50,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Redrawn:
-    """Records of a spectrum, generated anew in each run, each channel scaled to its power exactly.
+    """Draws records of a spectrum, new ones in each run, each channel scaled to its power exactly.
 
     `basis` and `x` are the spectrum that the generator realises.
     """
@@ -115,7 +115,7 @@ class Reapplied:
 
 @dataclass(frozen=True)
 class InPhase:
-    """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels.
+    """Draws sinusoids of `amplitudes` (L, r) at `frequencies` (L,), rad per step, in phase over the channels.
 
     `basis` and `x` are their spectrum.
     """

@@ -39,7 +39,7 @@ _LONGEST_GRID = 2**16
 
 @dataclass(frozen=True)
 class LossStudy:
-    """Losses of the closed loop over all runs with one input.
+    """Holds the losses of the closed loop over all runs with one input.
 
     Attributes:
         loss: (runs,) square root of the sum over the simulated samples of |y - y0|^2.

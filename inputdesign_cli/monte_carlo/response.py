@@ -1,4 +1,4 @@
-"""Monte Carlo of a nonparametric frequency response: how far estimates scatter at each line."""
+"""Monte Carlo study of a nonparametric frequency response: the scatter of the estimates at each line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a finite number of runs can show: confidence limits of a fraction, the spread of covariances."""
+"""Statistics of a finite number of runs: confidence limits of a fraction, the spread of covariances."""
 
 from __future__ import annotations
 

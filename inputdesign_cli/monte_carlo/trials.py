@@ -1,4 +1,4 @@
-"""What many runs of one excitation gave, and how far the estimated models are from the true system."""
+"""The results of many runs of one excitation, and the errors of the estimated models."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from inputdesign_cli.plant import Model
 
 @dataclass(frozen=True)
 class PredictedError:
-    """The error over frequency that the design predicts: r_u and, if one is asked for, r_adm, (n,) each.
+    """Holds the error over frequency that the design predicts: r_u and, if asked for, r_adm, (n,) each.
 
     `w` (n,) is in the unit of the experiment. Several entries of G stand one after the other, each over its
     own frequencies: `entries` holds the entry (output, input) of each value, (n, 2). Without it the

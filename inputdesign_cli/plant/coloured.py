@@ -38,7 +38,7 @@ _DIFFERENCE = np.array([1.0, -1.0])
 
 @dataclass(frozen=True)
 class Coloured(Around, Parametrised):
-    """`plant` with H0, its noise filtered by C_i / (D_i Delta_i); H0 is diagonal.
+    """A model `plant` with H0 whose noise is filtered by C_i / (D_i Delta_i); H0 is diagonal.
 
     Attributes:
         C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
@@ -160,7 +160,7 @@ class Coloured(Around, Parametrised):
     def _nearest(self) -> float:
         """Return the frequency below which all is taken as constant; zero unless plant and noise integrate.
 
-        What the plant integrates, the prediction differences: their product is finite at frequency zero.
+        The prediction differences where the plant integrates: their product is finite at frequency zero.
         """
         near = np.abs(self.plant.singularities)
         if not self.integrates or np.all(near > INTEGRATES):

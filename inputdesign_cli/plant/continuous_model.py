@@ -176,7 +176,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles in s of all entries."""
+        """Return the poles in s of all entries."""
         parts = [polynomial_roots(self.denominator[i][j]) for i, j in self.active]
         return np.concatenate(parts)
 

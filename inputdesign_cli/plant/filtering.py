@@ -1,4 +1,4 @@
-"""Difference equations: what a filter in q^-1 makes of samples, from rest."""
+"""Difference equations: filter samples by a filter in q^-1, from rest."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class Loop:
         [P   Q] [u] = [Q r  ]
 
     in which nothing has poles on or outside the unit circle: unstable and integrating poles of plant and
-    controller are zeros of R and Q, so that what they cause in the loop stays finite.
+    controller are zeros of R and Q, so that their effect in the loop stays finite.
 
     Poles and signals come from the states of G and of the rows of C: one polynomial in q^-1 would lose the
     digits of poles that crowd at z = 1 when sampling is fast. States that feedback does not reach are poles

@@ -1,4 +1,4 @@
-"""What every model with several inputs and outputs answers, and how its parameters are named."""
+"""The protocol of models with several inputs and outputs, and the names of their parameters."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Fraction:
 
 
 class Model(Protocol):
-    """y = G(theta) u + H(theta) e with p outputs, r inputs, k parameters and e of a full covariance.
+    """A model y = G(theta) u + H(theta) e: p outputs, r inputs, k parameters, e of a full covariance.
 
     Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
     plane are frequency + j damping (see `logarithmic_distance`).
@@ -62,7 +62,7 @@ class Model(Protocol):
 
     @property
     def flaw(self) -> str | None:
-        """Return why the parameters describe no plant, as a negative dead time, or None if they do."""
+        """Return why the parameters are not valid, as a negative dead time, or None if they are."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
@@ -138,7 +138,7 @@ class SampledPlant(Model, Protocol):
 
     @property
     def noise_gain(self) -> Array:
-        """Return how R H e enters the states besides its way through the outputs, (states, p)."""
+        """Return the gains by which R H e enters the states besides the way by the outputs, (states, p)."""
 
     @property
     def predictor_poles(self) -> ComplexArray:
@@ -168,7 +168,7 @@ DELAY = "delay"
 
 @dataclass(frozen=True)
 class Parameter:
-    """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
+    """A coefficient: its polynomial, its power, and its channels; a common one acts in several places."""
 
     letter: str
     power: int
@@ -316,7 +316,7 @@ class Parametrised:
 
 
 class WhiteNoise:
-    """H = I: the prediction is G u, so that e reaches its gradient through u alone."""
+    """Predicts G u, since H = I: e reaches the gradient of the prediction through u alone."""
 
     if TYPE_CHECKING:
 
@@ -350,7 +350,7 @@ class WhiteNoise:
 
 
 class Around(ABC):
-    """A model that is made of another one, `inner`, and answers as that does unless it says otherwise."""
+    """A model that is made of another one, `inner`, and answers like that one unless it says otherwise."""
 
     @property
     @abstractmethod

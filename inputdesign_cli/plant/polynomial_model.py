@@ -107,7 +107,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def active(self) -> tuple[tuple[int, int], ...]:
-        """The entries (output, input) of G that are not absent."""
+        """Return the entries (output, input) of G that are not absent."""
         places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
         return tuple((i, j) for i, j in places if self.first[i][j] < self.B[i][j].size)
 

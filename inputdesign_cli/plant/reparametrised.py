@@ -27,7 +27,7 @@ class Parametrisation:
     """Holds m parameters, k of them `free`, and the K coefficients of a model that follow from them.
 
     Attributes:
-        labels: (m,) what the user calls them; `symbols` (m,) what `terms` (K,) call them.
+        labels: (m,) their names for the user; `symbols` (m,) their names in `terms` (K,).
         values: (m,); parameters that are not free are known.
     """
 
@@ -115,7 +115,7 @@ class Words:
     Attributes:
         plant: the section as it was written; None if it lists the coefficients of the model.
         places: label -> where its value stands in the section.
-        known: of plant and of noise, what is listed as known.
+        known: the parameters of plant and of noise that are listed as known.
     """
 
     plant: Mapping[str, object] | None = None

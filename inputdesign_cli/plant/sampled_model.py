@@ -165,7 +165,7 @@ class SampledModel(Parametrised, WhiteNoise):
 
     @property
     def memory(self) -> float:
-        """Return the longest dead time, in samples, and one more for its fraction of a sample."""
+        """Return the longest dead time in samples, its fraction of a sample counted as a whole one."""
         return max((entry.lag + 1.0 for entry in self._entries.values() if entry.delay), default=0.0)
 
     def bends(self, output: int, input: int) -> NDArray[np.bool_]:

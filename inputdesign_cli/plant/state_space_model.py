@@ -42,7 +42,7 @@ class Matrices(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """Holds the derivatives of A, of how u(t - d) and u(t - d - 1) enter the states, of C, D and K."""
+    """Holds the derivatives of A, C, D and K, and of the gains of u(t - d) and u(t - d - 1) on the states."""
 
     A: Array
     early: Array
@@ -54,7 +54,7 @@ class Slope(NamedTuple):
 
 @dataclass(frozen=True)
 class StateSpaceModel(Parametrised):
-    """A model as above; e is white with a full covariance (p, p).
+    """A state-space model as above; e is white with a full covariance (p, p).
 
     Attributes:
         matrices: in continuous time, and behind a hold, where there is a `sample_time`; otherwise of samples.

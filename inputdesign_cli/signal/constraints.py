@@ -1,4 +1,4 @@
-"""Records within limits on their values, their moves and what they cause: exactly, not nearly."""
+"""Records within limits on their values, their moves and their responses: exactly, not nearly."""
 
 from __future__ import annotations
 

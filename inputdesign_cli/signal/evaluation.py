@@ -1,4 +1,4 @@
-"""What a record is judged by: its own information, and what its powers cost."""
+"""Judge a record by its own information and by the cost of its powers."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def level_of_power(power: Callable[[float], float], wanted: float, start: float)
 
 @dataclass(frozen=True)
 class Target:
-    """The requirement on a record.
+    """Holds the requirement on a record.
 
     Args:
         worst_ratio: maps an information matrix to the largest r_u / r_adm (or another figure, to be small).

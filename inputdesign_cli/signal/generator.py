@@ -25,7 +25,7 @@ class SignalGenerator:
 
     Args:
         band: where white excitation has its power, in rad per sample.
-        limited: what optimised phases keep low, at frequencies in rad per value; the inputs when None.
+        limited: signals that optimised phases keep low, at frequencies in rad per value; None: the inputs.
     """
 
     spectrum: DesignedSpectrum
@@ -98,7 +98,7 @@ class SignalGenerator:
     def _hold_gain(self, block: int) -> Array:
         """Return the gain of holding each value k times on the powers of the harmonics, (block // 2 + 1,).
 
-        |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; what lies above is lost.
+        |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; the powers above are lost.
         """
         w = 2.0 * np.pi * np.arange(block // 2 + 1) / (block * self.settings.hold)
         return np.abs(np.exp(-1j * np.outer(w, np.arange(self.settings.hold))).mean(axis=1)) ** 2

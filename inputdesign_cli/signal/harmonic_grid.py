@@ -1,4 +1,4 @@
-"""At which harmonics of a period a frequency response is measured, and which stay silent.
+"""Choose the harmonics of a period at which a frequency response is measured, and the silent ones.
 
 An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones: odd random grids
 ([pintelon-schoukens-2012], Section 4.3) leave out one of each group of odd harmonics at random.
@@ -26,7 +26,7 @@ class TooFewHarmonicsError(ValueError):
 
 @dataclass(frozen=True)
 class HarmonicGrid:
-    """Excited harmonics (L,) of a period, and the unexcited ones, odd and even, that are watched."""
+    """Holds excited harmonics (L,) of a period, and the unexcited ones, odd and even, that are watched."""
 
     period: int
     excited: Harmonics

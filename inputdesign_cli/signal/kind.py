@@ -1,4 +1,4 @@
-"""The protocol of a kind of signal, and what its records are drawn from."""
+"""The protocol of a kind of signal, and the settings from which its records are drawn."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ LimitedResponses = Callable[[Array], Sequence[LimitedResponse]]
 
 @dataclass(frozen=True)
 class Draft:
-    """Holds what a period of a signal is drawn from.
+    """Holds the settings from which a period of a signal is drawn.
 
     Args:
         lines: the sinusoids of one of its blocks, with the wanted powers, in rad per value.
         samples: values of the period, all blocks together.
         band: where the excitation has its power, in rad per value.
-        limited: what optimised phases keep low, at frequencies in rad per value; None for the inputs.
+        limited: signals that optimised phases keep low, at frequencies in rad per value; None: the inputs.
     """
 
     lines: Lines

@@ -56,7 +56,7 @@ def few_levels(
 ) -> Array:
     """Return `lines.inputs` blocks of a period, every input of few levels of its own, (samples, r).
 
-    The inputs have the powers of the lines. What remains beyond the last period continues it.
+    The inputs have the powers of the lines. The samples beyond the last period continue it.
     """
     assert lines.period is not None
     period, r = lines.period, lines.inputs

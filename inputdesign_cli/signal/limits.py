@@ -1,4 +1,4 @@
-"""Limits on single samples and on powers, channel by channel, and what enforces them on records."""
+"""Limits on single samples and on powers, channel by channel, and the means to enforce them on records."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SILENT = 1e-300  # what signals that are zero use of their bounds, so that any 
 
 @dataclass(frozen=True)
 class Bounds:
-    """The bounds on a record (n, r), by channel: `amplitude` and `rate` (r,), `output` (p,).
+    """Holds the bounds on a record (n, r), by channel: `amplitude` and `rate` (r,), `output` (p,).
 
     They bound |u|, its moves and |y|, where the record causes u and y from rest (in open loop u is
     the record). `powers` are the largest mean squares: kind, channel (None is the sum over the channels),
@@ -197,7 +197,7 @@ def limited_responses(
 def _constraints(plant: FiniteRecord, hold: int, bounds: Bounds) -> tuple[SignalConstraint, ...]:
     """Return the limits that clipping the record cannot meet: on outputs, and in closed loop on u.
 
-    Beside a limit on outputs those on u are stated as well, which meeting it might spoil.
+    Beside a limit on outputs the limits on u are stated as well, which meeting it might spoil.
     """
     open_loop = plant.experiment.loop is None
     if bounds.output is None and open_loop:

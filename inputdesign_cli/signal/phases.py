@@ -1,4 +1,4 @@
-"""Common phases of the lines of a multisine that keep all inputs, and what they cause, low at once."""
+"""Common phases of the lines of a multisine that keep all inputs and their responses low at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals that need no design: equal lines of any kind, and what records excite."""
+"""Signals that need no design: equal lines of any kind, and the excitation by records."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def equal_lines(
 
 @dataclass(frozen=True)
 class Excites:
-    """The excitation by a channel, its mean left out, if it goes on as it is.
+    """Holds the excitation by a channel, its mean left out, if it goes on as it is.
 
     Attributes:
         order: of persistent excitation, the lines of its spectrum on the whole circle ([ljung-1999],

@@ -84,7 +84,7 @@ def _changed(values: Array, rng: np.random.Generator) -> Array:
 
 @dataclass(frozen=True)
 class Record:
-    """The samples (n, r) of the excitation, its origin, and the worst r_u / r_adm that they reach.
+    """Holds the samples (n, r) of the excitation, their origin, and the worst r_u / r_adm that they reach.
 
     `extra_power` is the cost of their powers beyond the design, relative to it; `met` whether they meet
     the target; `factor_residual` the residual of the spectral factor, where one made them.
@@ -266,7 +266,7 @@ class _Candidates:
     def _best_within(self, values: Array) -> Array:
         """Return the most informative record between the highest that fits and one of the designed power.
 
-        What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
+        A record clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
         strongest = self._of_designed_power(values)
         if self.generator.kind.of_levels:
@@ -292,7 +292,7 @@ class _Candidates:
         return self._affordable(values, level)
 
     def _lowered(self, values: Array, level: float) -> Array:
-        """Lower the peak of the values towards what the limits admit, if that keeps their kind."""
+        """Lower the peak of the values towards the limits, if that keeps their kind."""
         settings, reach = self.limiter.settings, float(self.limiter.reach[0])
         fixed = self.generator.kind.of_levels or settings.phases == "optimised" or settings.ramp
         # Phases of several inputs that give way one by one would spoil the cross-spectra.

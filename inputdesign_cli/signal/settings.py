@@ -1,4 +1,4 @@
-"""How a spectrum is to be turned into a record: plain settings, and what they ask of its length."""
+"""The settings that turn a spectrum into a record, and their demands on its length."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Quantiser:
 
 @dataclass(frozen=True)
 class SignalSettings:
-    """The settings of the signal to generate.
+    """Holds the settings of the signal to generate.
 
     Args:
         method: the name of a kind, see `kinds.py`.
@@ -87,7 +87,7 @@ class SignalSettings:
 
     @property
     def block(self) -> int:
-        """Return the number of samples of which the length of a record is a multiple."""
+        """Return the number of samples that divides the length of a record."""
         return self.periods * self.hold
 
     @property

@@ -77,7 +77,7 @@ def _residual(taps: Array, c: Array) -> float:
 
 @dataclass(frozen=True)
 class MatrixFactor:
-    """Taps (L, n, n) of a causal factor, Phi = psi psi^*. Shares are of the largest value of the spectrum.
+    """Holds taps (L, n, n) of a causal factor, Phi = psi psi^*. Shares are of the spectrum's largest value.
 
     `residual` is the largest error of psi psi^* on a grid twice as fine as that of the factorisation;
     `floor` the amount added at the frequencies where the spectrum vanishes.

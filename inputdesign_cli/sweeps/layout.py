@@ -1,7 +1,7 @@
-"""The directory of a sweep, and what may be relied on in it.
+"""The directory of a sweep, and its guarantees.
 
     sweep.yaml           the spec with its `sweep` block: `idesign sweep` on it repeats the sweep
-    sweep.json           what was swept, and how the points ended
+    sweep.json           the grid of the sweep, and the status of its points
     sweep.csv            one row a point
     points/<key>/        the run directory of a point that has a result
     failures/<key>.json  why a point has none

@@ -1,4 +1,4 @@
-"""What a sweep is to do: a draft, a grid, a verb, and the key by which each point is known for good."""
+"""The plan of a sweep: a draft, a grid, a verb, and the key by which each point is known for good."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Plan:
         """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
 
         Raises:
-            SpecError: what is wrong with the first point, if no point that is tried can be read.
+            SpecError: the error of the first point, if no point that is tried can be read.
         """
         first: SpecError | None = None
         for index in dict.fromkeys(i * (len(self.grid) - 1) // _TRIED for i in range(_TRIED + 1)):

@@ -1,4 +1,4 @@
-"""One point of a sweep: run the verb, and leave a run directory or the reason why there is none."""
+"""Compute one point of a sweep: run the verb, and write a run directory or the reason why there is none."""
 
 from __future__ import annotations
 

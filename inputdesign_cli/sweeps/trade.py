@@ -1,4 +1,4 @@
-"""Time against amplitude against accuracy: the sweep that shows what more of each means would buy."""
+"""Time against amplitude against accuracy: the sweep that shows the gain from more of each."""
 
 from __future__ import annotations
 
