@@ -1,9 +1,8 @@
 """The few error types of the house.
 
-Every error that a user can cause is a `Diagnostic`: a stable code (which `idesign explain CODE`
-documents, see `error_codes.yaml`), one sentence that states the error, and a hint that says how to mend it.
-The mathematics knows nothing of files: it names the key (`plant.F`), and the spec adds file, line and
-column where it is at hand.
+Every error that a user can cause is a `Diagnostic`: a stable code, a sentence that states the error, and a
+hint at its remedy. `idesign explain CODE` documents the code, see `error_codes.yaml`. The mathematics knows
+nothing of files: it names the key (`plant.F`), and the spec adds file, line and column where it is at hand.
 """
 
 from __future__ import annotations

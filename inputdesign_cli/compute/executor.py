@@ -36,9 +36,9 @@ class Finished(Generic[Job, Answer]):
 class Executor(Protocol):
     """Computes a function of many jobs.
 
-    Jobs are drawn from the iterable as workers become free, never all at once; answers come in the order
-    in which they are finished. The answer to a job must depend on nothing but the job (a random stream
-    travels as its seed), so that every executor gives the same answers to the last digit.
+    Jobs are drawn from the iterable as workers become free, never all at once; answers come in the order in
+    which they are finished. The answer to a job must depend on nothing but the job; a random stream travels
+    as its seed. Then every executor gives the same answers to the last digit.
     """
 
     @property

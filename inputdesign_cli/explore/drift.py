@@ -1,7 +1,7 @@
 """Find outputs that drift along one line through all records, in addition to the response to the inputs.
 
-Lines that are removed from u and y separately are no remedy: the response of the plant to the input
-contains a line of its own.
+Lines that are removed from u and y separately are no remedy. The response of the plant to the input contains
+a line of its own.
 """
 
 from __future__ import annotations

@@ -86,8 +86,8 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
     """Return the per cent of white noise that the best of `tried` simulations explains in 5 % of cases.
 
-    Levels, starts and an agreement by chance take a chi-squared share of its power; the probabilities of
-    the structures that were tried add up at most (Bonferroni). Of no samples it explains all.
+    Levels, starts and an agreement by chance take a chi-squared share of its power. The probabilities of the
+    tried structures add up at most (Bonferroni). Without samples the fit is 100.
     """
     if samples == 0:
         return 100.0

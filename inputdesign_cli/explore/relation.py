@@ -161,8 +161,8 @@ def like_answers(parts: Parts, output: int, j: int) -> bool:
 def _by_chance(own: Array, more: Array, target: Array, *, held: bool = True) -> float:
     """Return the probability that columns `more` explain as much by chance beside `own` (n, m).
 
-    The likelihood ratio says so. Of a target that may be held, and moves at few samples only, so must a score
-    test whose covariance allows for errors of any size at any time ([white-1980]).
+    It follows from the likelihood ratio, or from a smaller score test for a target that may be held and moves
+    at few samples only. The covariance of the score allows for errors of any size at any time ([white-1980]).
     """
     both = np.column_stack([own, more])
     alone, together = _left(own, target), _left(both, target)

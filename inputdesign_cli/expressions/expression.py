@@ -1,6 +1,6 @@
 """Expressions in named parameters, as `K*(1 - exp(-h/T))`: read by a list of permitted syntax, never run.
 
-The text is parsed by Python's `ast` alone and becomes a list of steps by our own rules, with derivatives by
+The text is parsed by Python's `ast` alone and becomes a list of steps by our own rules. Derivatives come by
 forward differentiation: every step carries its value and its slope in all parameters.
 """
 

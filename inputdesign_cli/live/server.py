@@ -1,6 +1,6 @@
 """The server of one page: loopback only, behind a path that nobody can guess, and no file at all.
 
-A page of another site cannot read it: the Host header must name the loopback interface (so that a name of
+A page of another site cannot read it. The Host header must name the loopback interface (so that a name of
 that site which leads here is refused), and the path holds a secret. Other users of the machine do not know
 that path either.
 """

@@ -1,7 +1,7 @@
 """Monte Carlo study of a controller designed on an identified model: losses of the loop for each input.
 
-Each run identifies an ARX model by least squares, designs the model-reference (or internal-model)
-controller on it, and compares the true loop with the one that the true plant would have given. The difference
+Each run identifies an ARX model by least squares and designs the model-reference (or internal-model)
+controller on it. It compares the true loop with the one that the true plant would have given. The difference
 is exact, see `error_filters`; v is the noise at the output.
 """
 

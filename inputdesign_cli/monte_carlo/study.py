@@ -163,7 +163,7 @@ def searched_run(
 ) -> tuple[Estimate, bool]:
     """Return the minima that the search of `identify` finds, and whether the nominal plant's is the best.
 
-    The estimate is the minimum that is nearest to the nominal parameters; its rivals are the others, whose
+    The estimate is the minimum that is nearest to the nominal parameters; its rivals are the others. Their
     excess is negative where they explain the record better.
 
     Args:

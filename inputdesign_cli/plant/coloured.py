@@ -1,7 +1,7 @@
 """Add coloured noise, by polynomials in q^-1, or drift to any model.
 
 With H = H0 C / (D (1 - q^-1)) the prediction errors of output i are the model's, filtered once more:
-epsilon_i = (D_i (1 - q^-1) / C_i) epsilon0_i ([ljung-1999], Section 4.2). What integrates is known and has no
+epsilon_i = (D_i (1 - q^-1) / C_i) epsilon0_i ([ljung-1999], Section 4.2). The integrator is known and has no
 parameter, so that it is no more than this filter: signals are differenced, and noise is summed.
 """
 
@@ -43,8 +43,8 @@ class Coloured(Around, Parametrised):
     Attributes:
         C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
             the parameters of the plant.
-        held: of each D, whether it is known; then it may have roots on the unit circle, and the gradient with
-            respect to its coefficients is not asked for (and given as zero).
+        held: of each D, whether it is known. Then it may have roots on the unit circle, and the gradient with
+            respect to its coefficients is not needed (and given as zero).
         drift: whether the noise integrates, Delta = 1 - q^-1; one for all outputs or one an output.
     """
 

@@ -34,10 +34,9 @@ def graded_grid(
 ) -> Array:
     """Return a grid on [lo, hi] in rad/sample that resolves every pole and zero near the axis.
 
-    Linear and logarithmic spacing together, and around each of the `singularities` (complex points
-    of the frequency plane, see `logarithmic_distance`) even steps of a fortieth of its distance to
-    the axis, then offsets that grow geometrically. `knots` (breakpoints of tables) are included as
-    they are.
+    Linear and logarithmic spacing are joined. Around each of the `singularities` (complex points of the
+    frequency plane, see `logarithmic_distance`) come even steps of a fortieth of its distance to the axis.
+    Beyond these offsets grow geometrically. `knots` (breakpoints of tables) are included as they are.
     """
     span = hi - lo
     parts = [_spaced(float(lo), float(hi), points), np.asarray(knots, dtype=float)]
@@ -65,7 +64,7 @@ def _spaced(lo: float, hi: float, points: int) -> Array:
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
     """Return one grid for several plants, everywhere about as fine as the finest of theirs.
 
-    Poles that lie side by side share their points: the number of points grows with the places at which there
+    Poles that lie side by side share their points. The number of points grows with the places at which there
     are poles, not with the number of plants.
     """
     parts = [np.empty(0), *(graded_grid(singularities, lo, hi) for singularities in plants)]

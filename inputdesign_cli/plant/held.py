@@ -36,12 +36,12 @@ _ON_BOUNDARY = 1e-9
 class HeldEntry:
     """A transfer function e^(-delay s) b / a behind a hold, as rows that read states driven by samples.
 
-    The columns are the states (1, s, .., s^{n-1}) / a and these over a^2; the delayed input,
-    where b has the degree of a; and where there is a `delay` (which may be zero), the derivatives of the
-    first n states, and of the input, with respect to it.
+    The columns are the states (1, s, .., s^{n-1}) / a, these over a^2, and the delayed input, where b has the
+    degree of a. Where there is a `delay` (which may be zero), the derivatives with respect to it follow: of
+    the first n states, and of the input.
 
-    The unit of time is the geometric mean of the time constants, which keeps the companion form tame;
-    `unit` is its length in the time of the spec, so that s = s' unit.
+    The unit of time is the geometric mean of the time constants, which keeps the companion form tame. `unit`
+    is its length in the time of the spec, so that s = s' unit.
     """
 
     numerator: Array  # ascending in s, padded to the length of the denominator
@@ -176,8 +176,8 @@ class HeldEntry:
         """Return the transition in triangular form, and its basis.
 
         The second copy of the states depends on the first, and integrators on the other states of their copy.
-        Only these are turned (into Schur's form), so that the ones of integrators stay ones, and a state in
-        which they cancel is free of them near frequency zero.
+        Only these are turned (into Schur's form), so that the ones of integrators stay ones. A state in which
+        they cancel is then free of them near frequency zero.
         """
         n, m = self.order, integrators(self.denominator)
         turn = np.eye(n, dtype=complex)

@@ -50,13 +50,13 @@ class Loop:
         [R  -N] [y]   [R H e]
         [P   Q] [u] = [Q r  ]
 
-    in which nothing has poles on or outside the unit circle: unstable and integrating poles of plant and
+    in which nothing has poles on or outside the unit circle. Unstable and integrating poles of plant and
     controller are zeros of R and Q, so that their effect in the loop stays finite.
 
-    Poles and signals come from the states of G and of the rows of C: one polynomial in q^-1 would lose the
+    Poles and signals come from the states of G and of the rows of C. One polynomial in q^-1 would lose the
     digits of poles that crowd at z = 1 when sampling is fast. States that feedback does not reach are poles
-    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has
-    a delay.
+    of G, hence stable. y(t) is measured before u(t) is applied; a controller that needs time to compute has a
+    delay.
     """
 
     model: SampledPlant

@@ -1,7 +1,7 @@
 """Any model in other parameters than its coefficients, of which some may be known, by the chain rule.
 
-dG/dphi = sum_l dG/dtheta_l dtheta_l/dphi: whatever is asked of a model at the parameters phi follows from the
-model of its coefficients theta(phi) and the Jacobian J (K, k) of theta. What is known has no column in J.
+dG/dphi = sum_l dG/dtheta_l dtheta_l/dphi: all results at the parameters phi follow from the model of its
+coefficients theta(phi) and the Jacobian J (K, k) of theta. Known parameters have no column in J.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from inputdesign_cli.plant.transfer import StateSpace
 class SampledModel(Parametrised, WhiteNoise):
     """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay in s.
 
-    Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
-    dG/da_k = -s^k b / a^2: each entry needs one state-space model of a^2, exact through one exponential.
+    Sampling is linear in G: the gradient of the sampled plant is the sampled dG/da_k = -s^k b / a^2. Each
+    entry needs one state-space model of a^2, exact through one exponential.
     """
 
     continuous_plant: ContinuousModel

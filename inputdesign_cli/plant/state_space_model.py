@@ -109,7 +109,7 @@ class StateSpaceModel(Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
-        """Return a mask (k,) of all entries but those of K."""
+        """Return a mask (k,) of all entries except the entries of K."""
         return np.array([letter != "K" for letter, _, _ in self.entries], dtype=bool)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> StateSpaceModel:

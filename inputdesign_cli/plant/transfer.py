@@ -1,6 +1,6 @@
 """Transfer functions: scalars in q^-1 and in s, and matrices in q^-1 with the scalar as their 1 x 1 case.
 
-Denominators are kept in factors: a controller's slow pole next to z = 1 loses digits when it is multiplied
+Denominators are kept in factors. A controller's slow pole next to z = 1 loses digits when it is multiplied
 out, and the sensitivity function at low frequency depends on just those digits.
 """
 
@@ -149,8 +149,8 @@ class StateSpace(NamedTuple):
 class TransferMatrix:
     """A matrix T = Q^-1 P in q^-1: `numerator` P (rows, columns, l), `factors` of each entry of diagonal Q.
 
-    A denominator that several entries of a row share is kept once, so that its poles are not counted twice:
-    with integral action on every output each input has one integrator.
+    A denominator that several entries of a row share is kept once, so that its poles are not counted twice.
+    With integral action on every output each input has one integrator.
     """
 
     numerator: Array

@@ -38,8 +38,8 @@ class SignalConstraint:
 def slow_moves(values: Array, rate: float) -> Array:
     """Return the record nearest to `values` (n,), in the largest deviation, with moves up to `rate`.
 
-    Half way between the least such record above and the greatest below, which both are found by
-    one pass forwards and one backwards. It starts from rest: the first value is a move from zero.
+    It lies half way between the least such record above and the greatest below, which are found by one pass
+    forwards and one backwards. It starts from rest: the first value is a move from zero.
     """
     above, below = values.copy(), values.copy()
     for t in range(1, values.size):
@@ -72,8 +72,8 @@ def largest_move(values: Array) -> float:
 def compressed(values: Array, peak: float) -> Array:
     """Return values (n,) of the same periodogram, with their peak lowered towards `peak`.
 
-    Clip and restore, [van-der-ouderaa-1988]: the moduli of the discrete Fourier transform are kept, its
-    phases give way.
+    The method is clip and restore, [van-der-ouderaa-1988]: the moduli of the discrete Fourier transform are
+    kept, its phases give way.
     """
     best, least = values, float(np.abs(values).max())
     modulus = np.abs(np.fft.rfft(values))
@@ -95,8 +95,8 @@ def compressed(values: Array, peak: float) -> Array:
 def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Array:
     """Return the record near `values` (n, r) that keeps to all constraints.
 
-    Least squares, each input in its own root mean square, with the excess penalised ever more (a
-    quasi-Newton method), scaled down at the end so that the bounds hold exactly.
+    The distance is in least squares, each input in its own root mean square. The excess is penalised ever
+    more (a quasi-Newton method). The record is scaled down at the end so that the bounds hold exactly.
     """
     record = values
     if peak_ratio(record, constraints) > 1.0:

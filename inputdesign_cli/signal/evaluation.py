@@ -30,8 +30,8 @@ _NOTHING, _PLENTY = 1e-9, 1e30
 def least_level(ratio: Callable[[float], float], start: float) -> float:
     """Return the level at which a `ratio` that falls continuously with the level is one, from above.
 
-    Information is affine in the square of the level, so 1 / ratio^2 is a concave function of that square
-    for every bound on a variance, and near a line: its root is looked for.
+    Information is affine in the square of the level. For every bound on a variance 1 / ratio^2 is a concave
+    function of that square, and near a line; its root is computed.
 
     Raises:
         LinAlgError: the ratio is not defined at any level, or at most one at none: some parameter is not
@@ -67,8 +67,8 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
 def first_level(figure: Callable[[float], float], start: float) -> tuple[float, bool]:
     """Return the least of rising levels at which a `figure` is at most one, to a thousandth, and True.
 
-    Where limits bite, raising the level first helps, and at last changes nothing any more: when several
-    levels in a row gain nothing worth having, the level of the least figure, and False.
+    Where limits bite, raising the level first helps, and at last changes nothing any more. When several
+    levels in a row gain too little, return the level of the least figure, and False.
     """
     low, high = start / _GROWTH, start
     best, least, idle = start, np.inf, 0

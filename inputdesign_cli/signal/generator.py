@@ -45,8 +45,8 @@ class SignalGenerator:
     def method(self) -> str:
         """Return the name of the kind that is made.
 
-        A multisine where noise was asked for, but the spectrum consists of sinusoids, or no spectral factor
-        can be had to 1e-8 (a spectrum with deep zeros).
+        It is a multisine where noise was asked for, but the spectrum consists of sinusoids. So it is where no
+        spectral factor can be had to 1e-8 (a spectrum with deep zeros).
         """
         if self.settings.method != "filtered_noise":
             return self.settings.method

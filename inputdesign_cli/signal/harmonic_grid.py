@@ -1,6 +1,6 @@
 """Choose the harmonics of a period at which a frequency response is measured, and the silent ones.
 
-An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones: odd random grids
+An even nonlinearity answers odd harmonics at even ones, an odd one at odd ones. Odd random grids
 ([pintelon-schoukens-2012], Section 4.3) leave out one of each group of odd harmonics at random.
 """
 

@@ -1,17 +1,16 @@
 """Signals of two or three levels with a wanted spectrum.
 
 A two-level signal cannot have any spectrum that one likes. These start from a multisine of the wanted line
-powers whose phases make its fourth power small, so that its modulus hardly varies and little is lost by
-taking signs. Then they alternate between the two things wanted: the nearest signal of these levels, and the
-nearest one with these line powers. Discrete-interval binary signals of specified line powers are due to
-[van-den-bos-krol-1979]. What is lost against the designed spectrum
-is measured on the record's own information.
+powers. Its phases make its fourth power small, so that its modulus hardly varies and little is lost by taking
+signs. Then they alternate between two projections: the nearest signal of these levels, and the nearest one
+with these line powers. Discrete-interval binary signals of specified line powers are due to
+[van-den-bos-krol-1979]. The loss against the designed spectrum is measured on the record's own information.
 
 The record has one period a block, as many blocks as inputs. The transforms of the blocks at a line are the
-columns of a matrix Z (r x r); the record has the power matrix P there when Z Z^* is proportional to P. The
+columns of a matrix Z (r x r). The record has the power matrix P there when Z Z^* is proportional to P. The
 matrix of that kind nearest to Z is P^(1/2) times the unitary factor of P^(1/2) Z (the orthogonal Procrustes
-problem, [golub-van-loan], Section 6.4.1). With one input that keeps the
-phase of the line and restores its modulus.
+problem, [golub-van-loan], Section 6.4.1). With one input that keeps the phase of the line and restores its
+modulus.
 """
 
 from __future__ import annotations

@@ -31,9 +31,9 @@ def dense_roots(lines: Lines, samples: int) -> ComplexArray:
 def even_multisine(lines: Lines, samples: int, rng: np.random.Generator, *, periods: int) -> Array:
     """Return blocks of samples / periods, each line of a block of rank one, with random phases, (samples, r).
 
-    With as many periods as inputs the vectors of the blocks are orthogonal, and the blocks together have
-    the spectrum exactly. In contrast to `multisine_record` every column of the roots has phases of its own:
-    no block takes more than its share of the power, which keeps the peak low where inputs are alike.
+    With as many periods as inputs the vectors of the blocks are orthogonal, and the blocks together have the
+    spectrum exactly. In contrast to `multisine_record` every column of the roots has phases of its own. No
+    block takes more than its share of the power, which keeps the peak low where inputs are alike.
     """
     length, r = samples // periods, lines.inputs
     roots = dense_roots(lines, length)

@@ -35,8 +35,8 @@ def optimise_phases(
     [guillaume-1991]: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak.
 
     Args:
-        gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by what each may
-            reach; the record itself when there are none.
+        gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by their bounds; the
+            record itself when there are none.
         powers: the p, powers of two; with 4 alone the modulus comes out as even as can be.
         steps: of the quasi-Newton method, for each p.
     """

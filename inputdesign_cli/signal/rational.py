@@ -77,9 +77,9 @@ def rational_filter(taps: Array, order: int) -> RationalFilter:
     """Return the filter with `taps` (L, n, n), cut down to `order` states for each input.
 
     With the Hankel matrix H = U S V^T, cut to its largest singular values, U S^(1/2) stacks C, C A, C A^2, ..
-    and S^(1/2) V^T is [B, A B, A^2 B, ..]: C and B are their first blocks, and A is what takes the first
-    stack to itself moved up by one block. H is never formed: its products with vectors are convolutions with
-    the taps, made by FFT, and these are all that the singular value decomposition asks for.
+    and S^(1/2) V^T is [B, A B, A^2 B, ..]. C and B are their first blocks, and A takes the first stack to
+    itself moved up by one block. H is never formed. Its products with vectors are convolutions with the taps,
+    made by FFT; the singular value decomposition needs no more.
     """
     taps = taps[: 2 * _LONGEST]
     n = taps.shape[1]

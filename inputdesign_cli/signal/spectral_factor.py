@@ -35,10 +35,10 @@ class SpectralFactor:
 def spectral_factor(autocovariances: Array) -> SpectralFactor:
     """Return the minimum-phase factor of c_0 .. c_m.
 
-    Each step solves a o delta + delta o a = c + a o a (correlations o), Newton's method for
-    a o a = c. From a minimum-phase start all iterates stay so; at zeros on the unit circle it
-    slows down to halving the error of a, while the residual, which is quadratic in it, still
-    vanishes. The best iterate is returned with its residual for the caller to judge.
+    Each step solves a o delta + delta o a = c + a o a (correlations o), Newton's method for a o a = c. From a
+    minimum-phase start all iterates stay so. At zeros on the unit circle it slows down to halving the error
+    of a, while the residual, which is quadratic in it, still vanishes. The best iterate is returned with its
+    residual for the caller to judge.
     """
     c = np.asarray(autocovariances, dtype=float)
     m = c.size - 1
