@@ -26,7 +26,7 @@ def use_one_thread() -> None:
 
 @dataclass(frozen=True)
 class Finished(Generic[Job, Answer]):
-    """Holds one job with its answer, or with the error that stands in its place."""
+    """Holds one job with its answer, or with the error in place of the answer."""
 
     job: Job
     answer: Answer | None

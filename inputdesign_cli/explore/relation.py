@@ -88,8 +88,8 @@ def only_answers(parts: Parts) -> list[int]:
 def _moved_at_once(parts: Parts, lags: int) -> list[float]:
     """Return for each input the probability, by chance, that it answers y(t) between jumps of its own.
 
-    Past inputs hold all that a controller has made of past outputs between two steps of its reference. News
-    of u and of y goes together there. If y answered u at once, it would do so at the jumps as well.
+    Past inputs hold all that a controller has made of past outputs between two steps of its reference.
+    Innovations of u and of y go together there. If y answered u at once, it would do so at the jumps as well.
     """
     new_u, new_y = (np.concatenate(new) for new in _new(parts, lags))
     found = []
@@ -111,7 +111,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
 
 
 def early_answers(parts: Parts) -> list[ScoreTest]:
-    """Return the outputs that the news in a future input helps to predict, up to eight samples ahead.
+    """Return the outputs that innovations of future inputs help to predict, up to eight samples ahead.
 
     Args:
         parts: records u (n, r), y (n, p) of an open loop.
@@ -140,7 +140,7 @@ def early_answers(parts: Parts) -> list[ScoreTest]:
 
 
 def like_answers(parts: Parts, output: int, j: int) -> bool:
-    """Return whether u(t) may have been made from y(t): both have news at once, and nobody has set the input.
+    """Return whether u(t) may have been made from y(t): both have innovations at once, and u was not set.
 
     An input that is held, white, or follows from its own past was set without a look at the output.
     """

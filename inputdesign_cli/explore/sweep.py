@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def best(self) -> Regression:
-        """Return the regression with the lowest BIC among the ones with the fewest integrating poles.
+        """Return the regression with the lowest BIC among all with the fewest integrating poles.
 
         Wandering noise looks like the free response of integrators.
         """
@@ -134,7 +134,7 @@ class Regressed:
     def settled(
         self, delays: tuple[int, ...], way: tuple[int, int] | None, F: Array, least: int
     ) -> Regression:
-        """Return a model, its delays of `least` or more from a wide range first, then from the next ones.
+        """Return a model, its delays of `least` or more from a wide range first, then from nearby ones.
 
         Args:
             way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
@@ -188,7 +188,7 @@ class Regressed:
         """Yield of every record the columns and the target (n, m + 1), its own unknowns projected out.
 
         Args:
-            ranges: of each input the first lag, and the one after the last.
+            ranges: the first lag of each input, and the one after the last.
             through: whether lags of y stand among the columns, all signals through 1/F; else y is as it is.
             skipped: samples of each record that are left out.
         """

@@ -36,7 +36,7 @@ class Expression:
     """A checked text, or an expression composed of others, and its value.
 
     It is a list of steps without duplicates. The list is as long as its parts, however often they are used.
-    It is worked through without recursion, however deep it is.
+    It is evaluated without recursion, however deep it is.
 
     Attributes:
         made: the steps of a composed expression; None for a text, which states them.

@@ -61,7 +61,7 @@ class Followed:
     awaits: str = "computes whenever it is saved"
 
     def computing(self) -> Followed:
-        """Return the followed spec as it is while it is computed anew."""
+        """Return the followed spec with the state of a new computation."""
         return replace(self, state="computing", told="The file was saved: computing ..", errors=())
 
     def solved(self, run: Path, clock: str, seconds: float, *, pictures: bool = True) -> Followed:
@@ -80,7 +80,7 @@ class Followed:
 
     @property
     def page(self) -> str:
-        """Return the page as it is now."""
+        """Return the current page."""
         return filled("watch.html", {"title": f"{self.name}: {self.state}", **vars(self)})
 
 

@@ -95,7 +95,7 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Print nothing where a browser goes away while it waits for news."""
+        """Print nothing where a browser goes away while it waits for a new page."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 

@@ -41,8 +41,7 @@ def run_batches(
     """Return the answers of `function(count, rng)` for batches of `size` runs (the last shorter), in order.
 
     Args:
-        function: draws all that is random from `rng`; it can be pickled, with the data that all batches
-            share.
+        function: draws all that is random from `rng`; it can be pickled, with what all batches share.
         seed: the seed of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 

@@ -45,7 +45,7 @@ class LossStudy:
         loss: (runs,) square root of the sum over the simulated samples of |y - y0|^2.
         exact: (runs,) the same from the H2 norm of each run's loop, the reference averaged out.
         estimates: the parameters (runs, k).
-        unstable: how many estimates gave an unstable loop; their losses are left out.
+        unstable: the number of estimates with an unstable loop; their losses are left out.
         power: (inputs,) mean squares of the inputs applied.
     """
 
@@ -68,7 +68,7 @@ def study_losses(
     """Try several inputs on the true system of `problem`, all with the same noise and reference.
 
     Args:
-        problem: of an ARX plant and a law that states its loop.
+        problem: the problem of an ARX plant and a law that states its loop.
         inputs: name -> spectrum on the harmonics of the record.
         executor: where batches of the runs are computed (default: in this process).
 

@@ -145,7 +145,7 @@ def _again_where_lost(
 
 
 def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
-    """Combine estimates (runs, k) with earlier ones.
+    """Combine estimates (runs, k) with earlier estimates.
 
     Args:
         prior: the information (k, k) of the earlier estimates, which may be singular.

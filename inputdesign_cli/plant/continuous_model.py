@@ -40,7 +40,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
     an entry that is absent has none.
 
     `delay` holds a list of one dead time for each entry, an empty list for entries that act at once; it is
-    empty where all do. `entries` are the ones present; if None, zeros of the numerators say so.
+    empty where all do. `entries` are the present entries; if None, zeros of the numerators say so.
     """
 
     numerator: Rows

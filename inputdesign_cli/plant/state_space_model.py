@@ -58,7 +58,7 @@ class StateSpaceModel(Parametrised):
 
     Attributes:
         matrices: in continuous time, and behind a hold, where there is a `sample_time`; otherwise of samples.
-        entries: the free ones: letter, row and column; ("delay", 0, 0) for the dead time.
+        entries: the free entries: letter, row and column; ("delay", 0, 0) for the dead time.
     """
 
     matrices: Matrices

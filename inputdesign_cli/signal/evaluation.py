@@ -67,7 +67,7 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
 def first_level(figure: Callable[[float], float], start: float) -> tuple[float, bool]:
     """Return the least of rising levels at which a `figure` is at most one, to a thousandth, and True.
 
-    Where limits bite, raising the level first helps, and at last changes nothing any more. When several
+    Where limits are active, raising the level first helps, and at last changes nothing any more. When several
     levels in a row gain too little, return the level of the least figure, and False.
     """
     low, high = start / _GROWTH, start

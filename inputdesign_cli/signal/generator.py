@@ -24,7 +24,7 @@ class SignalGenerator:
     """Makes records of `samples` samples, each from random numbers of its own; other processes can have it.
 
     Args:
-        band: where white excitation has its power, in rad per sample.
+        band: the band of white excitation, in rad per sample.
         limited: signals that optimised phases keep low, at frequencies in rad per value; None: the inputs.
     """
 

@@ -22,7 +22,7 @@ class Draft:
     Args:
         lines: the sinusoids of one of its blocks, with the wanted powers, in rad per value.
         samples: values of the period, all blocks together.
-        band: where the excitation has its power, in rad per value.
+        band: the band of the excitation, in rad per value.
         limited: signals that optimised phases keep low, at frequencies in rad per value; None: the inputs.
     """
 
@@ -54,7 +54,7 @@ class SignalKind:
 
     @property
     def of_levels(self) -> bool:
-        """Return whether it is made from few levels."""
+        """Return whether the signal has few levels."""
         return self.few_levels or self.slewed
 
     def blocks(self, settings: SignalSettings, inputs: int) -> int:

@@ -136,7 +136,7 @@ class DesignedSpectrum:
         power: the mean square, of all inputs together.
         step: time between samples in the unit of time of the frequencies (1 for rad/sample).
         density: maps frequencies (n,) to Phi, (n,) for one input, else (n, r, r); None for sinusoids.
-        sinusoids: of a spectrum without a density, frequencies in its own unit.
+        sinusoids: the sinusoids of a spectrum without a density, frequencies in its own unit.
         free: whether their frequencies were found, not given.
         autocovariances: (m + 1,) c_0 .. c_m of one input that a moving average can make.
     """

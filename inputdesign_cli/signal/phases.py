@@ -38,7 +38,7 @@ def optimise_phases(
         gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by their bounds; the
             record itself when there are none.
         powers: the p, powers of two; with 4 alone the modulus comes out as even as can be.
-        steps: of the quasi-Newton method, for each p.
+        steps: the steps of the quasi-Newton method, for each p.
     """
     signals = np.array(gains) if len(gains) else None
     phases, best = start, np.inf
@@ -112,7 +112,7 @@ def low_peak_phases(
     """Return the common phases of the lines for which the joint peak over signals and periods is low, (L,).
 
     Args:
-        samples: of the whole record, in as many periods as there are inputs.
+        samples: the samples of the whole record, in as many periods as there are inputs.
         limited: the signals to keep low; each input relative to its root mean square when nothing is limited.
     """
     rms = np.sqrt(lines.mean_squares)

@@ -51,7 +51,7 @@ class Excites:
     Attributes:
         order: of persistent excitation, the lines of its spectrum on the whole circle ([ljung-1999],
             Section 13.2).
-        band: in rad/sample, with 5 % of the power below and 5 % above.
+        band: the band in rad/sample, with 5 % of the power below and 5 % above.
     """
 
     mean: float

@@ -62,12 +62,12 @@ class SignalSettings:
             spectrum exact over as many periods as inputs; so do `schroeder` and `optimised`. `random`:
             uniform and independent in each input, exact on average only. `even`: optimised from Schroeder's.
         lines: harmonics of a period that are used.
-        periods: equal ones in the record.
+        periods: the number of equal periods in the record.
         hold: each value stands for this many samples.
         ramp: samples over which the record fades in and out.
         bits: register of a pseudo-random sequence.
         number: levels of steps.
-        level: (r,) the peaks that the inputs are to have, whatever that buys.
+        level: (r,) the required peaks of the inputs, whatever accuracy follows.
         candidates, most_candidates: up to the second number are tried while the best of the first costs more
             than a twentieth beyond the design.
     """

@@ -106,7 +106,7 @@ def matrix_factor(
     """Factor the spectrum `density(w)` (K, n, n), w in [0, pi]: [wilson-1972], in the form with FFTs.
 
     Args:
-        points: of the grid of the whole circle.
+        points: the points of the grid of the whole circle.
         floor: eigenvalues below this share of the largest one are raised to it.
     """
     half = np.pi * np.arange(points // 2 + 1) / (points // 2)

@@ -55,7 +55,7 @@ def checked_run(directory: Path, spec: str | None = None) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the parts of a sweep stand in its directory."""
+    """Names the paths of the parts of a sweep in its directory."""
 
     root: Path
 

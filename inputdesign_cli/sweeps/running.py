@@ -68,7 +68,7 @@ class SweepRun:
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
         figures: draw the figures of every point too, not only of the sweep.
-        figure_format: of all figures: png, svg or pdf.
+        figure_format: the format of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
         watch: is called with this object after every point.
         statuses: the number of points of each status, once it has run; `files` that were written then.
