@@ -1,7 +1,7 @@
 """Find outputs that drift along one line through all records, in addition to the response to the inputs.
 
-Lines that are removed from u and y separately are no remedy: the response of the plant to the input
-contains a line of its own.
+Lines that are removed from u and y separately are no remedy. The response of the plant to the input contains
+a line of its own.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def slopes_of(parts: Parts, *, known: bool = False) -> Array:
 def _line(parts: Parts, known: bool) -> float:
     """Return the slope of one output; zero unless it is far from none in noise of any colour.
 
-    What an output-error model with a line does not explain is whitened by an autoregression. The deviation of
+    The residual of an output-error model with a line is whitened by an autoregression. The deviation of
     the slope follows from the whitened line.
     """
     samples, longest = sum(len(y) for _, y in parts), max(len(y) for _, y in parts)

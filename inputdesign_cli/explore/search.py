@@ -97,12 +97,12 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Chosen:
-    """What was found for one output.
+    """Holds the result of the search for one output.
 
     Attributes:
-        candidates: those to take come first; the `good` explain the record about as well as any.
+        candidates: the best come first; the `good` explain the record about as well as any.
         estimated: the records of the first part, `swept` its regressions, `least` their shortest delay.
-        dropped: families of which no structure could be estimated.
+        dropped: families without a structure that could be estimated.
     """
 
     candidates: tuple[Candidate, ...]
@@ -114,7 +114,7 @@ class Chosen:
 
     @property
     def best(self) -> Candidate:
-        """Return the one to take."""
+        """Return the best candidate."""
         return self.candidates[0]
 
     def ranges(self, candidate: Candidate) -> Ranges:
@@ -132,7 +132,7 @@ class Chosen:
 
 
 def price(unknowns: int, samples: int) -> float:
-    """Return the price of parameters in the log of a variance: that of BIC, and a share at least."""
+    """Return the price of parameters in the log of a variance: the BIC penalty, and a share at least."""
     return unknowns * max(float(np.log(samples)) / samples, _WORTH)
 
 
@@ -170,10 +170,10 @@ def ranked(
 
 @dataclass(frozen=True)
 class _Records:
-    """What estimates structures and what judges them.
+    """Holds the records by which structures are estimated and judged.
 
     Attributes:
-        first, judging: records of one output; of each that judges the first `late` samples are left out.
+        first, judging: records of one output; the first `late` samples of each that judges are left out.
         white: the first part through the autoregression of its noise; `swept` its regressions.
         C, D: the noise beside a plant.
         feedback: whether inputs answer the outputs.
