@@ -39,7 +39,7 @@ from inputdesign_cli.outcome.simulation import Simulation
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What was asked and found, section by section; sections that a question does not have are None.
+    """Holds the question and the answer, section by section; a section is None if the question lacks it.
 
     `notes` are the messages of the `findings`. `provenance` has what the writer of a run adds: environment,
     digests, and the names of its files.

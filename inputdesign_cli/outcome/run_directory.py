@@ -120,7 +120,7 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
 
 
 def read_run(directory: Path) -> dict[str, Any]:
-    """The content of `result.json` of a whole run.
+    """Return the content of `result.json` of a whole run.
 
     Raises:
         DataError: `run-missing` (no such directory, or no run in it), `run-incomplete` (one of its files is
@@ -188,7 +188,7 @@ def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, 
 
 @contextmanager
 def output_errors(target: Path) -> Iterator[None]:
-    """Turn what the operating system refuses into an `OutputError`."""
+    """Turn errors of the operating system into an `OutputError`."""
     try:
         yield
     except OSError as error:

@@ -26,7 +26,7 @@ _USUAL = 1000
 
 @dataclass(frozen=True)
 class ReadyMade:
-    """The signal that is asked for."""
+    """Describes the signal that is asked for."""
 
     kind: str
     bits: int | None = None  # of the register of a prbs; None: enough for the samples without repetition
@@ -43,12 +43,12 @@ class ReadyMade:
 
     @property
     def inputs(self) -> int:
-        """Number of inputs."""
+        """Return the number of inputs."""
         return len(self.levels)
 
 
 def make_signal(asked: ReadyMade) -> Results:
-    """Return the record as signal.csv, its figures, and what it excites.
+    """Return the record as signal.csv, its figures, and the excited frequencies.
 
     Raises:
         SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.

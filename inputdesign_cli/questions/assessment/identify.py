@@ -83,12 +83,12 @@ class ModelQuestion:
 
     @property
     def asked(self) -> Sequence[OnModelError]:
-        """What is asked of the model error."""
+        """Return the requirements on the model error."""
         return model_errors(self.requirements)
 
     @property
     def errors(self) -> Sequence[OnModelError]:
-        """What has r_u: what is asked of the model error, or else every entry of G."""
+        """Return the model errors that r_u is computed for: those required, or else every entry of G."""
         return self.asked or self.entries
 
     def ratio(self, information: Array) -> float:
@@ -131,7 +131,7 @@ class Identification:
 
 @dataclass(frozen=True)
 class Identified:
-    """An estimate, its data, and what is asked of it.
+    """Holds an estimate, its data, and the accuracy asked of it.
 
     Attributes:
         question: None where it cannot be asked of this estimate; `unasked` says why.
@@ -237,7 +237,7 @@ def estimated(
 
 
 def told(error: IdesignError) -> str:
-    """What is wrong and how to mend it, as a sentence."""
+    """Return the messages and hints of an error as one sentence."""
     return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
 
@@ -267,7 +267,7 @@ def findings_of(task: Identification, found: Identified) -> list[Finding]:
 
 
 def speaking_against(task: Identification, found: Identified) -> list[Finding]:
-    """Return what speaks against the model; faults of measurement alone, since they upset the other tests."""
+    """Return findings against the model; faults of measurement alone, as they upset other tests."""
     data, estimate, units = found.data, found.estimate, task.header.units
     return mismeasured(task, found) or [
         # Where an expression ends G may vanish, whatever the inputs do.
@@ -286,7 +286,7 @@ def mismeasured(task: Identification, found: Identified) -> list[Finding]:
 
 
 def identification_results(task: Identification, found: Identified, began: float) -> Results:
-    """Return what `idesign identify` writes.
+    """Return the results that `idesign identify` writes.
 
     Args:
         began: `time.perf_counter()` when the work began.

@@ -44,7 +44,7 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 
 def build_calibration(spec: Spec) -> Calibration | None:
-    """Return how alpha is calibrated for `confidence: {exact: ..}`; None without it."""
+    """Return the calibration of alpha for `confidence: {exact: ..}`; None without it."""
     stated = None if (error := spec.accuracy.error) is None else error.calibrated
     return None if stated is None or stated.exact is None else Calibration(stated.exact, stated.draws)
 

@@ -58,7 +58,7 @@ class Memory:
 
     @property
     def folder(self) -> Path:
-        """The folder that names of files in the spec are relative to."""
+        """Return the folder that names of files in the spec are relative to."""
         return self.directory / self.campaign.folder
 
 

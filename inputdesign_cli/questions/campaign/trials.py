@@ -50,7 +50,7 @@ class CampaignStudy:
 
 @dataclass(frozen=True)
 class Ended:
-    """The end of one run.
+    """Describes the end of one run.
 
     Attributes:
         status: `stopped` if the data met what is asked; `unplanned` if no experiment could be planned.

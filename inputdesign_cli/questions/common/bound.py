@@ -31,7 +31,7 @@ Pairs = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Informed:
-    """What an information matrix M (k, k), in the coordinates of the errors, says of them over frequency.
+    """Relates an information matrix M (k, k), in the coordinates of the errors, to them over frequency.
 
     Without r_adm `stated` the errors are r_u of entries of G. Each binds at its `active` frequencies. For
     comparison there are M of the baseline `white`, of white excitation with `equal` means, and of the

@@ -37,7 +37,7 @@ _FADED = float(np.log(100.0))
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumTask(ABC):
-    """A question about the spectrum of an experiment, with its record and its trial.
+    """Asks about the spectrum of an experiment, with its record and its trial.
 
     Without a requirement on them `unstated` are the errors that have r_u; `ellipses` are None for a choice.
     """
@@ -78,7 +78,7 @@ class SpectrumTask(ABC):
         requirements: Sequence[Requirement],
         findings: Iterable[Finding],
     ) -> Results:
-        """Return the results with a record, what an unknown start changes, and the minima that data leave.
+        """Return the results with a record, the effect of an unknown start, and the rival minima.
 
         A design is of spectra, which have no start; the record may live on its start from rest.
         """
@@ -108,7 +108,7 @@ class SpectrumTask(ABC):
         *,
         flat: bool = True,
     ) -> Delivered:
-        """Return what a trial of a record (n, r) takes; the curves show its information."""
+        """Return the design with a record (n, r) for a trial; the curves show its information."""
         of_length = partial(informed.of_length, experiment, self.ellipses, flat=flat)
         search = None if self.foresight is None else partial(self.foresight.tried, record, requirements)
         return Delivered(results, record, renewed, alpha, of_length, search)
@@ -117,7 +117,7 @@ class SpectrumTask(ABC):
 def growth_by_start(
     experiment: Experiment, record: Array, step: float, requirements: Sequence[Requirement]
 ) -> float:
-    """Return how many times as large errors are if the start of a record (n, r) and its levels are unknown.
+    """Return the factor on the errors if the start of a record (n, r) and its levels are unknown.
 
     What samples after the start has faded show, about their means, decides where it is enough.
     """

@@ -41,7 +41,7 @@ _MOST_SHIFTS = 2
 
 @dataclass(frozen=True)
 class Exploration:
-    """The results, why no model deserves trust (nothing where one does), and what tests say against it."""
+    """Holds the results, reasons against trust in any model (empty if one has it), and failed tests."""
 
     results: Results
     reasons: tuple[str, ...] = ()

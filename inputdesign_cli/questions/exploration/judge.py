@@ -30,7 +30,7 @@ _SEE = "see whether the model is of this plant, and gain, delay, units and colum
 
 
 def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
-    """Return how a given model does on other data.
+    """Return the fit and the tests of a given model on other data.
 
     Raises:
         DataError: the data cannot be used, or an output never changes.

@@ -88,7 +88,7 @@ def _structure(candidate: Candidate) -> Structure:
 
 
 def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, float]]) -> Iterator[str]:
-    """Yield what a user should know of the record and of how the model was chosen."""
+    """Yield remarks on the record and on the choice of the model."""
     outputs, inputs = found.model.outputs, found.model.inputs
     yield from (_chosen(log, found, i) for i in range(outputs))
     for i, (slope, wanders) in enumerate(zip(found.slopes, found.wanders, strict=True)):
@@ -133,7 +133,7 @@ def exploration_notes(log: Record, found: Found, loops: Sequence[tuple[int, floa
 
 
 def _chosen(log: Record, found: Found, i: int) -> str:
-    """Return which structure was taken for an output, and how it compares."""
+    """Return the structure that was chosen for an output, beside the others."""
     chosen, taken, ranges = found.outputs[i], found.taken[i], found.ranges[i]
     orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
     orders += f"; times in {log.time_unit}" if taken.orders.physical else ""

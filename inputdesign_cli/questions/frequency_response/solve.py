@@ -43,7 +43,7 @@ _STREAM = 0x5EED
 
 @dataclass(frozen=True)
 class ResponseTask:
-    """A design of lines, or the analysis of given ones, and its study.
+    """Designs lines, or analyses given ones, and studies them.
 
     Attributes:
         given: (L, r) powers that are not designed.

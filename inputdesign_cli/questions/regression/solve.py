@@ -46,7 +46,7 @@ KEY = "accuracy.mean_squared_error"
 
 @dataclass(frozen=True)
 class MomentsDesign:
-    """R with its proof: no R of the structure goes beyond the `bound`, within `tolerance` it is optimal.
+    """Holds R with its proof: no R of the structure is beyond `bound`; within `tolerance` it is optimal.
 
     Of one input `rho` are the autocorrelations (n,).
     """
@@ -60,14 +60,14 @@ class MomentsDesign:
 
     @property
     def energy(self) -> float:
-        """trace R."""
+        """Return the energy, trace R."""
         return float(np.trace(self.R))
 
 
 def moments_outcome(
     task: RegressionTask, design: MomentsDesign, signal: out.Signal | None, timing: dict[str, float]
 ) -> out.Outcome:
-    """Return what result.json says of a design; raise `internal-disagreement` of value and bound."""
+    """Return the content of result.json for a design; raise `internal-disagreement` of value and bound."""
     regression, split, target, n = task.regression, design.split, task.target, task.regression.n
     unit, white = regression.error(np.eye(n)), None
     if target is not None:
@@ -215,7 +215,7 @@ def _attained(regression: Regression, Phi: Array, R: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class RegressionTrial:
-    """The study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
+    """Holds the study: the true parameters, inputs to compare, and the noise, None if it is nominal."""
 
     theta: Array
     runs: int
