@@ -1,4 +1,4 @@
-"""What is said of a campaign: its records, its rounds and its plans."""
+"""The entry of a campaign in a result: its records, its rounds and its plans."""
 
 from __future__ import annotations
 

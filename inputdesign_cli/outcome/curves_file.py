@@ -1,4 +1,4 @@
-"""figures.json: what the figures of a run show, so that a page draws them again, in its own size."""
+"""figures.json: the content of the figures of a run, so that a page draws them again, in its own size."""
 
 from __future__ import annotations
 

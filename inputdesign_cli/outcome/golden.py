@@ -1,4 +1,4 @@
-"""Golden files: how they are read, and how `idesign check` and the tests compare results with them.
+"""Golden files: their format, and how `idesign check` and the tests compare results with them.
 
 A golden file holds runs, and each run the quantities to find in its result:
 

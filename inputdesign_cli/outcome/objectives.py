@@ -1,4 +1,4 @@
-"""What the kinds of objective of a result are called: in a summary, on a page, on an axis."""
+"""Names of the kinds of objective of a result: in a summary, on a page, on an axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Record what a run was made from, so that a run of something else does not replace it by name.
+"""Record the source of a run, so that a run of something else does not replace it by name.
 
 `made_from` in `result.json` names the spec and the data relative to the run directory: a project that is
 moved as a whole keeps its runs. `asked_sha256` is the digest of the spec as it was read, if the `spec.yaml`

@@ -1,4 +1,4 @@
-"""The outcome of a question: what `result.json` holds, typed."""
+"""The outcome of a question: the content of `result.json`, typed."""
 
 from __future__ import annotations
 

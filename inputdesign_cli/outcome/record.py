@@ -1,4 +1,4 @@
-"""What a run directory says of itself, whoever has written it: its result, and which files are of the run."""
+"""Read the result of a run directory, and list the files of its run, whoever has written it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Replace one run by another: whole whenever the writer is killed, and put right by the next call.
+"""Replace one run by another: whole whenever the writer is killed, and repaired by the next call.
 
 Everything happens in a folder of work inside the directory of the run, under a lock that ends with its
 process. The folder holds `new`, the files of the new run, and `old`, the files of the run that leaves, while
@@ -46,7 +46,7 @@ def workplace(target: Path) -> Iterator[Path]:
 
 
 def heal(target: Path) -> None:
-    """Repair what a killed process left in `target`, to the run before or the next one.
+    """Repair `target` after a killed process: it has the run before, or the next one.
 
     Raises:
         OutputError: `output-busy`.

@@ -1,4 +1,4 @@
-"""What a design, an analysis or a study hands to the record and the report: plain data, nothing to compute.
+"""Results of a design, an analysis or a study for the record and the report: plain data, nothing to compute.
 
 `result` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
 are in rad per time unit, spectra in the convention of the contract (power = integral over the normalised
@@ -34,7 +34,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Results:
-    """Holds one run: the outcome and what illustrates it. `tables`, `curves` go by file stem ("bound")."""
+    """Holds one run: the outcome with its tables and curves, which go by file stem ("bound")."""
 
     outcome: Outcome
     resolved_spec: str  # YAML text of the spec with all overrides applied

@@ -158,7 +158,7 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
 def _write_files(
     results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
 ) -> list[str]:
-    """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
+    """Write all files of the run into `folder`, on the disc on return; return names, the result last."""
     tables = {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
     texts = {name: encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
     contents = {**texts, **results.files, **figures}

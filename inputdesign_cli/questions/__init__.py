@@ -143,7 +143,7 @@ def assess(
     operating_point: Mapping[str, float] | None = None,
     preparation: Preparation | None = None,
 ) -> Assessment:
-    """Identify the model from real experiments, compare what the data buy with what is asked, and top up.
+    """Identify the model from real experiments, compare its accuracy with the one asked, and top up.
 
     It takes data as `identify` does, and raises `SpecError` where nothing is asked that data could meet.
     """

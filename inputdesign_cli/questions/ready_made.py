@@ -1,4 +1,4 @@
-"""Make signals that need no spec as records with units, and measure what they excite."""
+"""Make signals that need no spec as records with units, and measure the frequencies that they excite."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ReadyMade:
 
 
 def make_signal(asked: ReadyMade) -> Results:
-    """Return the record as signal.csv, its figures, and the excited frequencies.
+    """Return the record as signal.csv, its figures, and the band and order of its excitation.
 
     Raises:
         SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.

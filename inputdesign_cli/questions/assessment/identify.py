@@ -92,7 +92,7 @@ class ModelQuestion:
         return self.asked or self.entries
 
     def ratio(self, information: Array) -> float:
-        """Return the largest ratio to what is asked at an information (k, k) in these coordinates."""
+        """Return the largest ratio to the admitted error at an information (k, k) in these coordinates."""
         return max(requirement.worst(information).ratio for requirement in self.requirements)
 
 
@@ -152,7 +152,7 @@ class Identified:
     noise_refuted: float | None = None
 
     def asked_by(self, task: Identification, source: str) -> Identified:
-        """Return it with what a spec asks at the estimate, where it can be asked."""
+        """Return the estimate with the question that the spec asks at it, where it can be asked."""
         samples, factor = len(self.data.y), self.estimate.factor
         try:
             return replace(self, question=task.at(self.model, samples, factor, source))
@@ -194,7 +194,7 @@ def identified(
 def estimated(
     task: Identification, data: Record, first: Path, taken: Preparation, *, start: Array | None = None
 ) -> Identified:
-    """Return the same from data that have been read.
+    """Return the estimate, and the question that it answers, from data that have been read.
 
     Args:
         first: the file that an objection to the data names.
@@ -242,7 +242,7 @@ def told(error: IdesignError) -> str:
 
 
 def findings_of(task: Identification, found: Identified) -> list[Finding]:
-    """Return everything that speaks for or against data and estimate."""
+    """Return all findings for or against the data and the estimate."""
     units, model, estimate, question = task.header.units, found.model, found.estimate, found.question
     rivals = (
         other_minima(units, model, estimate, question.asked, question.entries, question.information)

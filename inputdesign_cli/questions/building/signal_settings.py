@@ -1,4 +1,4 @@
-"""`signal:` and the limits on single samples -> what is asked of the record, and whether it can exist."""
+"""`signal:` and the limits on single samples -> the requirements on the record, and whether it can exist."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SEARCHED = 2
 
 
 def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
-    """Return everything that the spec asks of its record, for a model with a number of parameters.
+    """Return the requirements of the spec on its record, for a model with a number of parameters.
 
     Raises:
         SpecError: `needs-band`; `too-large`; `beyond-nyquist` when samples are too far apart for the band.

@@ -35,7 +35,7 @@ _SAME = 1e-9
 
 
 class AddedSpectrum(Protocol):
-    """A section of `spectrum` that another package adds (`specification.plugins`)."""
+    """Describes a section of `spectrum` that another package adds (`specification.plugins`)."""
 
     def build(self, spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
         """Return the family of spectra of inputs in a band; see `build_basis`."""

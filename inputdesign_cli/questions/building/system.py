@@ -1,4 +1,4 @@
-"""Spec -> plant, loop and experiment: what is excited, for how long, in which loop, at what price."""
+"""Spec -> plant, loop and experiment: the excited channels, the length, the loop and the price."""
 
 from __future__ import annotations
 

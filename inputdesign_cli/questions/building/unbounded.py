@@ -182,7 +182,7 @@ def _free_frequencies(experiment: Experiment, priced: list[PricedPower]) -> list
 
 
 def _gain(experiment: Experiment, priced: list[PricedPower], place: float) -> tuple[Array, Array] | None:
-    """Return the information (k, k) at unit price near a frequency and nearer; None if it does not grow."""
+    """Return the information (k, k) at unit price near a frequency, then nearer; None if it does not grow."""
     hi = experiment.band[1]
     distance = np.abs(experiment.singularities - place)
     scale = float(np.min(distance[distance > _ON * hi], initial=0.1 * hi))

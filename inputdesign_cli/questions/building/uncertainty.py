@@ -1,4 +1,4 @@
-"""`uncertainty` -> what is known of the plant before any data, the plants it may be, rival dead times."""
+"""`uncertainty` -> knowledge of the plant before any data, the plants it may be, rival dead times."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class _NoPlantError(Exception):
 
 @dataclass(frozen=True)
 class UncertainPlant:
-    """The parameters of an uncertain plant, and the plants that they make.
+    """Holds the parameters of an uncertain plant, and the plants that they make.
 
     Attributes:
         spec: exists here only while a question is built.

@@ -78,7 +78,7 @@ class Past:
 
 @dataclass(frozen=True)
 class Decision:
-    """The outcome of a round.
+    """Holds the outcome of a round.
 
     Attributes:
         seed: of the record of the next part.

@@ -1,4 +1,4 @@
-"""The confidence factor alpha: as stated, or calibrated to what estimates really do."""
+"""The confidence factor alpha: as stated, or calibrated to the scatter of simulated estimates."""
 
 from __future__ import annotations
 

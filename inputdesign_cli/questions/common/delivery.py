@@ -1,4 +1,4 @@
-"""What all kinds of questions deliver: results that grow, their last check, and a study of them.
+"""Results that all kinds of questions deliver: how they grow, their last check, and a study of them.
 
 What is about to be written is reread, and evaluated by other means.
 """

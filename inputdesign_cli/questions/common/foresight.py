@@ -1,4 +1,4 @@
-"""Minima of the likelihood far apart may leave data of a design undecided: looked for before they are taken.
+"""Look for minima of the likelihood far apart, which may leave a design's data undecided, beforehand.
 
 The local covariance knows of one minimum. A dead time that few frequencies excite has others, whole periods
 away. A record of the design is simulated on the nominal plant and estimated with the search of `identify`.

@@ -1,4 +1,4 @@
-"""Why nothing meets the requirements within the limits, or no record was found that does, and what would."""
+"""Reasons why nothing meets the requirements within the limits, or no record was found, and the remedies."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Bought:
 
     @property
     def details(self) -> dict[str, object]:
-        """Return this as data, with frequencies in the user's unit."""
+        """Return the best accuracy within the limits as data, with frequencies in the user's unit."""
         return {
             "factor": self.factor,
             "factor_bound": float(np.sqrt(max(self.nearest.certificate.bound, 1.0))),

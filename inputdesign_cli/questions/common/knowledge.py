@@ -33,7 +33,7 @@ class Knowledge:
     box: bool
 
     def coordinates(self, theta: Array) -> Array:
-        """Return z (m,) of parameters (k,)."""
+        """Return the coordinates z (m,) of parameters (k,)."""
         return np.asarray(np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0], dtype=float)
 
     def admits(self, theta: Array) -> bool:

@@ -1,4 +1,4 @@
-"""Designs for every plant that the true one might be: what was drawn, what the design keeps there.
+"""Designs for every plant that the true one might be: the drawn plants, and the accuracy at each.
 
 All that is said of plants that were not drawn is said under the distribution of the draws.
 """

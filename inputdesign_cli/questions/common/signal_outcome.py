@@ -1,4 +1,4 @@
-"""The record as it is applied: what the outcome says of it, its tables, the outputs it causes, its files."""
+"""The record as it is applied: its entry of the outcome, its tables, the outputs it causes, its files."""
 
 from __future__ import annotations
 

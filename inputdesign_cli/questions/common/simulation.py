@@ -80,7 +80,7 @@ def cloud(trials: Trials, covariance: Array | None) -> plots.CloudCurves | None:
 
 
 def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, plots.SignalCurves]:
-    """Return r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
+    """Return the signals r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
     slowest = float(np.abs(loop.closed_poles).max(initial=0.0))
     tail = min(int(np.ceil(_FADED / (1.0 - slowest))), len(excitation))
     r = np.concatenate([excitation, np.zeros((tail, units.inputs))])
@@ -159,7 +159,7 @@ def _fractions(tried: Tried, predicted: PredictedError, errors: Array) -> OnDesi
 
 
 def covariance_in_theory(information: Array) -> Array:
-    """Return M^-1 (k, k) by way of unit diagonal."""
+    """Return the covariance M^-1 (k, k), inverted after scaling to unit diagonal."""
     scale = np.sqrt(np.diag(information))
     return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
 

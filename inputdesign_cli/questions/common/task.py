@@ -1,4 +1,4 @@
-"""The road of a designed and of a given spectrum: a record with what it relies on, and its trial."""
+"""Steps of a designed and of a given spectrum: a record with its assumptions, and its trial."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class SpectrumTask(ABC):
         return simulate(self.simulation, delivered, executor)
 
     def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
-        """Return the errors that are asked about, or r_u of all entries of G, and whether they are."""
+        """Return the model errors asked about, or r_u of all entries of G, and whether any is asked about."""
         stated = model_errors(asked)
         return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
 

@@ -1,4 +1,4 @@
-"""A model that was found in a log -> a complete spec, commented, and what `identify` makes of it."""
+"""A model that was found in a log -> a complete spec, commented, and the task of `identify` on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A given excitation: what accuracy it buys. Nothing is optimised."""
+"""A given excitation and its accuracy. Nothing is optimised."""
 
 from __future__ import annotations
 

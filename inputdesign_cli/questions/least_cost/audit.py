@@ -1,4 +1,4 @@
-"""The last check of a design: what is about to be written, reread, and evaluated by other means.
+"""The last check of a design: the output, reread, is evaluated by other means before it is written.
 
 The spectrum is that of `result.json` as text, not that of the solver. Its information comes from a rule of
 its own: four Gauss points on intervals of the grid on which peaks are sought.
@@ -241,7 +241,7 @@ def _rule(grid: Array, steps: int) -> Iterator[tuple[Array, Array]]:
 
 
 def _root(powers: ComplexArray) -> ComplexArray:
-    """Return R (n, r, r) with R R^* the powers, their rounding below zero cut off."""
+    """Return the root R (n, r, r) of powers R R^*, with their rounding below zero cut off."""
     if powers.shape[1] == 1:
         return np.sqrt(np.maximum(powers.real, 0.0)).astype(complex)
     values, vectors = np.linalg.eigh(powers)
@@ -249,6 +249,6 @@ def _root(powers: ComplexArray) -> ComplexArray:
 
 
 def _outer(F: ComplexArray) -> NDArray[np.float64]:
-    """Return Re sum of F_l F_m^* over frequencies and channels: (n, k, p, r) -> (k, k)."""
+    """Return the real part of the sum of F_l F_m^* over frequencies and channels: (n, k, p, r) -> (k, k)."""
     flat = np.moveaxis(F, 1, 0).reshape(F.shape[1], -1)
     return np.asarray((flat @ flat.conj().T).real)

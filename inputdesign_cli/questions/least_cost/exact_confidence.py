@@ -1,4 +1,4 @@
-"""Designs and records that keep an exact confidence: alpha is calibrated to what simulated estimates do."""
+"""Designs and records that keep an exact confidence: alpha is calibrated to simulated estimates."""
 
 from __future__ import annotations
 

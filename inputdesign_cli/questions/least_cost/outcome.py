@@ -32,7 +32,7 @@ _BINDS = 1e-6
 
 @dataclass(frozen=True)
 class Answer:
-    """Holds a design, the status of its proof, and what the solver did."""
+    """Holds a design, the status of its proof, and the work of the solver."""
 
     design: Design
     status: str
@@ -77,7 +77,7 @@ class Designed:
 
     @cached_property
     def information(self) -> Array:
-        """Return M (k, k) of the delivered spectrum over the delivered number of samples."""
+        """Return the information (k, k) of the delivered spectrum over the delivered number of samples."""
         return np.asarray(delivered(self.problem, self.design, self.experiment.samples)[0])
 
 

@@ -90,7 +90,7 @@ def pilot_length(samples: int, block: int) -> int:
 
 @dataclass
 class ShortestRecord:
-    """Search the shortest record by trying lengths, multiples of `block` up to `longest`, in several `ways`.
+    """Searches the shortest record by trying lengths, multiples of `block` up to `longest`, in `ways`.
 
     Of a long record only the most promising way is tried at a length. `before` is the ratio without a record.
     """
@@ -109,7 +109,7 @@ class ShortestRecord:
     _hopeless: float = _HOPELESS
 
     def search(self, misses: Sequence[Record], low: int | None = None) -> Made | None:
-        """Return the shortest record that meets the accuracy, to one per cent; out of time that so far.
+        """Return the shortest record that meets the accuracy, to one per cent, or so far when time ends.
 
         The `misses` missed; longer records than `low` are looked for. It raises `OutOfTimeError` before one
         is found.

@@ -1,4 +1,4 @@
-"""What a design keeps at the plants that were drawn, at others like them, and at the worst that are found.
+"""The accuracy of a design at the plants that were drawn, at others like them, and at the worst found.
 
 The worst plant of a region is looked for by ascent from several starts, as [frank-wolfe-1956] does: from a
 point towards the farthest one of the region in the direction of the gradient. It is added to the design until
@@ -232,7 +232,7 @@ def plants_kept(
     binding: Sequence[int],
     floors: Sequence[Floor],
 ) -> RobustResult:
-    """Return where the plants come from, how many count, the worst of them, and scenarios.csv.
+    """Return the source of the plants, the number that counts, the worst of them, and scenarios.csv.
 
     The plant of the spec comes first in `at_each`; `binding` are places there.
     """
@@ -412,7 +412,7 @@ class AtPlants:
             return Tried(Kept(np.inf), asked)
 
     def on_each(self, batch: Batch, above: float = 0.0) -> list[Tried]:
-        """Return this for every plant of a batch, to the last digit also up to `above`."""
+        """Return the largest error ratio at every plant of a batch, to the last digit also up to `above`."""
         return [self.on(plant) for plant in batch.plants]
 
 

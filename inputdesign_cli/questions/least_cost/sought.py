@@ -1,4 +1,4 @@
-"""The design that is sought: what it must meet, and how it is found."""
+"""The design that is sought: its requirements, and the method that finds it."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class GridMethod:
         return Answer(replace(baseline, problem=problem, result=on_grid), "optimal_on_grid", solver)
 
     def frequencies(self, lo: float, hi: float) -> Array:
-        """Return (lines,): the ends of the band, and frequencies evenly spread in log w between them."""
+        """Return the ends of the band, and frequencies evenly spread in log w between them, as (lines,)."""
         if lo > 0.0:
             return np.geomspace(lo, hi, self.lines)
         return np.append(0.0, hi * np.geomspace(1.0, _ABOVE_ZERO, self.lines - 1)[::-1])

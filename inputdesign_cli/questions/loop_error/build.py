@@ -123,7 +123,7 @@ def _in_delays(A: Array, B: Array, C: Array, D: Array, *, lag: int) -> tuple[Row
 
 
 class AddedLaw(Protocol):
-    """A section of `control` that another package adds (`specification.plugins`)."""
+    """Describes a section of `control` that another package adds (`specification.plugins`)."""
 
     def build(self, spec: Spec, plant: MatrixPlant) -> ControlLaw:
         """Return the control law for a plant."""

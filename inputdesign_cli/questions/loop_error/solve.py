@@ -150,7 +150,7 @@ def spectrum_results(
 
 
 def theory_of(theory: LossTheory) -> TheoreticalLoss:
-    """Return N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
+    """Return the error N E||y - y0||^2 of the model structure, and mean and deviation of its root."""
     return TheoreticalLoss(theory.value, LossMoments(theory.mean, theory.sd))
 
 

@@ -136,7 +136,7 @@ def error_curves(task: RegressionTask, design: MomentsDesign) -> ErrorCurves:
 
 
 def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Estimates) -> TriedInput:
-    """Return means with their standard errors, and the theory of these samples."""
+    """Return the mean estimate and error with their standard errors, and the theory for these samples."""
     squared = found.error**2
     runs = squared.size
     G, m = Phi.T @ Phi, regression.m
@@ -157,7 +157,7 @@ def tried_regressors(regression: Regression, Phi: Array, theta: Array, found: Es
 
 @dataclass(frozen=True)
 class RegressorRecord:
-    """Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their description.
+    """Holds Phi (N, n), the signals to apply (N, n), or (N, 1) for delayed copies of one, and their form.
 
     `lines` of one periodic input are its frequencies (L,) in rad/sample and mean squares (L,).
     """
@@ -227,7 +227,7 @@ class RegressionTrial:
 
 @dataclass(frozen=True)
 class RegressionTask:
-    """The least energy for a `target` error, or the least error for an `energy`, trace R, and its study.
+    """Minimises the energy, trace R, for a `target` error, or the error for an `energy`, and studies it.
 
     Toeplitz moments belong to delayed copies of one input, and are proved to a relative gap of `tolerance`.
     The record has a number of equal `periods` (None: free), and a past by `start`.
