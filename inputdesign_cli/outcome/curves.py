@@ -324,7 +324,7 @@ class ErrorCurves(Curves):
 
 @dataclass(frozen=True)
 class MomentsCurves(Curves):
-    """Holds the moments of regressors, and the lines of the periodic input that has them, if single."""
+    """Holds the moments of regressors, and the lines of the periodic input that has them (for one input)."""
 
     R: Array  # (n, n)
     estimated: int  # how many of the n are estimated

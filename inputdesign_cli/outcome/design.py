@@ -71,7 +71,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class ModelError:
-    """The largest r_u/r_adm over all frequencies (rad per time unit), where it stands, and alpha of r_u."""
+    """Holds the largest r_u/r_adm over frequency, its frequency (rad per time unit), and alpha of r_u."""
 
     alpha: float
     worst_ratio: float | None = None
@@ -82,7 +82,7 @@ class ModelError:
 
 @dataclass(frozen=True)
 class Loop:
-    """Holds the controller of a loop and its margins; times in the user's unit, phase in degrees."""
+    """Holds the controller of a loop and the margins kept; times in the user's unit, phase in degrees."""
 
     nominal_peak: float | None = None
     max_sensitivity: float | None = None
@@ -215,7 +215,7 @@ class Signal:
 
     `worst_ratio` is the largest ratio of the requirements. `of_limits` are the shares of limits on single
     samples that it takes. `begun_anywhere` is the growth of its errors where the start is unknown (None
-    without bound); it is absent (NaN here) where the start does not matter.
+    without bound). It is absent (NaN here) where the start does not matter.
     """
 
     samples: int
@@ -314,7 +314,7 @@ class Moments:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Holds derivatives of the value `of` with respect to the assumptions of the design."""
+    """Holds the derivatives of the value `of` with respect to the assumptions of the design."""
 
     of: str
     neglected_norm: float

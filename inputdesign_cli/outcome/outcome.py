@@ -79,7 +79,7 @@ class Outcome:
     provenance: Mapping[str, object] = others()
 
     def saying(self, findings: Iterable[Finding]) -> Self:
-        """Return the same outcome with further findings and their notes."""
+        """Return the outcome with further findings and their notes."""
         more = tuple(findings)
         if not more:
             return self

@@ -28,7 +28,7 @@ class DearestPlant:
 
 @dataclass(frozen=True)
 class LostPlant:
-    """Holds a plant at which no model keeps the margins; `peak` is that of its sensitivity function."""
+    """Holds a plant at which no model keeps the requirement; `peak` is that of its sensitivity function."""
 
     scenario: int
     parameters: Parameters

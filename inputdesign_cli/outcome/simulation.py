@@ -32,7 +32,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Violations:
-    """Holds runs whose error exceeds r_adm: number, quantiles 0.05, 0.5, 0.95 of the place, largest ratio."""
+    """Holds runs beyond r_adm: number, quantiles 0.05, 0.5, 0.95 of their frequency, the largest ratio."""
 
     runs: int
     frequency_quantiles: Array
@@ -77,7 +77,7 @@ class ExactLoss:
 
 @dataclass(frozen=True)
 class Searched:
-    """Holds the number of runs whose search from several starts ended elsewhere, or found rival minima."""
+    """Holds the numbers of records searched from several starts, ended elsewhere, and with rival minima."""
 
     runs: int
     elsewhere: int

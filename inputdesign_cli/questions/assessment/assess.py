@@ -1,7 +1,7 @@
 """Data -> does the real experiment meet the target, and if not, what is still to be done.
 
-A verdict holds for one estimate and its information: that of the given records together, and of the prior
-where the spec states the estimate that it belongs to. A prior without it counts for designs only.
+A verdict holds for one estimate and its information. The information is that of all given records, and of the
+prior where the spec states its estimate. A prior without it counts for designs only.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     Both sides are evaluated at the new estimate: r_u by the information of the data themselves, r_adm by the
     new model. Where tests refute the structure, or the question cannot be asked of the estimate, nothing is
     decided. Where the data fall short, the experiment that this model still needs is designed as `solve`
-    does, with the data as prior information; where there is none, the result says why.
+    does. The data are its prior information. Where there is no such experiment, the result says why.
 
     Raises:
         SpecError: nothing is asked that data could meet.

@@ -1,8 +1,8 @@
 """Spec -> whether a design has a best value.
 
 It has no best value if some excitation informs about the parameters and is neither paid for nor limited.
-Combinations of the inputs may be free, and frequencies: at a pole of the plant on the unit circle, a loop
-takes all power of the input away, while the power of the output there informs about the pole.
+Combinations of the inputs may be free, and frequencies. At a pole of the plant on the unit circle, a loop
+takes all power of the input away. The power of the output there informs about the pole.
 """
 
 from __future__ import annotations

@@ -222,11 +222,11 @@ class UncertainPlant:
 
     @cached_property
     def _act(self) -> NDArray[np.bool_]:
-        """Return which entries (p, r) of the nominal G are not zero."""
+        """Return whether each entry (p, r) of the nominal G is other than zero."""
         return self._acting(self.nominal)
 
     def _acting(self, model: Model) -> NDArray[np.bool_]:
-        """Return which entries (p, r) of G are not zero at some of a few frequencies."""
+        """Return whether each entry (p, r) of G is other than zero at some of a few frequencies."""
         lo, hi = self.experiment.band
         return np.any(model.plant_at(lo + (hi - lo) * _PROBES) != 0.0, axis=0)
 
@@ -361,8 +361,8 @@ def _needed(spec: Spec, basis: Basis | None) -> int | None:
 def _unknowns(spec: Spec, basis: Basis | None) -> int:
     """Return the number of unknowns of the program: of the spectrum, and the factor, length or cost.
 
-    A given excitation has no unknowns. The number of plants that prove a risk is then the number for one:
-    (1 - risk)^plants is the probability that all of them meet the accuracy by chance.
+    A given excitation has no unknowns. A risk is then proved by as many plants as with one unknown. All of
+    them meet the accuracy by chance with probability (1 - risk)^plants.
     """
     if basis is None:
         return 1

@@ -47,7 +47,7 @@ class CampaignTask:
         return self.design.solve()
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Design, and try whole campaigns and experiments in one shot on the true system.
+        """Design, and simulate whole campaigns and experiments in one shot on the true system.
 
         Raises:
             SpecError: `not-supported` for prior information without data.

@@ -119,7 +119,7 @@ class Informed:
 
 
 def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
-    """Return the information (k, k) of white excitation at the cost or length of the design; None if limited.
+    """Return the information (k, k) of white noise at the design's cost or length; None if limits bind both.
 
     M less what is known without excitation is in proportion to both. The `ratio` is that of the costs.
     """

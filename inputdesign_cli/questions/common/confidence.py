@@ -165,8 +165,9 @@ def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
 def settled_alpha(needed: Callable[[float], float | None], start: float) -> float:
     """Return the alpha whose design needs just that alpha, or raise `infeasible` or `confidence-not-settled`.
 
-    A design for a larger alpha is more accurate, and needs a smaller one: log(needed / alpha) falls, and the
-    secant method in log(alpha) finds its root. Where there is no design within the limits `needed` is None.
+    A design for a larger alpha is more accurate, and needs a smaller one. So log(needed / alpha) falls, and
+    the secant method in log(alpha) finds its root. Where there is no design within the limits `needed` is
+    None.
     """
     x, before, missing, refused = np.log(start), None, np.nan, False
     for _ in range(_MOST_ROUNDS):

@@ -35,8 +35,8 @@ APART = 1e-6
 class Delivered:
     """Holds a design or an analysis to be tried: a record (n, r), None if no excitation is needed.
 
-    `renewed` realises the spectrum anew in each run; `of_length` draws `bound` and `ellipses` for another
-    number of samples; `rivals` searches a number of records from several starts, if that finds other minima.
+    `renewed` realises the spectrum anew in each run. `of_length` draws `bound` and `ellipses` for another
+    number of samples. `rivals` searches a number of records from several starts, if that finds other minima.
     """
 
     results: Results

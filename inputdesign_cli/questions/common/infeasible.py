@@ -41,9 +41,8 @@ _SHARE = 0.8
 class Reach:
     """Describes the reach of spectra: whether all of them have a bound, and whether it is attained.
 
-    Where it is only approached, at ends of the `band` of all spectra, that stays off them by so little that
-    nothing is lost to the tolerance. `note` says what the reader of a result must know of it; None if
-    there is nothing to say.
+    Where it is only approached, at ends of the `band` of all spectra, the band stays off them by a margin
+    within the tolerance. `note` explains that to the reader of a result; None if there is nothing to explain.
     """
 
     bounded: bool = True
@@ -177,7 +176,7 @@ def named(limit: PowerLimit) -> str:
 def explain(
     units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound]
 ) -> InfeasibleError:
-    """Say the proof that came with the failure, by the numbers of the spec that can be loosened."""
+    """Return the error with the proof of the failure, by numbers of the spec that can be loosened."""
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
     involved = [limit for limit, _ in bought.shares]
@@ -274,9 +273,9 @@ def contradictory(limits: Sequence[PowerLimit], why: str) -> InfeasibleError:
 def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -> float | None:
     """Return the least factor on these limits together that allows the accuracy; None if none does.
 
-    The multipliers of the limits are the slope of the square of the best ratio: Newton's method, in
-    logarithms, between values that are proved too small and values that are known to do. Information of noise
-    or of a prior does not grow with the powers: the square of the ratio is not the factor.
+    The multipliers of the limits are the slope of the square of the best ratio. Newton's method uses it, in
+    logarithms, between values proved too small and values known to do. Information of noise or of a prior
+    does not grow with the powers: the square of the ratio is not the factor.
     """
     stated = unreachable.problem.limits
     bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}

@@ -104,8 +104,8 @@ def make_record(
 ) -> Record | None:
     """Return the best of several records of the designed spectrum, or the `first` that meets what is asked.
 
-    Best is the least power that meets the requirements of every scenario by the record itself, or the best
-    criterion of the plant where it is worst. None when no excitation is needed, or when the record would be
+    The best record meets the requirements of every scenario with the least power, or has the best criterion
+    at its worst plant. Return None when no excitation is needed. Return None, too, when the record would be
     too short (criteria per sample without `signal.samples`) or longer than any that is computed.
     """
     problem, settings = design.problem, request.settings

@@ -40,8 +40,8 @@ def signal_of(
 ) -> Signal:
     """Return the entry of the outcome for a record: powers and peaks by channel, and its accuracy.
 
-    The value of a criterion is for an experiment of its own length that goes on as the record does, so that
-    it compares with the design. Other requirements have their worst ratio.
+    The value of a criterion is for an experiment of the design's length that goes on as the record does.
+    Other requirements have their worst ratio.
     """
     samples, made = record.samples, record.method != "given"
     plant = FiniteRecord(experiment, len(samples), units.step)

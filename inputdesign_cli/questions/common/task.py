@@ -58,7 +58,7 @@ class SpectrumTask(ABC):
         return self.delivered().results
 
     def simulate(self, executor: Executor | None = None) -> Results:
-        """Return this with the experiment tried many times on the true system; see `common.simulation`."""
+        """Return the answer with many simulated experiments on the true system; see `common.simulation`."""
         delivered = self.delivered()
         if delivered.record is None:
             seconds_left()  # or else its time is the reason

@@ -68,7 +68,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
 
 
 def _reasons(found: Fits, data: Record) -> Iterator[str]:
-    """Yield why a model is not of these data: its simulation explains nothing, or too little of an output.
+    """Yield reasons why a model is not of these data: its simulation explains nothing, or too little.
 
     A poor fit alone is no fault of the model, since the noise may be strong, unless past inputs explain the
     rest.

@@ -1,8 +1,8 @@
 """The accuracy of a design at the plants that were drawn, at others like them, and at the worst found.
 
-The worst plant of a region is looked for by ascent from several starts, as [frank-wolfe-1956] does: from a
-point towards the farthest one of the region in the direction of the gradient. It is added to the design until
-none is found to be missed; that there is no worse one is not proved.
+The worst plant of a region is sought by ascent from several starts, as in [frank-wolfe-1956]. A step leads
+towards the farthest point of the region in the direction of the gradient. The worst plant is added to the
+design until none is found to be missed; that there is no worse one is not proved.
 """
 
 from __future__ import annotations

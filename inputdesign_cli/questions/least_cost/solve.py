@@ -92,7 +92,7 @@ class ConvexTask(SpectrumTask):
         )
 
     def _outcome(self, done: Designed) -> Outcome:
-        """Return the outcome of the design with what was left out of its proof."""
+        """Return the outcome of the design, with findings on parts that its proof lacks."""
         outcome, columns, reach = design_outcome(done), self.asked.columns, self.asked.reach
         if columns is not None and outcome.spectrum is not None:
             details = {**outcome.spectrum.details, "factor_columns": columns.columns}

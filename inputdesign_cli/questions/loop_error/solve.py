@@ -329,7 +329,7 @@ class LossTrial:
 class LoopErrorTask:
     """Designs for the closed-loop error, and studies the design.
 
-    The `law` of control is called as in the spec, `grid` are the points of spectrum.csv, and the `covariance`
+    The `law` of control is called as in the spec, and `grid` are the points of spectrum.csv. The `covariance`
     is that of a high model order, or exact for the model structure.
     """
 
