@@ -104,11 +104,11 @@ class Identification:
         nominal: the structure; its parameters are one of the starts.
         nominal_covariance: (k, k), of its parameters, zero where the spec states none.
         assessable: whether any accuracy is asked for that data could meet or miss.
-        operating_point: by channel, what the spec says that signals vary about.
+        operating_point: by channel, the levels in the spec that signals vary about.
         earlier: the prior as an estimate, which counts along; None if it has no values.
         has_prior: whether it states prior information.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
-        knowledge: what else it says of the parameters; None if it says nothing.
+        knowledge: further knowledge of the parameters in the spec; None if there is none.
         foreseen: the plants that the design was made for; None if it was made for the plant of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.

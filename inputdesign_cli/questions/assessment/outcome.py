@@ -175,7 +175,7 @@ def bound_of_data(
     """Return bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
 
     Args:
-        errors: what has r_u; `asked` says whether requirements state r_adm.
+        errors: the model errors of r_u; `asked` says whether requirements state r_adm.
         information: (k, k) of the data.
     """
     bound = Bound(confidence.alpha, confidence=confidence.reported)

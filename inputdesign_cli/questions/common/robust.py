@@ -1,6 +1,6 @@
 """Designs for every plant that the true one might be: the drawn plants, and the accuracy at each.
 
-All that is said of plants that were not drawn is said under the distribution of the draws.
+All claims about plants that were not drawn hold under the distribution of the draws.
 """
 
 from __future__ import annotations
