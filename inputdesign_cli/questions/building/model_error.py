@@ -44,7 +44,7 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 
 def build_calibration(spec: Spec) -> Calibration | None:
-    """Return how alpha is calibrated for `confidence: {exact: ..}`; None without it."""
+    """Return the calibration of alpha for `confidence: {exact: ..}`; None without it."""
     stated = None if (error := spec.accuracy.error) is None else error.calibrated
     return None if stated is None or stated.exact is None else Calibration(stated.exact, stated.draws)
 
@@ -156,8 +156,7 @@ def _too_much(spec: Spec, admissible: accuracy.AdmissibleError, made: OnModelErr
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
     """Raise `SpecError` (`unbounded-error`) if no information is enough for the requirement.
 
-    At a pole of G on the unit circle, a small error of the estimated pole makes the error of G grow faster
-    than G itself.
+    Near a pole of G on the unit circle, the error of G by an error of the pole grows faster than G itself.
     """
     lo, hi = requirement.band
     units = build_units(spec)

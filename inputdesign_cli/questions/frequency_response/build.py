@@ -51,7 +51,7 @@ def stated_response(spec: Spec) -> FrequencyResponse:
 
 
 def build_periods(spec: Spec) -> Periods:
-    """Return how the record repeats; raise `bad-period` unless whole periods fit into the experiment."""
+    """Return the repetition of the record; raise `bad-period` unless whole periods fit into it."""
     stated, blocks, samples = stated_response(spec), spec.plant.inputs, spec.experiment.samples
     skip, shortest = stated.transient, spec.designs and spec.goal == "shortest_experiment"
     if stated.period is not None:
@@ -197,7 +197,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
 
 
 def build_measurement(spec: Spec) -> Measurement:
-    """Return how data measure a frequency response: at the lines of the spec, or where they excite it."""
+    """Return the measurement of a frequency response by data: at the spec's lines, or the excited ones."""
     asked = spec.accuracy.frequency_response is not None
     return Measurement(
         header=build_header(spec),
@@ -282,7 +282,7 @@ def _given(spec: Spec, grid: harmonic_grid.HarmonicGrid) -> Array | None:
 
 
 def _check_supported(spec: Spec) -> None:
-    """Refuse what is not done for a frequency response, rather than ignore it."""
+    """Refuse keys that are not supported for a frequency response, rather than ignore them."""
     others = {*spec.accuracy.requirements, *spec.accuracy.goals} - {"frequency_response"}
     if not spec.plant.sampled:
         what = "measure lines of a plant that is not sampled"
