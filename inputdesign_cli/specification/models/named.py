@@ -82,7 +82,7 @@ def _number(value: Plain) -> float:
 
 
 def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
-    """Names of parameters can stand in expressions."""
+    """Check that names of parameters can stand in expressions."""
     for name in parameters:
         if not is_name(name):
             message = f"{clip(name)} is no name of a parameter"

@@ -79,7 +79,7 @@ def to_yaml(data: dict[str, Plain]) -> str:
 
 
 def fingerprint(data: dict[str, Plain]) -> str:
-    """SHA-256 of the data as canonical JSON: order of keys and `1` against `1.0` make no difference."""
+    """Return the SHA-256 of the data as canonical JSON: order of keys and `1` or `1.0` make no difference."""
     text = json.dumps(_canonical(data), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
