@@ -149,7 +149,7 @@ def failed(
     """Return the tests that refute the model, each at its share of the level of its group (Bonferroni).
 
     Args:
-        looks: how often the tests are repeated as data come in; the looks share the level as well.
+        looks: number of times that the tests are repeated as data come in; they share the level as well.
     """
     groups = ((directed, "one parameter"), (tests, "many signals"), (shifts, "level shift"))
     return tuple(

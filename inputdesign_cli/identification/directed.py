@@ -223,8 +223,8 @@ class Moves:
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
     """Return the indices of the parameters that speak against a verdict of |error of G| <= r_adm.
 
-    It is neither enough nor necessary that the parameter is beyond chance: what counts is that it exists and
-    that G is beyond r_adm, after the estimated move and with its uncertainty.
+    It is neither enough nor necessary that the parameter is significant. It must exist, and G must be beyond
+    r_adm after the estimated move and with its uncertainty.
     """
     # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
     # G by more than is admitted, at a level that is shared among all that would. What is not a number is no

@@ -383,8 +383,8 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
     """Return the information of a mixture if minima beyond sampling instants are about as likely.
 
-    Each has the weight of its likelihood times the square root of the determinant of its covariance
-    (Laplace's method, [tierney-kadane-1986]); the covariance is that of the mixture about the estimate.
+    The weight of each is its likelihood times the square root of the determinant of its covariance (Laplace's
+    method, [tierney-kadane-1986]). The covariance is that of the mixture about the estimate.
 
     Args:
         factor: L (k, k) of the best minimum alone, its information L L^T.

@@ -124,7 +124,7 @@ def frozen(
         resolution: (p,), the step in which each output is recorded.
         u: (samples, r).
         errors: (samples, p), of prediction.
-        apart: (samples, p), the record less what the model simulates.
+        apart: (samples, p), the record less the simulation by the model.
         simulated: (samples, p).
         lengths: of the stretches without gaps.
     """
@@ -171,7 +171,7 @@ def _spread(x: NDArray[np.float64]) -> float:
 
 
 def shifted(controller: TransferMatrix, u: Array, y: Array, r: Array, lengths: Sequence[int]) -> list[Shift]:
-    """Return by input the shift of u (n, m), y (n, p) or r (n, m) after which u = r - C y holds better.
+    """Return by input the shift of u (n, m), y (n, p) or r (n, m) that makes u = r - C y hold much better.
 
     Args:
         lengths: of the stretches without gaps; levels are taken away from each.

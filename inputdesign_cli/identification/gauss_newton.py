@@ -70,8 +70,8 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
     """Minimise the cost of every run from `start` (runs, k), in `most` steps at most.
 
     Args:
-        idle: a run has settled as well where ten steps take less than this off -2 log likelihood, or where
-            no step however short takes anything; at zero it has not, and is given up.
+        idle: the decrease of -2 log likelihood in ten steps below which a run has settled, as well as where
+            no step, however short, decreases it. At zero such a run is given up unsettled.
     """
     theta = problem.stabilised(start)
     runs = theta.shape[0]

@@ -146,8 +146,8 @@ def _responses(records: Records, theta: Array, lags: Sequence[float], white: Whi
 def _scores(white: White, begin: int, output: int, response: Array) -> tuple[Array, Array]:
     """Return score statistics (n,) of a response (n,) begun at every sample of a record, and their signs.
 
-    A score is the correlation of residuals and response; the part that the estimate explains is
-    taken off its power.
+    A score is the correlation of residuals and response. The power of the response counts without the part
+    that the estimate explains.
 
     Args:
         begin: of the record; `response`, in the errors of one output.

@@ -53,8 +53,8 @@ class Periods:
         """Return the periods of signals that count, (.., blocks, kept, period, channels), to the end.
 
         Args:
-            repeats: how many records of equal length with the same input follow each other; of all of them
-                the periods that count stand one after the other.
+            repeats: number of records of equal length with the same input that follow each other. Their
+                periods that count stand one after the other.
         """
         if repeats > 1:
             return np.concatenate([self.parts(one) for one in np.split(signal, repeats, axis=-2)], axis=-3)
@@ -154,8 +154,8 @@ def period_drift(
 ) -> PeriodDrift | None:
     """Return the drift of outputs (N, p) beyond chance, record by record, or None if nothing drifts.
 
-    The mean of a period has the variance Phi(0) / period. A degree counts if the means have more of the
-    orthogonal polynomial of that degree than chance has with 1e-4 for all outputs, records and degrees.
+    The mean of a period has the variance Phi(0) / period. A degree counts if the
+    means have more of its orthogonal polynomial than by chance, at 1e-4 for all outputs, records and degrees.
 
     Args:
         time: (N,), at which samples were taken, in any unit.

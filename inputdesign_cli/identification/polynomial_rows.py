@@ -262,7 +262,7 @@ def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
 
     Args:
         model: the structure and the covariance are meant.
-        u, y: (runs, samples, r), (runs, samples, p); what came before them is not known.
+        u, y: (runs, samples, r), (runs, samples, p); earlier samples are unknown.
     """
     longest = max(parameter.power for parameter in model.parameters)
     nowhere, weights = np.zeros((len(y), model.theta.size)), np.linalg.inv(model.covariance)

@@ -256,7 +256,7 @@ def centred(parts: Sequence[Part]) -> list[Part]:
 
 
 def evaluate(records: Records, theta: Array) -> Point:
-    """Return records at theta with their cost: infinite on overflow, zero if errors are rounding."""
+    """Return errors and cost of records at theta: infinite on overflow, zero if errors are rounding."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         near = records.at(theta)
         S = near.all_errors.T @ near.all_errors / records.samples

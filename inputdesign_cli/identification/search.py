@@ -71,7 +71,7 @@ def search(records: Records, points: Array, *, starts: int, quick: int | None = 
     """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k).
 
     Args:
-        starts: how many points were looked at.
+        starts: the number of points that were tried.
         quick: the most steps from each, fewer if these gain nothing that matters. Kinks may stop the search,
             and no other minima are returned.
     """
@@ -268,7 +268,7 @@ def from_rest_or_free(
     Args:
         records: from rest.
         rest: whether the records begin at rest about zero; None: as the data say.
-        searched: what searches from its own starts and, if given, from the parameters (k,).
+        searched: a function that searches from its own starts and, if given, from the parameters (k,).
         about: (k,), parameters that show roughly how long unknown inputs act.
     """
     # An unknown level makes up for the means.

@@ -59,8 +59,8 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
     """Return the effect of stationary noise C/D e before a record on (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
-    first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values
-    are made of independent ones by the predictors of every order.
+    first n samples. Both e = D q and v = C q follow from the autoregression q = e / D. The predictors of
+    every order make its last n values of independent ones.
     """
     n = max(C.size, D.size) - 1
     if n == 0:
@@ -90,9 +90,9 @@ def density(C: Array) -> float:
     """Return -2 log of a density of the zeros of C, up to a constant: 2 log of the variance of e / C.
 
     It vanishes on the unit circle and is all but flat elsewhere, 1 - c_1^2 for one zero. The likelihood has
-    no slope across the circle, and in short records it is often largest there: noise seems to vanish at a
-    frequency, and the model to be exact ([sargan-bhargava-1983]; [chung-2013] treat variances that come out
-    zero alike). A zero z moves by about 2 z / N.
+    no slope across the circle. In short records it is often largest there: noise seems to vanish at a
+    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that come out
+    zero alike. A zero z moves by about 2 z / N.
     """
     return 2.0 * float(np.log(_step_down(C)[1][0]))
 
@@ -154,8 +154,8 @@ class _Basis(NamedTuple):
 class FreeStarts:
     """The starts of records of these `lengths`; `starts` has the longest record's, output by output.
 
-    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
-    as large as an error each, they are errors of their own.
+    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share.
+    Each is as large as an error and counts as one.
     """
 
     lengths: tuple[int, ...]
@@ -198,7 +198,7 @@ class FreeStarts:
         return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
 
     def combined(self, coefficients: Sequence[Array], starts: Sequence[Start]) -> Array:
-        """Return the responses (N, p) to unknowns of these coefficients, by starts or their derivatives."""
+        """Return the effect (N, p) of starts, or of their derivatives, for these coefficients of unknowns."""
         within = np.arange(max(self.lengths)) < np.array(self.lengths)[:, None]
         pairs = zip(coefficients, starts, strict=True)
         each = [(own @ np.concatenate([start.free, start.noise]))[within] for own, start in pairs]
@@ -214,12 +214,12 @@ class FreeStarts:
     def eliminated(self, errors: Array, weights: Array | None) -> tuple[list[Array], Array, Array]:
         """Return the likeliest starts of errors (N, p), the root of the weights, and explained directions.
 
-        These are, output by output, the coefficients of all unknowns in each record, (records, m + n), free
-        ones first; R (p, p), R^T R being the weights up to a factor; and orthonormal directions
-        ((N + M) p, K) of the errors in units of R.
+        The starts are coefficients (records, m + n) of all unknowns by output, free ones first. The root is
+        R (p, p), with R^T R the weights up to a factor. The directions ((N + M) p, K) that starts can explain
+        are orthonormal, in units of R.
 
         Args:
-            weights: W (p, p); None: as the covariance left asks.
+            weights: W (p, p); None: by the covariance of the remaining errors.
         """
         errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
         plain, of = self._plain

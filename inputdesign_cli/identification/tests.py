@@ -79,7 +79,7 @@ def cross_correlations(
 
     Args:
         errors, u: (samples, p), (samples, r).
-        lags: how far back the inputs are looked at.
+        lags: the number of lags of the inputs.
         fitted: number of estimated parameters of the plant, which take as many directions away.
         feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
         lengths: see `whiteness`.

@@ -64,9 +64,9 @@ class TransferKind(Kind):
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the effect of the past of each output: a level, and the free response of its entries.
 
-        A level of the input is unknown as well: level and states make it up where poles are stable, not the
-        ramp that an integrator makes of it, nor nearly. Inputs before the record that come late by a dead
-        time move the states, sample by sample, as if from anywhere.
+        A level of the input is unknown as well. Level and states make it up where poles are stable, but not
+        the ramp that an integrator, or nearly one, makes of it. Inputs before the record that come late by a
+        dead time move the states, sample by sample, as if from anywhere.
         """
         if not free:
             return (Start.white(np.zeros((0, samples))),) * self.model.outputs

@@ -169,8 +169,8 @@ class White:
     def mean(self, echoes: NDArray[np.float64]) -> Array:
         """Return the means (m,) of the scores of signals that are made of the residuals themselves.
 
-        Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
-        the mean -tr(Q^T T Q), for T, which looks back in time, has no trace. Under whitening it is zero.
+        Residuals are P e, with P = I - Q Q^T for the unknown starts Q, and e white. The score (T P e)^T P e
+        has the mean -tr(Q^T T Q), since T looks back in time and has no trace. Under whitening it is zero.
 
         Args:
             echoes: T (m, lags, p, p), in the units of residuals.
@@ -188,13 +188,13 @@ class White:
         return -self.variance * _traces(self.echoes, self._of_starts)
 
     def probability(self, statistic: float, directions: Array) -> float:
-        """Return the probability that noise alone has this sum of squares along directions ((N + M) p, f).
+        """Return the probability of a sum of squares as large by chance, along orthonormal D ((N + M) p, f).
 
-        It is chi-squared in units of the noise along these directions, and what is known of that is the
-        estimate. With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of its power changes by
-        2 tr(D^T T_k D) / f for each delta theta_k; of the variance v that this has, the statistic over f is F
-        with f and 2 / v degrees of freedom. White directions have v = 0, a narrow band where the noise has a
-        zero or a pole next to the unit circle has 0.1 and more.
+        It is chi-squared in units of the noise along these directions, whose power is known by the estimate.
+        With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of this power changes by
+        2 tr(D^T T_k D) / f for each delta theta_k. If v is the variance of this change, the statistic over f
+        is F with f and 2 / v degrees of freedom. White directions have v = 0. A narrow band where the noise
+        has a zero or a pole next to the unit circle has 0.1 and more.
         """
         freedom, v = directions.shape[1], 0.0
         if np.any(self.echoes):

@@ -34,8 +34,8 @@ def from_control(
         system: in discrete time with its dt, or in continuous time.
         sample_time: of a system in continuous time that is sampled behind a hold; without, it stays in s.
         delay: dead time of a system in continuous time, a number or rows of columns.
-        parameters: of a state-space system, the entries that are estimated: {"k": ("B", 1, 0)}; without, its
-            transfer functions are the plant, and all their coefficients are estimated.
+        parameters: the estimated entries of a state-space system: {"k": ("B", 1, 0)}. Without, its transfer
+            functions are the plant, and all their coefficients are estimated.
         known: names of parameters that are not estimated.
         noise: the block; white noise of variance 1 where nothing is given.
         blocks: other blocks of the spec: experiment, accuracy, spectrum ..
@@ -43,7 +43,7 @@ def from_control(
     Raises:
         SpecError: `not-supported` for another kind of object; `not-sampled` for one in discrete time that
             does not say its dt; `bad-argument` for an argument that does not go with the system;
-            `improper-transfer`, `inaccurate-conversion`; what is wrong with the spec.
+            `improper-transfer`, `inaccurate-conversion`; or an error of the spec.
     """
     import control
 

@@ -141,7 +141,7 @@ def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
-    """Check that there is at most one goal, and that the objective has what it needs."""
+    """Check that there is at most one goal, and that the keys of the objective are complete."""
     accuracy, objective = spec.accuracy, spec.objective
     for extra in accuracy.goals[1:]:
         message = f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment"

@@ -128,7 +128,7 @@ Nested = TypeVar("Nested", bound=tuple)
 
 
 def depth(value: object) -> int:
-    """Return how deeply lists are nested: 0 for a number, 1 for a list of numbers."""
+    """Return the depth of nested lists: 0 for a number, 1 for a list of numbers."""
     if not isinstance(value, list | tuple):
         return 0
     return 1 + max((depth(v) for v in value), default=0)

@@ -133,7 +133,7 @@ class Spec(Section):
 
         Args:
             changes: values by key; None removes a key.
-            file: what diagnostics about the new values name as their file.
+            file: the name of their file in diagnostics about the new values.
             design: as for `from_dict` (default: as this spec).
         """
         for key in changes:

@@ -32,7 +32,7 @@ def plain(value: object, where: str = "", depth: int = 0) -> Plain:
     Args:
         value: of any type.
         where: its key.
-        depth: how many mappings and lists are around it.
+        depth: the number of mappings and lists around it.
 
     Raises:
         SpecError: `bad-argument` for values that no file could hold.
