@@ -70,8 +70,8 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
     """Minimise the cost of every run from `start` (runs, k), in `most` steps at most.
 
     Args:
-        idle: the decrease of -2 log likelihood in ten steps below which a run has settled, as well as where
-            no step, however short, decreases it. At zero such a run is given up unsettled.
+        idle: the decrease of -2 log likelihood in ten steps below which a run has settled. It has settled as
+            well where no step, however short, decreases the cost. At zero such a run is given up.
     """
     theta = problem.stabilised(start)
     runs = theta.shape[0]

@@ -64,8 +64,8 @@ class PolynomialKind(Kind):
         """Return the effect of the past on the prediction errors, output by output.
 
         The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j. This sum is off by impulses if y and u
-        before the record are missing. It is off by impulses through 1/F_j if the state of an entry is,
-        and by a step through it if the level of its input is. For a stable F_j the others make up for the
+        before the record are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown
+        level of its input a step through 1/F_j. For a stable F_j the others make up for the
         step, but not if F_j integrates or nearly does. From rest only y is missing, which noise has moved.
         That matters only if the predictor remembers y beyond its order.
         """

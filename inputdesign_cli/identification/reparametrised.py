@@ -126,7 +126,7 @@ class ReparametrisedKind(Kind):
         return Starts(np.array(points), found.tried).and_given(given)
 
     def brought_back(self, point: Point) -> Array:
-        """Return the parameters (k,) whose coefficients are nearest to a point, weighed by its Hessian."""
+        """Return the parameters (k,) whose coefficients are nearest to a point, weighted by its Hessian."""
         at = self.model.parametrisation
         if not np.isfinite(point.cost):
             return at.theta

@@ -178,7 +178,7 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
     """Return the point where the search settles if kinks of the cost stopped it, otherwise None.
 
     A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains what its slopes promise. The same happens if the edge of stability mirrors a root.
+    and Newton gains as much as its slopes promise. The same happens if the edge of stability mirrors a root.
     Parameters that block the way are held, one after the other; only dead times, if there are some. The rest
     settles. Then each held one is moved to both sides, where the cost must be higher.
     """
@@ -243,7 +243,7 @@ def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.
 
 
 def _promised(point: Point) -> float:
-    """Return the promised decrease of -2 log likelihood by one step: about what a search would find.
+    """Return the promised decrease of -2 log likelihood by one step: about as much as by a search.
 
     Near the edge of stability the determinant allows short steps only.
     """

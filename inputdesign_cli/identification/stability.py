@@ -1,4 +1,4 @@
-"""Polynomials with all roots inside the unit circle: the test, and the nearest thing when it fails."""
+"""Test whether all roots of polynomials lie inside the unit circle, and mirror the others into it."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class StateSpaceKind(Kind):
 
         Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
         Inputs before the record that come late by the dead time move the states, sample by sample, along the
-        directions of inputs; their direct effect through D is not counted. From rest, only noise has moved
+        directions of inputs. Their direct effect through D is not counted. From rest, only noise has moved
         the states, by an unknown amount.
         """
         coloured, nothing = self._coloured, np.zeros((0, samples))

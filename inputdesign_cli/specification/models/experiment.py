@@ -178,7 +178,7 @@ class Cost(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Check that something has a price."""
+        """Check that some power has a price."""
         if not any(np.any(w) for w in (self.input_power, self.output_power, self.excitation_power)):
             message = "all weights of {key} are zero: every experiment would be free"
             yield PathDiagnostic("no-cost", message, "write input_power: 1")
@@ -197,7 +197,7 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
 
 
 def _one_line(text: str) -> str:
-    """Return a text that may stand in the header of a table."""
+    """Return a text if it may stand in the header of a table; refuse it otherwise."""
     if any(c in '",;\t\r\n' for c in text) or len(text) > 40:
         message = "{key} must be one line of at most 40 characters without commas and quotes"
         raise fail("bad-name", message, "shorten it: it stands in headers of tables")

@@ -135,7 +135,7 @@ def depth(value: object) -> int:
 
 
 def as_whole(value: object) -> object:
-    """Return 500.0 as 500, and everything else unchanged."""
+    """Return a whole float as an integer (500.0 as 500), and everything else unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
