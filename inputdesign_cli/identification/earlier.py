@@ -44,7 +44,7 @@ class Earlier:
         return float(np.sum((self.rows @ (theta - self.theta)) ** 2))
 
     def is_of_these_data(self, theta: Array, factor: Array) -> bool:
-        """Return whether the estimate is of these data: it has half of the information and does not move theta.
+        """Return whether the estimate is of these data: it has half of the information, and theta stays.
 
         Other data of the same length have another input or another noise, and move theta by a deviation.
 
