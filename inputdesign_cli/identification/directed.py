@@ -55,7 +55,7 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Directed:
-    """One parameter more than the model has."""
+    """The test of one parameter that the model does not have, and its estimate."""
 
     test: ScoreTest  # whether these data ask for it
     # That act alike on these data where they are small, the likeliest first.
@@ -76,13 +76,13 @@ class Directed:
         return any(alternative.lag for alternative in self.alternatives)
 
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """Return how G of the estimated `model` changes if the parameter is estimated, (states, n, p, r)."""
+        """Return the change (states, n, p, r) of G of the estimated `model` if the parameter is estimated."""
         if self.larger is not None:
             return np.asarray(self.larger.plant_at(w) - model.plant_at(w))[None]
         return self.size * self.slope(model, w)
 
     def slope(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """Return the derivative of G by the parameter, the others following: (states, n, p, r)."""
+        """Return the derivative (states, n, p, r) of G by the parameter if the others follow."""
         others = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
         return np.asarray(others + self.alternatives[0].slopes(model, w))
 
@@ -94,7 +94,7 @@ _Tried = tuple[Alternative, Array, Array]
 def directed_tests(
     white: White, alternatives: Sequence[Alternative], parameters: int
 ) -> tuple[Directed, ...]:
-    """Return the test of every alternative; alternatives that these data cannot distinguish share one.
+    """Return the test of every alternative; alternatives that these data cannot distinguish share one test.
 
     Args:
         parameters: k of the model.
@@ -143,7 +143,7 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
 
 
 def _score(white: White, tried: _Tried) -> tuple[Score, float]:
-    """Return the score of a regressor, and the mean of it in its standard deviations."""
+    """Return the score of a regressor, and its mean in standard deviations of the score."""
     alternative, column, along = tried
     mean = np.zeros(1)
     if alternative.echo is not None:
@@ -186,7 +186,7 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
 
 @dataclass(frozen=True)
 class Moves:
-    """What a parameter more does to G at n frequencies, in units of the admissible error."""
+    """The change of G at n frequencies by an added parameter, in units of the admissible error."""
 
     estimated: Array  # (n,), how far G moves if the parameter is estimated along
     deviation: Array  # (n,), the standard deviation of that
@@ -223,8 +223,8 @@ class Moves:
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
     """Return the indices of the parameters that speak against a verdict of |error of G| <= r_adm.
 
-    It is neither enough nor necessary that the parameter is beyond chance: what counts is that it exists and
-    that G is beyond r_adm, after the estimated move and with its uncertainty.
+    It is neither enough nor necessary that the parameter is significant. It must exist, and G must be beyond
+    r_adm after the estimated move and with its uncertainty.
     """
     # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
     # G by more than is admitted, at a level that is shared among all that would. What is not a number is no

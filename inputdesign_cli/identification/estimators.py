@@ -64,7 +64,7 @@ _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
 
 class Ended(NamedTuple):
-    """How a search ended: whether it settled, after `steps` from the best of `starts`, and other minima."""
+    """The end of a search: whether it settled, after `steps` from the best of `starts`, and other minima."""
 
     converged: bool
     steps: int
@@ -73,7 +73,7 @@ class Ended(NamedTuple):
 
 
 class Begun(NamedTuple):
-    """How the records begin."""
+    """The start of the records: at rest, or unknown."""
 
     free: bool  # whether unknown starts and levels were estimated along with theta
     rest_refuted: bool  # whether the records say that they do not begin at rest about zero
@@ -81,14 +81,14 @@ class Begun(NamedTuple):
 
 
 class Simulation(NamedTuple):
-    """What the inputs and the start of each record cause in the model, `outputs` (samples, p)."""
+    """The response of the model to the inputs and the start of each record."""
 
     outputs: Array  # (samples, p)
     fit: tuple[float | None, ...]  # per cent of the rms of y that it explains, by output; None if unstable
 
 
 class Agreement(NamedTuple):
-    """How an earlier estimate, which is combined with the data, goes with them."""
+    """The agreement of the data with an earlier estimate that is combined with them."""
 
     differing: float  # the probability that two estimates of one system differ as much
     alike: float  # the probability that one from other data agrees as closely
@@ -116,12 +116,12 @@ class Estimate:
 
     @cached_property
     def information(self) -> Array:
-        """Return the information matrix (k, k)."""
+        """Return the information matrix (k, k) of the parameters."""
         return self.factor @ self.factor.T
 
     @cached_property
     def covariance(self) -> Array:
-        """(k, k), by way of the factor: the information itself may be singular to rounding."""
+        """Return the covariance (k, k) from the factor: the information may be singular to rounding."""
         half = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.factor)), lower=True)
         return np.asarray(half.T @ half)
 
@@ -139,7 +139,7 @@ class BatchEstimate:
 
 @singledispatch
 def estimator(model: Model, step: float) -> Kind:
-    """Return what models of this kind supply to be estimated, from samples `step` apart.
+    """Return the structure of the estimator for models of this kind, from samples `step` apart.
 
     Models in discrete time have their own step.
 
@@ -250,7 +250,7 @@ def _fitted(kind: Kind, u: Array, y: Array, start: Array) -> BatchEstimate:
 
 @_fitted.register
 def _(kind: PolynomialKind, u: Array, y: Array, start: Array) -> BatchEstimate:
-    """Return the estimates from records at rest, noise as well, all in one go."""
+    """Return the estimates from records that begin at rest, noise as well, all in one pass."""
     problem = FromRest.of(kind.model, u, y)
     found = minimise(problem, start)
     sums = problem.sums(found.theta)
@@ -337,7 +337,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
 
 
 def _simulation(records: Records, point: Point, y: Array) -> Simulation:
-    """Return what prediction errors leave of the outputs: what inputs and starts cause."""
+    """Return the simulated outputs: the outputs less the part that prediction errors cause."""
     kind, ends = records.kind, np.cumsum(records.lengths)[:-1]
     model = kind.model.at(point.theta)
     with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
@@ -355,7 +355,7 @@ def _simulation(records: Records, point: Point, y: Array) -> Simulation:
 
 
 def noise_of(records: Records, point: Point) -> Array:
-    """(p, p) covariance of e: the parameters of every output count, and unknown starts."""
+    """Return the covariance (p, p) of e, corrected for the parameters of every output and unknown starts."""
     samples, outputs = point.errors.shape
     own = shares(np.any(records.from_rest(point.theta)[1], axis=1))
     left = np.sqrt(np.maximum(samples - own - point.unknowns / outputs, 1.0))
@@ -364,7 +364,7 @@ def noise_of(records: Records, point: Point) -> Array:
 
 
 def factor_at(records: Records, point: Point, noise: Array) -> Array:
-    """Return the information of records about the parameters, in factors.
+    """Return the triangular factor of the information matrix of records about the parameters.
 
     Raises:
         SpecError: `not-exciting`.
@@ -381,10 +381,10 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
 
 
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
-    """Return the information where minima beyond sampling instants are about as likely: of their mixture.
+    """Return the information of a mixture if minima beyond sampling instants are about as likely.
 
-    Each has the weight of its likelihood times the square root of the determinant of its covariance
-    (Laplace's method, [tierney-kadane-1986]); the covariance is that of the mixture about the estimate.
+    The weight of each is its likelihood times the square root of the determinant of its covariance (Laplace's
+    method, [tierney-kadane-1986]). The covariance is that of the mixture about the estimate.
 
     Args:
         factor: L (k, k) of the best minimum alone, its information L L^T.
@@ -410,10 +410,10 @@ def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
 
 
 def information_of(records: Records, point: Point, noise: Array) -> Array:
-    """Return sum over the samples of psi noise^-1 psi^T, (k, k)."""
+    """Return the information matrix (k, k): the sum over the samples of psi noise^-1 psi^T."""
     return replace(point.of_errors, weights=_weights(records, noise)).hessian
 
 
 def _weights(records: Records, noise: Array) -> Array:
-    """Return W (p, p), the inverse of the noise, which may be no more than rounding."""
+    """Return the weights W (p, p): the inverse of the noise, which may be no more than rounding."""
     return inverses((noise + records.rounding)[None])[0][0]

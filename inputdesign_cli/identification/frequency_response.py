@@ -117,7 +117,7 @@ def found_period(x: Array) -> int:
 
 
 def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.int64]:
-    """Return samples until the response to a pulse first has a tenth of its largest value, (p, r); else 0.
+    """Return the samples (p, r) until a pulse response first has a tenth of its largest value, otherwise 0.
 
     Args:
         samples: of the record; later responses are not looked for.
@@ -132,7 +132,7 @@ def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.in
 
 
 def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
-    """What outputs have at odd and even harmonics that one input (N, 1) which repeats does not excite.
+    """Return the output power at odd and even harmonics that one repeating input (N, 1) does not excite.
 
     Empty where it does not repeat, or excites all of a kind.
     """
@@ -161,7 +161,7 @@ def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
 
 
 def _local_polynomial(records: _Records) -> FrequencyResponse | None:
-    """Return the response at lines of the longest record, not a number where inputs are not separable."""
+    """Return the response at lines of the longest record, NaN where inputs are not separable."""
     (_, u, y), longest = records[0], max(len(y) for *_, y in records)
     window = _window(records)
     if min(len(y) for *_, y in records) < 2 * window + 4:
@@ -196,7 +196,7 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
 
 
 def _usable(found: FrequencyResponse | None) -> FrequencyResponse | None:
-    """Return the response where it is a number; None if it is nowhere."""
+    """Return the response at its finite frequencies; None if there are none."""
     if found is None or not np.any(at := np.all(np.isfinite(found.noise), axis=1)):
         return None
     G, radius, noise, coherence = found.G[at], found.radius[at], found.noise[at], found.coherence[at]
@@ -204,13 +204,13 @@ def _usable(found: FrequencyResponse | None) -> FrequencyResponse | None:
 
 
 def _window(records: _Records) -> int:
-    """Return how many lines of each record the parabolas are fitted to."""
+    """Return the number of lines of each record that the parabolas are fitted to."""
     unknowns = _PARABOLA * (records[0][1].shape[1] + len(records))
     return -(-(unknowns + _FREEDOM) // len(records)) + 1
 
 
 def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse | None:
-    """The response, output by output, to inputs that are delayed first; what lies before them is left out."""
+    """Return the response to delayed inputs, output by output, without the samples that lie before them."""
     found, begin = [], int(delays.max())
     for i, late in enumerate(delays):
         moved = []
@@ -229,7 +229,7 @@ def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse 
 
 
 def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> _Found | None:
-    """Return what polynomials of some terms say at w; None if inputs are not separable."""
+    """Return the local estimate at w from polynomials of some terms; None if inputs are not separable."""
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):
         last = (lines.size - 1) // 2
@@ -269,5 +269,5 @@ def _coherence(explained: NDArray[np.float64], noise: NDArray[np.float64]) -> ND
 
 
 def _radius(variance: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:
-    """|error|^2 over its estimated variance is of the F distribution with 2 and 2 `freedom` degrees."""
+    """Return the radius of confidence: |error|^2 / variance follows F with 2 and 2 `freedom` degrees."""
     return np.asarray(np.sqrt(variance * scipy.special.fdtri(2, 2 * freedom, CONFIDENCE)))

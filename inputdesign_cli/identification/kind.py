@@ -25,13 +25,13 @@ FADED = 2000
 
 
 class Starts(NamedTuple):
-    """Where a search begins: points (n, k), and how many points were tried."""
+    """The starting points (n, k) of a search, and the number of points that were tried."""
 
     points: Array
     tried: int
 
     def and_given(self, given: Array | None) -> Starts:
-        """Return the starts after the `given` one (k,), if any."""
+        """Return the starts, preceded by the `given` one (k,) if there is one."""
         if given is None:
             return self
         return Starts(np.concatenate([given[None], self.points.reshape(-1, given.size)]), self.tried + 1)
@@ -64,7 +64,7 @@ class Kind(ABC):
 
     @property
     def recent(self) -> int:
-        """Return the lag up to which the structure looks at the inputs; of others they act through poles."""
+        """Return the largest lag at which inputs act directly; at larger lags they act through poles."""
         return 0
 
     @property
@@ -94,11 +94,11 @@ class Kind(ABC):
         """Return the parameters on which the starts depend."""
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return by how much a parameter is moved to differentiate the starts."""
+        """Return the step of a parameter in the numerical derivative of the starts."""
         return _STEP * max(abs(float(theta[index])), 1.0)
 
     def lateness(self, theta: Array) -> int:
-        """Return the samples in which inputs from before a record act by other ways than the states."""
+        """Return the number of samples in which inputs before a record act other than through the states."""
         return 0
 
     @property
@@ -118,16 +118,16 @@ class Kind(ABC):
         return np.array(found).reshape(-1, 2, theta.size)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
+        """Return signals (N, m) filtered by the inverse noise model of each output, as (p, N, m)."""
         return np.repeat(signals[None], self.model.outputs, axis=0)
 
     @abstractmethod
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta (k,) with a stable predictor."""
+        """Return theta (k,), changed where its predictor would be unstable."""
 
     @abstractmethod
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Return starting points: made from records at rest about zero, and the `given` one (k,)."""
+        """Return starting points from records at rest about zero, and the `given` one (k,)."""
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
         """Return the kind with starting points that keep `known` parameters (k,), if they can do that."""
@@ -142,9 +142,9 @@ class Kind(ABC):
         return ()
 
     def echoes(self, theta: Array, samples: int) -> NDArray[np.float64]:
-        """Return how gradients respond to past errors (k, lags, p, p), by parameter, lag, output, error.
+        """Return the responses of gradients to past errors, (k, lags, p, p): parameter, lag, output, error.
 
-        They are zero of parameters of the plant alone. They count as zero if the response does not fade: it
+        They are zero for parameters of the plant alone. They count as zero if the response does not fade: it
         is not the noise model that holds this plant.
         """
         samples = min(samples, FADED)
@@ -162,10 +162,10 @@ class Kind(ABC):
         return np.where(fades[:, None, None, None], found, 0.0)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
-        """Return which outputs are stable, so that they can be simulated."""
+        """Return whether each output is stable, so that it can be simulated."""
         return (True,) * self.model.outputs
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:
-    """Return the samples of a record in which inputs before it act through a dead time; none without one."""
+    """Return the number of samples in which inputs before a record act through a dead time; 0 without one."""
     return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0

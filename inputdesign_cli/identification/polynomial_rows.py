@@ -82,11 +82,11 @@ class Row:
 
     @property
     def memory(self) -> int:
-        """Return how far back the regression looks, recursions aside."""
+        """Return the largest lag of the regression, recursions aside."""
         return max(one.lags.stop for one in (self.a, *self.b)) - 1
 
     def whitening(self, theta: Array) -> tuple[Array, Array]:
-        """Return D and C, (order + 1,) each, at parameters (k,)."""
+        """Return the coefficients of D and C, (order + 1,) each, at parameters (k,)."""
         return self.d.polynomial(theta[None])[0], self.c.polynomial(theta[None])[0]
 
 
@@ -96,7 +96,7 @@ def rows_of(model: PolynomialModel) -> tuple[Row, ...]:
 
 
 def owners(rows: Sequence[Row]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the output, counted among these rows, and the place in theta of each coefficient, (m,)."""
+    """Return the output (among these rows) and the index in theta of each coefficient, (m,)."""
     columns = np.concatenate([one.columns for row in rows for one in row.all])
     return np.repeat(np.arange(len(rows)), [row.size for row in rows]), columns
 
@@ -104,7 +104,7 @@ def owners(rows: Sequence[Row]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def errors_and_gradients(
     rows: Sequence[Row], theta: Array, u: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return epsilon (runs, p, N), and psi (runs, m, N) of every coefficient in its output.
+    """Return errors epsilon (runs, p, N), and gradients psi (runs, m, N) of every coefficient in its output.
 
     Args:
         rows: one an output.
@@ -135,7 +135,7 @@ def errors_and_gradients(
 
 
 def _multiplied(polynomials: Array, x: Array) -> Array:
-    """Return sum_i p_i x(t - i) for polynomials (runs, order + 1) and signals (runs, N)."""
+    """Return sum_i p_i x(t - i) for polynomials p (runs, order + 1) and signals x (runs, N)."""
     out = polynomials[:, :1] * x
     for lag in range(1, min(polynomials.shape[1], x.shape[1])):
         out[:, lag:] += polynomials[:, lag, None] * x[:, :-lag]
@@ -143,7 +143,7 @@ def _multiplied(polynomials: Array, x: Array) -> Array:
 
 
 def _divided(monic: Array, x: Array) -> Array:
-    """Return x / D for monic polynomials D (runs, order + 1) and signals (runs, N).
+    """Return x / D for monic polynomials D (runs, order + 1) and signals x (runs, N).
 
     All runs, one after the other, are a triangular system with few diagonals.
     """
@@ -236,7 +236,7 @@ class Sums:
 
 
 def stabilised(rows: Sequence[Row], theta: Array) -> Array:
-    """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
+    """Return theta (runs, k) with roots of C, D and F outside the unit circle mirrored into it.
 
     Roots of F that are exactly one belong to integrators, and stay.
     """
@@ -258,11 +258,11 @@ def is_arx(model: PolynomialModel) -> bool:
 
 
 def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
-    """Return estimates (runs, k) of an ARX model in one step, weighed by its covariance ([ljung-1999], 4.2).
+    """Return estimates (runs, k) of an ARX model in one step, weighted by its covariance ([ljung-1999], 4.2).
 
     Args:
         model: the structure and the covariance are meant.
-        u, y: (runs, samples, r), (runs, samples, p); what came before them is not known.
+        u, y: (runs, samples, r), (runs, samples, p); earlier samples are unknown.
     """
     longest = max(parameter.power for parameter in model.parameters)
     nowhere, weights = np.zeros((len(y), model.theta.size)), np.linalg.inv(model.covariance)

@@ -24,7 +24,7 @@ _LONGEST = 40
 
 
 def starting_points(row: Row, size: int, u: Array, y: Array) -> Array:
-    """Return starts (points, k) for one output y (N,) and all inputs u (N, r); k is the `size`."""
+    """Return starting points (points, k) for one output y (N,) and all inputs u (N, r); k is the `size`."""
     inputs = [u[:, j] for j in row.inputs]
     highest = max(one.lags.stop for one in row.all) - 1
     order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
@@ -53,7 +53,7 @@ def starting_points(row: Row, size: int, u: Array, y: Array) -> Array:
 
 
 def regress(y: Array, regressors: list[tuple[Array, range]]) -> tuple[list[Array], Array]:
-    """Least squares of y(t) on x(t - lag): one array of coefficients for each regressor, and the residual."""
+    """Estimate y(t) from x(t - lag) by least squares; return coefficients by regressor, and the residual."""
     columns = [shifted(x, lag, (x.size,)) for x, lags in regressors for lag in lags]
     if not columns:
         return [np.zeros(0) for _ in regressors], y
@@ -68,7 +68,7 @@ def _caused(b: Array, F: Array, delay: int, x: Array) -> Array:
 
 
 def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Parts:
-    """A, B, C by regression; output-error denominators F take the place of a missing A."""
+    """Estimate A, B, C by regression; output-error denominators F take the place of a missing A."""
     longest = max((f.lags for f in row.f), key=len, default=range(1, 1))
     in_f = len(longest) > 0 and not row.a.lags
     regressors = [(x, b.lags) for x, b in zip(inputs, row.b, strict=True)]
@@ -78,7 +78,7 @@ def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Pa
 
 
 def _output_error(row: Row, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool) -> Parts:
-    """B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
+    """Estimate B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
     if any(f.lags for f in row.f) or not row.a.lags:
         found = [
             _iterated(target, f.lags, [(x, b.lags)])
@@ -113,7 +113,7 @@ def noise_polynomials(v: Array, c: int, d: int) -> tuple[Array, Array]:
 
 
 def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> tuple[Array, list[Array]]:
-    """A common denominator with these lags `below`, monic, and the numerators by Steiglitz and McBride."""
+    """Estimate a common monic denominator at lags `below`, and numerators, by Steiglitz and McBride."""
     F = np.ones(1)
     numerators: list[Array] = []
     for _ in range(_ITERATIONS if below else 1):

@@ -33,7 +33,7 @@ from inputdesign_cli.plant.filtering import filtered
 
 @dataclass(frozen=True)
 class PolynomialKind(Kind):
-    """Polynomials in q^-1; see `Kind`."""
+    """A polynomial model in q^-1; see `Kind`."""
 
     model: PolynomialModel
 
@@ -44,7 +44,7 @@ class PolynomialKind(Kind):
 
     @property
     def recent(self) -> int:
-        """Return how far back the regressions look."""
+        """Return the largest lag of the regressions."""
         return max(row.memory for row in self.rows)
 
     @property
@@ -61,18 +61,18 @@ class PolynomialKind(Kind):
         return errors[0].T, psi
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """Return the starts, output by output.
+        """Return the effect of the past on the prediction errors, output by output.
 
         The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j. This sum is off by impulses if y and u
-        before the record are missing. It is off by impulses through 1/F_j if the state of an entry is,
-        and by a step through it if the level of its input is. For a stable F_j the others make up for the
+        before the record are missing. An unknown state of an entry adds impulses through 1/F_j, an unknown
+        level of its input a step through 1/F_j. For a stable F_j the others make up for the
         step, but not if F_j integrates or nearly does. From rest only y is missing, which noise has moved.
         That matters only if the predictor remembers y beyond its order.
         """
         return tuple(_start(row, theta, samples, free=free) for row in self.rows)
 
     def lateness(self, theta: Array) -> int:
-        """Return by how many samples B looks back further than F."""
+        """Return the number of samples by which B looks back further than F."""
         entries = (entry for row in self.rows for entry in zip(row.b, row.f, strict=True))
         return max([0, *(b.lags.stop - f.lags.stop for b, f in entries)])
 
@@ -82,15 +82,15 @@ class PolynomialKind(Kind):
         return np.flatnonzero([parameter.letter in letters for parameter in self.model.parameters])
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """Return signals (N, m) through D/C of each output (p, N, m)."""
+        """Return signals (N, m) filtered by D/C of each output, as (p, N, m)."""
         return np.array([filtered(*row.whitening(theta), signals, axis=0) for row in self.rows])
 
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta with the roots of C, D and F in the unit circle."""
+        """Return theta with the roots of C, D and F inside the unit circle."""
         return stabilised(self.rows, theta[None])[0]
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """Each output estimated alone, then what outputs share weighed by how well each knows it."""
+        """Return each output's own estimate; shared parameters are weighted by the information of each."""
         listed = np.zeros((0, len(self.model.names))) if given is None else given[None]
         points, tried = list[Array](), 0
         for u, y in parts:
@@ -104,7 +104,7 @@ class PolynomialKind(Kind):
         return Starts(np.concatenate(points), tried)
 
     def _one_by_one(self, u: Array, y: Array, starts: Sequence[Array]) -> Array:
-        """Return theta (k,) from each output alone: the information of all, added up."""
+        """Return theta (k,) from each output alone, combined by the sum of the information matrices."""
         size = len(self.model.names)
         total, moment = np.zeros((size, size)), np.zeros(size)
         for row, own, points in zip(self.rows, y.T, starts, strict=True):
@@ -120,7 +120,7 @@ class PolynomialKind(Kind):
         return np.asarray(scaled / scale)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions by a further coefficient in any of the polynomials, or a shorter delay."""
+        """Return the extensions by a further coefficient in any of the polynomials, or by a shorter delay."""
         model, larger = self.model.at(theta), []
         for i, j in model.active:
             B, F = model.B[i][j], model.F[i][j]
@@ -153,7 +153,7 @@ class PolynomialKind(Kind):
 
 
 def _start(row: Row, theta: Array, samples: int, *, free: bool) -> Start:
-    """Impulses, and levels, with what 1/F makes of them."""
+    """Return the effect of an unknown past: impulses and levels, directly and through 1/F."""
     impulse, level = np.eye(1, samples)[0], np.ones(samples)
     if free:
         older = [b.lags.stop - f.lags.stop for b, f in zip(row.b, row.f, strict=True)]
@@ -169,7 +169,7 @@ def _start(row: Row, theta: Array, samples: int, *, free: bool) -> Start:
 
 
 def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
-    """Return a table with another entry."""
+    """Return a table with the entry at (i, j) replaced."""
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )

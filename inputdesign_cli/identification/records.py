@@ -35,9 +35,9 @@ _EXACT = 1e-20
 
 @dataclass(frozen=True)
 class Point:
-    """Prediction errors of records near theta (k,), and what they cost.
+    """Prediction errors of records near theta (k,), and their cost.
 
-    What noise before the records is likely to have been counts as M more errors of each output.
+    The likely values of noise before the records count as M more errors of each output.
     """
 
     theta: Array
@@ -55,7 +55,7 @@ class Point:
 
     @classmethod
     def at_rest(cls, theta: Array, errors: Array, psi: NDArray[np.float64]) -> Point:
-        """Return errors and gradient without unknown starts, not yet weighed."""
+        """Return errors and gradient without unknown starts, not yet weighted."""
         k, none, weights = theta.size, np.zeros((errors.size, 0)), np.eye(errors.shape[1])
         return cls(theta, errors, psi, len(errors), none, np.zeros(k), np.zeros((k, k)), weights)
 
@@ -66,12 +66,12 @@ class Point:
 
     @property
     def psi(self) -> NDArray[np.float64]:
-        """Return their gradient (k, N, p)."""
+        """Return the negative gradient psi (k, N, p) of the prediction errors."""
         return self.all_psi[:, : self.samples]
 
     @property
     def freedom(self) -> int:
-        """Return the number of errors that levels and states leave."""
+        """Return the number of errors less the number of unknown levels and states."""
         return self.errors.size - self.unknowns
 
     @property
@@ -96,7 +96,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Records:
-    """Records of one structure, one after the other."""
+    """Records of one structure, which follow each other."""
 
     kind: Kind  # the structure
     parts: tuple[Part, ...]  # u (n, r), y (n, p) of each record
@@ -112,7 +112,7 @@ class Records:
 
     @cached_property
     def dead_times(self) -> NDArray[np.int64]:
-        """Return the parameters that move dead times: there the cost has kinks."""
+        """Return the indices of the parameters that move dead times: there the cost has kinks."""
         return np.flatnonzero(self.kind.model.dead_times)
 
     @cached_property
@@ -132,17 +132,17 @@ class Records:
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
-        """Return the samples of each part."""
+        """Return the number of samples of each part."""
         return tuple(len(y) for _, y in self.parts)
 
     @cached_property
     def longest(self) -> int:
-        """Return the samples of the longest record: the past acts on all alike, on shorter ones for fewer."""
+        """Return the length of the longest record: the past acts on all alike, on shorter ones for less."""
         return max(self.lengths)
 
     @cached_property
     def rounding(self) -> Array:
-        """Return a covariance (p, p) of errors so small that they are rounding."""
+        """Return a covariance (p, p) below which errors count as rounding."""
         return _EXACT * np.diag(np.mean(self.y**2, axis=0))
 
     def from_rest(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -151,7 +151,7 @@ class Records:
         return np.concatenate([e for e, _ in found]), np.concatenate([psi for _, psi in found], axis=1)
 
     def at(self, theta: Array) -> Point:
-        """Return prediction errors and their gradient, the unknown starts eliminated, not yet weighed."""
+        """Return prediction errors and their gradient, the unknown starts eliminated, not yet weighted."""
         errors, psi = self.from_rest(theta)
         finite = bool(np.all(np.isfinite(errors)) and np.all(np.isfinite(psi)))
         point = Point.at_rest(theta, errors, psi)
@@ -192,7 +192,7 @@ class Records:
 
     @property
     def _moving(self) -> list[int]:
-        """Return the parameters on which the starts depend."""
+        """Return the indices of the parameters on which the starts depend."""
         return self.kind.in_starts(self.late, free=self.free).tolist()
 
     def _starts(self, theta: Array) -> tuple[Start, ...]:
@@ -218,12 +218,12 @@ class Records:
         )
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
-        """(p, N, m), see `Kind`."""
+        """Return signals filtered by the inverse noise models, (p, N, m); see `Kind`."""
         pieces = np.split(signals, np.cumsum(self.lengths)[:-1])
         return np.concatenate([self.kind.whitened(theta, x) for x in pieces], axis=1)
 
     def stabilised(self, theta: Array) -> Array:
-        """Return theta with a stable predictor."""
+        """Return theta, changed where its predictor would be unstable."""
         return self.kind.stabilised(theta, self.longest)
 
 
@@ -239,13 +239,13 @@ def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
 
 
 def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[Part]:
-    """Return the signals of each record; None: of the only one."""
+    """Return the signals of each record; `lengths` None stands for a single record."""
     at = np.cumsum(lengths or [len(y)])[:-1]
     return list(zip(np.split(u, at), np.split(y, at), strict=True))
 
 
 def longest(parts: Sequence[Part]) -> list[Part]:
-    """Return the longest records, of which starting points are made: at most three, of similar lengths."""
+    """Return the longest records, for starting points: at most three, of similar lengths."""
     ranked = sorted(parts, key=lambda part: -len(part[1]))[:_MOST_STARTED]
     return [part for part in ranked if 2 * len(part[1]) >= len(ranked[0][1])]
 
@@ -256,7 +256,7 @@ def centred(parts: Sequence[Part]) -> list[Part]:
 
 
 def evaluate(records: Records, theta: Array) -> Point:
-    """Return the cost of records; infinite where it overflows, zero where all errors are rounding."""
+    """Return errors and cost of records at theta: infinite on overflow, zero if errors are rounding."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         near = records.at(theta)
         S = near.all_errors.T @ near.all_errors / records.samples
@@ -315,7 +315,7 @@ def shares(acting: NDArray[np.bool_]) -> Array:
 
 
 def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.float64]]:
-    """Return cost (runs,) and weights W (runs, p, p) of errors of the covariances S (runs, p, p)."""
+    """Return cost (runs,) and weights W (runs, p, p) of errors with covariances S (runs, p, p)."""
     inverse, logarithm = inverses(S)
     root = np.exp(logarithm / S.shape[1])
     return samples * root, (root / S.shape[1])[:, None, None] * inverse
@@ -324,7 +324,7 @@ def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.fl
 def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
     """Return the inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
 
-    Through correlations, since outputs may differ by orders of magnitude; a singular correlation is raised
+    They follow from correlations: outputs may differ by orders of magnitude. A singular correlation is raised
     to rounding, and one that has overflowed has an infinite determinant.
     """
     usable = np.atleast_1d(np.isfinite(covariances).all(axis=(1, 2)))

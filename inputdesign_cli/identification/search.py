@@ -54,7 +54,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Search:
-    """Where the search from the best of `starts` points ended."""
+    """The end of the search from the best of `starts` points."""
 
     records: Records
     point: Point
@@ -71,7 +71,7 @@ def search(records: Records, points: Array, *, starts: int, quick: int | None = 
     """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k).
 
     Args:
-        starts: how many points were looked at.
+        starts: the number of points that were tried.
         quick: the most steps from each, fewer if these gain nothing that matters. Kinks may stop the search,
             and no other minima are returned.
     """
@@ -96,7 +96,7 @@ def _first(records: Records, theta: Array) -> Array:
 
 
 def _likely(point: Point, found: Minimum) -> Iterator[tuple[int, Array, float]]:
-    """Yield runs that ended nearly as likely as the best `point`, and what they have more, the best first."""
+    """Yield runs that ended nearly as likely as the best `point`, with their excess, the best first."""
     for run in np.argsort(found.cost) if point.cost > 0.0 else ():
         cost = float(found.cost[run])
         excess = point.freedom * float(np.log(cost / point.cost)) if np.isfinite(cost) else np.inf
@@ -106,7 +106,7 @@ def _likely(point: Point, found: Minimum) -> Iterator[tuple[int, Array, float]]:
 
 
 def rivals(point: Point, found: Minimum) -> tuple[Rival, ...]:
-    """Where other starts ended, the likeliest first: far from the best `point`, and nearly as likely."""
+    """Return the minima that other starts found, likeliest first: far from the best and nearly as likely."""
     minima = [Rival(point.theta, 0.0)]
     for _, theta, excess in _likely(point, found):
         if not any(_is_near(point, theta - other.theta, excess - other.excess) for other in minima):
@@ -156,7 +156,7 @@ def _beyond_instants(records: Records, found: Minimum) -> Minimum:
 
 
 def _beyond(records: Records, point: Point) -> Array:
-    """(n, k): where to begin beyond instants within reach, the other parameters following the dead time."""
+    """Return starts (n, k) beyond sampling instants within reach; other parameters follow the dead time."""
     crossings = records.kind.crossings(point.theta, records.longest)
     if not len(crossings):
         return np.zeros((0, point.theta.size))
@@ -175,10 +175,10 @@ def _beyond(records: Records, point: Point) -> Array:
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
-    """Return where a search stopped by kinks of the cost settles, or None if kinks did not stop it.
+    """Return the point where the search settles if kinks of the cost stopped it, otherwise None.
 
     A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains what its slopes promise. The same happens if the edge of stability mirrors a root.
+    and Newton gains as much as its slopes promise. The same happens if the edge of stability mirrors a root.
     Parameters that block the way are held, one after the other; only dead times, if there are some. The rest
     settles. Then each held one is moved to both sides, where the cost must be higher.
     """
@@ -212,7 +212,7 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
 
 
 def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
-    """Return the step (k,) of Gauss and Newton that leaves some parameters."""
+    """Return the Gauss-Newton step (k,) of all parameters that are not held."""
     free = np.flatnonzero(~held)
     scale = np.sqrt(np.maximum(np.diag(point.hessian)[free], 1e-300))
     step = np.zeros(held.size)
@@ -222,13 +222,13 @@ def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
 
 
 def _deviance(records: Records, point: Point) -> float:
-    """-2 log of the likelihood at the likeliest levels and states, up to a constant."""
+    """Return -2 log of the likelihood at the likeliest levels and states, up to a constant."""
     products = point.all_errors.T @ point.all_errors
     return float(records.samples * np.linalg.slogdet(products)[1]) + point.of_noise
 
 
 def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.0) -> float:
-    """Return the probability that unknown starts at a point, if useless, lower -2 log likelihood as far.
+    """Return the probability that useless unknown starts at a point lower -2 log likelihood as far.
 
     Many unknowns shrink the estimated noise, which chi-squared does not account for: F does. One is the
     answer if there are no unknowns beyond the ones from rest, or too few errors to compare.
@@ -243,7 +243,7 @@ def _chance_of(at_rest: Search, records: Records, point: Point, gain: float = 0.
 
 
 def _promised(point: Point) -> float:
-    """Return what errors promise that one step takes off -2 log likelihood: about what a search would find.
+    """Return the promised decrease of -2 log likelihood by one step: about as much as by a search.
 
     Near the edge of stability the determinant allows short steps only.
     """
@@ -268,7 +268,7 @@ def from_rest_or_free(
     Args:
         records: from rest.
         rest: whether the records begin at rest about zero; None: as the data say.
-        searched: what searches from its own starts and, if given, from the parameters (k,).
+        searched: a function that searches from its own starts and, if given, from the parameters (k,).
         about: (k,), parameters that show roughly how long unknown inputs act.
     """
     # An unknown level makes up for the means.

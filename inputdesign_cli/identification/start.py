@@ -36,7 +36,7 @@ _ALIKE = 1e-6
 
 
 class Start(NamedTuple):
-    """Effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
+    """The effect of the past on the N prediction errors of one output; each row belongs to one unknown."""
 
     free: NDArray[np.float64]  # (m, N), by the level and states, of which nothing is known
     disturbance: NDArray[np.float64]  # (m, N), `free` before the inverse of the noise model
@@ -56,11 +56,11 @@ class Start(NamedTuple):
 
 
 def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
-    """Return what stationary noise C/D e before a record adds to (D/C) of the record, (n, samples).
+    """Return the effect of stationary noise C/D e before a record on (D/C) of the record, (n, samples).
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
-    first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values
-    are made of independent ones by the predictors of every order.
+    first n samples. Both e = D q and v = C q follow from the autoregression q = e / D. The predictors of
+    every order make its last n values of independent ones.
     """
     n = max(C.size, D.size) - 1
     if n == 0:
@@ -81,7 +81,7 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
 
 
 def each_later(response: Array, count: int) -> NDArray:
-    """Return a response (N,) begun at once, and one sample later than the row before, (count, N)."""
+    """Return a response (N,) in rows (count, N), each one sample later than the row before."""
     padded = np.concatenate([np.zeros(max(count - 1, 0)), response])
     return np.lib.stride_tricks.sliding_window_view(padded, response.size)[:count][::-1]
 
@@ -90,9 +90,9 @@ def density(C: Array) -> float:
     """Return -2 log of a density of the zeros of C, up to a constant: 2 log of the variance of e / C.
 
     It vanishes on the unit circle and is all but flat elsewhere, 1 - c_1^2 for one zero. The likelihood has
-    no slope across the circle, and in short records it is often largest there: noise seems to vanish at a
-    frequency, and the model to be exact ([sargan-bhargava-1983]; [chung-2013] treat variances that come out
-    zero alike). A zero z moves by about 2 z / N.
+    no slope across the circle. In short records it is often largest there: noise seems to vanish at a
+    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that come out
+    zero alike. A zero z moves by about 2 z / N.
     """
     return 2.0 * float(np.log(_step_down(C)[1][0]))
 
@@ -100,7 +100,7 @@ def density(C: Array) -> float:
 def _step_down(d: Array) -> tuple[list[Array], NDArray]:
     """Return the predictors of the orders 0 to n - 1 of e / D, and the variances (n,) of their errors.
 
-    By the recursion of [brockwell-davis-1991], Section 5.2, from the predictor of order n, which is D.
+    They follow from D, the predictor of order n, by the recursion of [brockwell-davis-1991], Section 5.2.
     """
     predictor, variance, found = d * (1.0 - _INSIDE) ** np.arange(d.size), 1.0, []
     while predictor.size > 1:
@@ -154,8 +154,8 @@ class _Basis(NamedTuple):
 class FreeStarts:
     """The starts of records of these `lengths`; `starts` has the longest record's, output by output.
 
-    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
-    as large as an error each, they are errors of their own.
+    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share.
+    Each is as large as an error and counts as one.
     """
 
     lengths: tuple[int, ...]
@@ -169,7 +169,7 @@ class FreeStarts:
 
     @property
     def past(self) -> int:
-        """M: of every record the most unknowns of past noise that an output has."""
+        """Return M: for every record the most unknowns of past noise that an output has, added up."""
         return len(self.lengths) * self._past
 
     @property
@@ -179,7 +179,7 @@ class FreeStarts:
 
     @property
     def determinant(self) -> float:
-        """log det Z^T Z, which integrating over all unknowns adds to -2 log likelihood, and `Start.zeros`.
+        """Return log det Z^T Z for all unknowns plus `Start.zeros`: both add to -2 log likelihood.
 
         Records share the noise model and its zeros.
         """
@@ -198,28 +198,28 @@ class FreeStarts:
         return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
 
     def combined(self, coefficients: Sequence[Array], starts: Sequence[Start]) -> Array:
-        """Return the responses (N, p) by the coefficients of all unknowns, to these starts or derivatives."""
+        """Return the effect (N, p) of starts, or of their derivatives, for these coefficients of unknowns."""
         within = np.arange(max(self.lengths)) < np.array(self.lengths)[:, None]
         pairs = zip(coefficients, starts, strict=True)
         each = [(own @ np.concatenate([start.free, start.noise]))[within] for own, start in pairs]
         return np.stack(each, axis=1)
 
     def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
-        """Return the unknowns of past noise as errors, of outputs that have fewer zero, (M, p)."""
+        """Return the unknowns of past noise as errors (M, p), zero for outputs that have fewer."""
         found = np.zeros((len(self.lengths), self._past, len(self.starts)))
         for i, (own, start) in enumerate(zip(coefficients, self.starts, strict=True)):
             found[:, : len(start.noise), i] = -own[:, len(start.free) :]
         return found.reshape(-1, len(self.starts))
 
     def eliminated(self, errors: Array, weights: Array | None) -> tuple[list[Array], Array, Array]:
-        """Return the likeliest starts of errors (N, p), the root of the weights, and what starts can explain.
+        """Return the likeliest starts of errors (N, p), the root of the weights, and explained directions.
 
-        These are, output by output, the coefficients of all unknowns in each record, (records, m + n), free
-        ones first; R (p, p), R^T R being the weights up to a factor; and orthonormal directions
-        ((N + M) p, K) of the errors in units of R.
+        The starts are coefficients (records, m + n) of all unknowns by output, free ones first. The root is
+        R (p, p), with R^T R the weights up to a factor. The directions ((N + M) p, K) that starts can explain
+        are orthonormal, in units of R.
 
         Args:
-            weights: W (p, p); None: as the covariance left asks.
+            weights: W (p, p); None: by the covariance of the remaining errors.
         """
         errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
         plain, of = self._plain
@@ -271,7 +271,7 @@ class FreeStarts:
 
     @cached_property
     def _blocks(self) -> list[tuple[int, int, _Basis]]:
-        """Return record, output and basis of every start."""
+        """Return the record, the output and the basis of every start."""
         outputs = range(len(self.starts))
         return [(k, i, self._bases[n, i]) for k, n in enumerate(self.lengths) for i in outputs]
 
@@ -292,7 +292,7 @@ class FreeStarts:
 
 
 def _root(errors: Array, weights: Array | None) -> Array:
-    """R (p, p) with R^T R = W, up to a factor; W None: the inverse of the covariance of errors (N, p)."""
+    """Return R (p, p), R^T R = W up to a factor; W None: the inverse covariance of errors (N, p)."""
     if weights is not None:
         return np.asarray(np.linalg.cholesky(weights).T)
     rms = np.sqrt(np.maximum(np.mean(errors**2, axis=0), 1e-300))

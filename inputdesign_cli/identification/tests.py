@@ -47,9 +47,9 @@ class ResidualTest(NamedTuple):
 def whiteness(
     errors: Array, *, lags: int = 25, fitted: int = 0, lengths: Sequence[int] | None = None
 ) -> ResidualTest:
-    """Return correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
+    """Return the test of correlations of the residuals (samples, p) among all outputs at lags 1 .. `lags`.
 
-    The portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978].
+    It has the portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978].
 
     Args:
         fitted: number of estimated parameters of the noise model, which make residuals look whiter.
@@ -75,11 +75,11 @@ def cross_correlations(
     feedback: bool = False,
     lengths: Sequence[int] | None = None,
 ) -> ResidualTest:
-    """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
+    """Return the score test of whether the past inputs u(t), u(t - 1), .. explain residuals.
 
     Args:
         errors, u: (samples, p), (samples, r).
-        lags: how far back the inputs are looked at.
+        lags: the number of lags of the inputs.
         fitted: number of estimated parameters of the plant, which take as many directions away.
         feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
         lengths: see `whiteness`.
@@ -98,13 +98,13 @@ def cross_correlations(
 
 
 def _most_lags(samples: int, pairs: int, lags: int, fitted: int) -> int:
-    """As many lags as asked for, fewer in a short record, enough for some freedom to be left."""
+    """Return the number of lags asked for, or fewer in a short record, so that some freedom is left."""
     return max(min(lags, samples // (4 * pairs)), fitted // pairs + 1)
 
 
 @dataclass(frozen=True)
 class Tests:
-    """Tests of an estimate against its own records."""
+    """All tests of an estimate against its own records."""
 
     whiteness: ResidualTest  # of the residuals, all channels at once, correlations (lags, p, p)
     independence: ResidualTest  # of residuals and past inputs, correlations (lags, p, r)

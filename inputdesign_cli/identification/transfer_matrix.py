@@ -45,11 +45,11 @@ class TransferKind(Kind):
 
     @property
     def continuous(self) -> bool:
-        """Return whether frequencies of the model are in rad per time unit: not behind a hold."""
+        """Return whether frequencies are in rad per time unit: not if the inputs are held."""
         return not self.between.hold
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
-        """Return y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
+        """Return prediction errors y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
         model = self.model.at(theta)
         errors, psi = y.copy(), np.zeros((theta.size, *y.shape))
         for i, j in model.active:
@@ -62,11 +62,11 @@ class TransferKind(Kind):
         return errors, psi
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
-        """What the past of each output adds: a level, and what the states of its entries do without an input.
+        """Return the effect of the past of each output: a level, and the free response of its entries.
 
-        A level of the input is unknown as well: level and states make it up where poles are stable, not the
-        ramp that an integrator makes of it, nor nearly. Inputs before the record that come late by a dead
-        time move the states, sample by sample, as if from anywhere.
+        A level of the input is unknown as well. Level and states make it up where poles are stable, but not
+        the ramp that an integrator, or nearly one, makes of it. Inputs before the record that come late by a
+        dead time move the states, sample by sample, as if from anywhere.
         """
         if not free:
             return (Start.white(np.zeros((0, samples))),) * self.model.outputs
@@ -82,7 +82,7 @@ class TransferKind(Kind):
         return np.flatnonzero([free and parameter.letter == "a" for parameter in self.model.parameters])
 
     def start_step(self, theta: Array, index: int, samples: int) -> float:
-        """Return a small share of the coefficient, or of that of modes as slow as the record."""
+        """Return a small share of the coefficient, or of its value for modes as slow as the record."""
         parameter = self.model.parameters[index]
         i, j = parameter.places[0]
         slowest = 1.0 / (samples * self.between.sample_time)
@@ -95,11 +95,11 @@ class TransferKind(Kind):
 
     @property
     def instants(self) -> float | None:
-        """Return the time between the steps of held inputs; others make no kinks."""
+        """Return the time between the steps of held inputs; None for others, which make no kinks."""
         return self.between.sample_time if self.between.hold else None
 
     def stabilised(self, theta: Array, samples: int) -> Array:
-        """Return theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
+        """Return theta with poles mirrored into the left half plane, off its edge and off infinity.
 
         Poles that are exactly zero belong to integrators, and stay. Dead times are kept
         positive and below the length of the record.
@@ -119,7 +119,7 @@ class TransferKind(Kind):
         return out
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """The likeliest after a few steps from rest of those made from the parts, and the `given` one."""
+        """Return the likeliest starts after a few steps from rest, and the `given` one."""
         about = Records(self, tuple(parts))
         above = np.array([parameter.letter == "b" for parameter in self.model.parameters])
         made = []
@@ -154,7 +154,7 @@ class TransferKind(Kind):
         return replace(self, held=held)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions by a zero more in a proper entry, or a dead time if it has none."""
+        """Return the extensions by a further zero in a proper entry, or by a dead time if it has none."""
         model = self.model.at(theta)
         none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
         model, larger = replace(model, delay=model.delay or none), []
@@ -176,7 +176,7 @@ class TransferKind(Kind):
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:
-        """Return where the coefficients of each denominator stand in theta."""
+        """Return the indices in theta of the coefficients of each denominator."""
         groups: dict[tuple[tuple[int, int], ...], list[int]] = {}
         for index, parameter in enumerate(self.model.parameters):
             if parameter.letter == "a":
@@ -186,7 +186,7 @@ class TransferKind(Kind):
 
 @lru_cache(maxsize=32)
 def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int) -> Array:
-    """Return what states of an entry, and unknown inputs over `late` samples, do to its output, (m, N)."""
+    """Return the effects (m, N) of an entry's states and of `late` unknown inputs on its output."""
     entry = HeldEntry.of(np.ones(1), np.array(denominator), step)
     impulses = np.eye(min(entry.order + late, samples), samples)
     entering = np.concatenate([impulses, np.ones((int(entry.order > 0), samples))])

@@ -98,7 +98,7 @@ class Signal(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Every setting belongs to the type of signal."""
+        """Check that every setting belongs to the type of signal."""
         for key in self.stated(*_ONLY_FOR):
             types = _ONLY_FOR[key]
             if self.type is not None and self.type not in types:
