@@ -60,7 +60,10 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
     # Over the shape of the noise all lines count alike.
     ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
     freedom = 2 * blocks * lines
-    beyond = np.maximum(np.sum(level - noise, axis=0), 0.0)
+    # Where strong noise at some lines hides the sum, what is beyond it is taken to have its shape.
+    like_noise = (ratio - 1.0) * np.mean(noise / even, axis=0) * np.sum(even, axis=0)
+    plain = np.sum(level - noise, axis=0)
+    beyond = np.where(plain > 0.0, plain, np.maximum(like_noise, 0.0))
     return SilentLines(
         lines,
         np.asarray(ratio),

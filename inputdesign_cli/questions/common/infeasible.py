@@ -194,7 +194,8 @@ def explain(
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
         # Within the same limits information grows in proportion to the length.
         longer = int(np.ceil(question.experiment.samples * nearest.objective))
-        remedies.append(f"with {longer} samples a spectrum can, and a record with somewhat more")
+        enough = units.length(longer)
+        remedies.append(f"with {enough} a spectrum can, and a record with somewhat more")
     try:  # that it is infeasible is proved, whatever else is found out
         with time_for_hints():
             parts += _what_would_do(unreachable, question, involved)

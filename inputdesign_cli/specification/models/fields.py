@@ -70,6 +70,8 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
         place = f"radius {abs(worst):.6g} at {abs(float(np.angle(worst))):.4g} rad/sample"
         message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
         hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
+        if 0.0 in polynomial[1:-1] and all(float(c).is_integer() for c in polynomial):
+            hint += "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
         return PathDiagnostic("unstable-polynomial", message, hint)
 
     return _check_roots(polynomial, np.abs, refuse)
