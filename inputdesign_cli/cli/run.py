@@ -77,12 +77,12 @@ class Place:
 
     @property
     def directory(self) -> Path:
-        """The run directory."""
+        """Return the run directory."""
         return self.into.output or Path("runs") / self.name
 
     @property
     def origin(self) -> Origin:
-        """What the run is made from."""
+        """Return what the run is made from: sources, command and judges."""
         from inputdesign_cli.outcome.origin import Origin
 
         return Origin(self.sources, self.asked, self.into.overwrite, self.judges)

@@ -85,7 +85,7 @@ def prepare_signals() -> None:
 
 @contextmanager
 def ending_early(stop: Callable[[], None]) -> Iterator[list[int]]:
-    """The first Ctrl-C or SIGTERM asks for the end by `stop`, the next one ends the program as usual.
+    """Call `stop` at the first Ctrl-C or SIGTERM; the next one ends the program as usual.
 
     The list has the number of the signal that came.
     """

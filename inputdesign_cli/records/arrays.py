@@ -140,7 +140,7 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, NDArray]]:
 
 
 def _wrong(array: NDArray) -> str:
-    """What an array holds that is no column of numbers; nothing where it is one."""
+    """Return the name of the content of an array that is no column of numbers; empty where it is one."""
     kind = array.dtype.kind
     if array.size == 0:
         return "nothing"

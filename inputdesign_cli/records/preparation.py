@@ -14,7 +14,7 @@ Run = tuple[str, int, int]
 
 @dataclass(frozen=True)
 class Preparation:
-    """How a record is to be read and prepared.
+    """Describes how a record is to be read and prepared.
 
     Attributes:
         columns: channel (`u1`, `y1`, `time`) -> name or number of its column.

@@ -21,7 +21,7 @@ _NORMAL = 1.96  # standard deviations to either side of 95 %
 
 @dataclass(frozen=True)
 class Rows:
-    """A table: the first column holds names, the others numbers."""
+    """Holds a table: the first column has names, the others numbers."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]

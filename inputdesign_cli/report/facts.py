@@ -14,7 +14,7 @@ _GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses 
 
 
 class Fact(NamedTuple):
-    """A line of a table: its name, the value, and a note that may be empty."""
+    """Holds a line of a table: its name, the value, and a note that may be empty."""
 
     name: str
     value: str

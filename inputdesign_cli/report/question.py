@@ -35,7 +35,7 @@ class Question:
 
 
 def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:
-    """The question of the spec of a run.
+    """Return the question of the spec of a run.
 
     Args:
         text: the spec as resolved (YAML).
@@ -104,7 +104,7 @@ def _structure(spec: Spec) -> str:
 
 
 def _objective(spec: Spec) -> str:
-    """The `objective.kind` of the result."""
+    """Return the `objective.kind` of the result."""
     if spec.goal != "best_accuracy":
         return spec.goal
     errors = ("closed_loop_error", "mean_squared_error")

@@ -60,7 +60,7 @@ def _is_sweep(directory: Path) -> bool:
 
 
 def is_page(file: Path) -> bool:
-    """Whether a file is a page that was made here."""
+    """Return whether a file is a page that was made here."""
     try:
         return _GENERATOR in read_regular(file)[:1000]
     except OSError:

@@ -28,7 +28,7 @@ _TRIED = 50
 
 @dataclass(frozen=True)
 class Plan:
-    """The points of a sweep, in order; `source` is the file of the spec, or standard input."""
+    """Holds the points of a sweep, in order; `source` is the file of the spec, or standard input."""
 
     draft: SpecTemplate
     grid: Grid

@@ -49,7 +49,7 @@ Solve = Callable[[Spec], Result]
 
 @dataclass(frozen=True)
 class Draft:
-    """A spec as facts for its template, and the files next to it."""
+    """Holds a spec as facts for its template, and the files next to it."""
 
     facts: Mapping[str, object]  # what the template knows by name
     files: Mapping[str, bytes]
@@ -62,7 +62,7 @@ class Draft:
 
     @property
     def text(self) -> str:
-        """The spec."""
+        """Return the text of the spec."""
         known = {**self.facts, "spectrum": self.spectrum, "why": self.why}
         return filled("inputdesign_cli.wizard", "experiment.txt", known)
 
@@ -183,7 +183,7 @@ def _spectra(samples: int) -> list[tuple[str, str]]:
 
 
 class Conversation:
-    """Questions one by one: an answer that cannot be used is refused at once, and asked for again."""
+    """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again."""
 
     def __init__(self, known: Mapping[str, str], stem: str, folder: Path) -> None:
         """Begin with what is known; stem and folder as of `compose`."""
@@ -193,7 +193,7 @@ class Conversation:
 
     @property
     def question(self) -> Question | None:
-        """The next question, or None."""
+        """Return the next question; None if all are answered."""
         there = {*self._answers, *known_from(self._answers)}
         return next((one for one in QUESTIONS if one.key not in there), None)
 

@@ -28,7 +28,7 @@ _LONG = 100_000  # samples after which no pole of a log remembers anything
 
 @dataclass(frozen=True)
 class _Level:
-    """The variance of the innovation, the pole of the noise (0: white), and how they are known."""
+    """Holds the variance of the innovation, the pole of the noise (0: white), and how they are known."""
 
     variance: float
     pole: float
@@ -86,7 +86,7 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
 
 
 def _moves(noise: Noise) -> bool:
-    """Return whether noise drifts, or remembers so long that it cannot be told from drift in a record."""
+    """Return whether noise drifts, or is correlated so long that it looks like drift in a record."""
     longest = min(abs(float(np.sum(row))) for row in _per_output(noise.D, 1))
     return bool(np.any(noise.drift)) or longest < _STEADY
 

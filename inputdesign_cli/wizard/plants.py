@@ -37,7 +37,7 @@ _REJECTED = (
 
 @dataclass(frozen=True)
 class PlantAnswer:
-    """What is known of the plant."""
+    """Holds what is known of the plant."""
 
     lines: tuple[str, ...]  # of the spec, with comments
     slow: float  # its slowest time constant, in seconds
@@ -56,7 +56,7 @@ class PlantAnswer:
 
     @property
     def sample_time(self) -> float:
-        """Seconds between samples: a twentieth of the time constant, where nothing else is known."""
+        """Return the sample time in seconds: a twentieth of the time constant, if nothing else is known."""
         return _round_step(self.slow / 20.0) if self.sampling is None else self.sampling
 
 

@@ -26,7 +26,7 @@ _WITHIN = {
 
 @dataclass(frozen=True)
 class Range:
-    """The amplitude about an operating point."""
+    """Holds the amplitude about an operating point."""
 
     amplitude: float
     offset: float
