@@ -74,7 +74,7 @@ def _declared(one: Parameter, kind: type, owner: str, *, is_argument: bool = Fal
 
 
 def path_option(text: str) -> Path:
-    """Return the path that an option gives; an empty text (of a variable that is not set) is none."""
+    """Return the path that an option gives; refuse an empty text, as of a variable that is not set."""
     if not text.strip():
         raise typer.BadParameter("the name is empty")
     return Path(text)
@@ -167,7 +167,7 @@ class Changes:
     confine: Path | None = None
 
     def faster(self, fast: bool) -> Changes:
-        """Return the changes, without the bound over every spectrum if it is to go fast."""
+        """Return the changes, without the bound over every spectrum if the run is to be fast."""
         more = ["solver.any_spectrum=false"] * fast
         return replace(self, overrides=[*(self.overrides or []), *more])
 
@@ -193,14 +193,14 @@ class Shown:
 
 @dataclass(frozen=True)
 class Workers:
-    """Where a command computes: in its own process, in several, or on a cluster."""
+    """Describes where a command computes: in its own process, in several, or on a cluster."""
 
     jobs: int = 1
     cluster: str | None = None
     worker_timeout: float | None = None
 
     def executor(self, *, quiet: bool) -> Executor:
-        """Return what computes; an address comes first."""
+        """Return what computes: a cluster if an address is given, else one or more processes here."""
         from inputdesign_cli.compute.cluster import Cluster
         from inputdesign_cli.compute.executor import InProcess
         from inputdesign_cli.compute.processes import Processes

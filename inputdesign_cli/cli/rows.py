@@ -22,7 +22,7 @@ TimeUnit = Literal["s", "ms", "us", "min", "h", "d"]
 
 @dataclass(frozen=True)
 class Levels:
-    """What the channels of a record vary about."""
+    """Holds the levels about which the channels of a record vary."""
 
     remove_means: bool = False
     operating_point: str = ""
@@ -35,7 +35,7 @@ class Levels:
 
 @dataclass(frozen=True)
 class Written:
-    """How a text file is written, where it does not show it, and which column is which."""
+    """Describes how a text file is written, where it does not show it, and which column is which."""
 
     columns: str = ""
     separator: str | None = None
@@ -66,7 +66,7 @@ class Written:
 
 @dataclass(frozen=True)
 class Rows(Written):
-    """How the rows of data files become samples."""
+    """Describes how the rows of data files become samples."""
 
     sample_time: float | None = None
     time_unit: TimeUnit | None = None

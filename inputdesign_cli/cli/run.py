@@ -56,13 +56,13 @@ def standard_input() -> str:
 
 
 def name_of(file: Path) -> str:
-    """Return the name of a spec in names of directories."""
+    """Return the name of a spec for use in names of directories."""
     return "stdin" if str(file) == STANDARD_STREAM else file.stem
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run goes, else to runs/`name`; what it was made from, the spec first."""
+    """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first."""
 
     into: Into
     name: str
@@ -82,7 +82,7 @@ class Place:
 
     @property
     def origin(self) -> Origin:
-        """Return what the run is made from: sources, command and judges."""
+        """Return the origin of the run: its files and the text of its spec."""
         from inputdesign_cli.outcome.origin import Origin
 
         return Origin(self.sources, self.asked, self.into.overwrite, self.judges)

@@ -84,7 +84,7 @@ def complain(error: IdesignError) -> None:
 
 
 def _refusal(error: OSError | MemoryError) -> Diagnostic:
-    """Return the diagnostic of what the operating system refuses to the whole program."""
+    """Return the diagnostic of a refusal of the operating system that ends the program."""
     if isinstance(error, MemoryError):
         return Diagnostic(
             "system-refuses", "there is not enough memory", "shorten the record or lower the order"

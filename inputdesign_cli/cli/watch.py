@@ -85,7 +85,7 @@ def watch(
 
 
 def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figures: bool) -> None:
-    """Solve and show, again and again."""
+    """Solve the spec and show its page, again and again."""
     from inputdesign_cli.live.pages import Followed, stamp, wait_for_change
     from inputdesign_cli.questions import run_verb
 

@@ -125,7 +125,7 @@ def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
 
 @dataclass(frozen=True)
 class _Error:
-    """One r_u (n,) or its ratio, and how it is drawn wherever it is."""
+    """Holds one r_u (n,) or its ratio, and its style in all figures."""
 
     name: str
     values: Array

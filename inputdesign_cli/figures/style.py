@@ -101,7 +101,7 @@ def lowered(*indices: str | int) -> str:
 
 
 class _LogTicks(LogFormatterSciNotation):
-    """10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
+    """Writes 10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         formula = re.fullmatch(r"\$\\mathdefault\{(.*?)(?:\^\{(.*)\})?\}\$", super().__call__(x, pos))
@@ -114,7 +114,7 @@ _SYMBOL = re.compile(r"\br_(u|adm)\b")
 
 
 class Page(Figure):
-    """A figure that a notebook shows, whether pyplot has been imported or not."""
+    """Makes a figure that a notebook shows, whether pyplot has been imported or not."""
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()

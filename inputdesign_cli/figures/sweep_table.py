@@ -31,7 +31,7 @@ class SweepAxis:
 
 @dataclass(frozen=True)
 class SweepContent:
-    """What `sweep.json` says of a sweep."""
+    """Holds the content of `sweep.json`."""
 
     verb: Literal["solve", "analyse", "simulate"]
     axes: tuple[SweepAxis, ...]

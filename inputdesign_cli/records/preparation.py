@@ -43,5 +43,5 @@ class Preparation:
 
     @property
     def levels(self) -> Mapping[str, float]:
-        """Return the levels of the signals by channel: the operating point, if that is what is taken away."""
+        """Return the levels taken away, by channel: the operating point, unless trends are removed."""
         return self.operating_point if self.detrend == "none" else {}

@@ -42,7 +42,7 @@ class Record(Samples):
         header: the names of the columns of the first file, in small letters.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
         repeated: files that have samples in common.
-        lined: whether a line was taken away from an output: its slope is then estimated with the model, since
+        lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
             the inputs cause a part of it.
         remarks: what a question did to the record later.
     """
@@ -75,7 +75,7 @@ class Record(Samples):
         return tuple((name, int(count)) for (name, _), count in zip(self.files, counts, strict=True))
 
     def at(self, samples: NDArray[np.int64], lengths: tuple[int, ...]) -> Record:
-        """Return some of the samples, in segments of these lengths."""
+        """Return the record at some of the samples, in segments of these lengths."""
         return replace(
             self,
             u=self.u[samples],

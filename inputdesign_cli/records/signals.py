@@ -56,7 +56,7 @@ class Signals:
     findings: tuple[Finding, ...] = ()
 
     def at(self, rows: NDArray[np.int64]) -> Signals:
-        """Return some of the rows."""
+        """Return the signals in some of the rows."""
         texts = [self.sheet.texts[i] for i in rows.tolist()] if self.sheet.texts else ()
         sheet = replace(self.sheet, lines=self.sheet.lines[rows], texts=texts)
         u, y, time = self.u[rows], self.y[rows], self.time[rows]
@@ -196,7 +196,7 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
 
 
 def typical_step(time: Array) -> float:
-    """Return the mean step of time, gaps apart, rounded where rounding alone may be the difference."""
+    """Return the mean step of time without gaps, rounded where the difference may be rounding."""
     steps = np.diff(time[~np.isnan(time)])
     middle = float(np.median(steps)) if steps.size else 0.0
     near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]

@@ -29,7 +29,7 @@ _OF_RUNS = ("errors", "cloud", "disturbance")
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
+    """Holds a picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
 
     uri: str
     caption: str

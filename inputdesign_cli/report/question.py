@@ -88,7 +88,7 @@ def _sentences(spec: Spec, verb: str, family: str) -> list[str]:
 
 
 def _units(spec: Spec) -> str:
-    """Return in which units the numbers are."""
+    """Return the units of the numbers in words."""
     named = [f"{name} in {one.unit}" for name, one in (spec.channels or {}).items() if one.unit]
     signals = ", ".join(named) or "signals in the units of the spec"
     clock = f"time in {spec.time_unit}, frequencies in rad/{spec.time_unit}"

@@ -45,7 +45,7 @@ def bibtex_text(directory: Path) -> str:
 
 
 def _is_sweep(directory: Path) -> bool:
-    """Return whether there is a sweep; else there is a run.
+    """Return whether a directory holds a sweep; else it holds a run.
 
     Raises:
         DataError: `run-missing`, there is neither.

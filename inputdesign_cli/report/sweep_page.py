@@ -95,7 +95,7 @@ def _columns(table: SweepTable) -> list[tuple[str, str]]:
 
 
 def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, Outcome]:
-    """Return the question and the result of the first point that has one: they speak for the others."""
+    """Return the question and the result of the first point that has one, as examples of all points."""
     run = next((run for run in table.columns["run"] if run), None)
     if run is None:
         return None, Outcome()

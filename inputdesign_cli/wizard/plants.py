@@ -133,7 +133,7 @@ _Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST)]  # NaN i
 
 
 class System(BaseModel):
-    """What a system of python-control in JSON may hold."""
+    """Holds a system of python-control as JSON describes it."""
 
     model_config = ConfigDict(extra="forbid")
     num: list[_Number]
