@@ -34,7 +34,7 @@ class EllipsoidError(OnModelError):
     against: Literal["relative", "absolute"] = "relative"
 
     def _forms(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the coefficients z (n, k), c (n, k), c_0 (n,) of the entry."""
+        """Return the terms z (n, k), c (n, k) and c_0 (n,) of |z^T d| = |c_0 + c^T d| for the entry."""
         output, input = self.entry or (0, 0)
         part = self.experiment.model.entry_fraction(output, input, w)
         above = self.experiment.whiten_rows(part.numerator_gradient)

@@ -63,11 +63,11 @@ class Requirement(ABC):
         """Return the cone that enforces the requirement at this frequency."""
 
     def most(self, information: Array) -> float:
-        """Return an upper bound on the ratio, without the search for its maximum where that is long."""
+        """Return an upper bound on the largest ratio, without a slow search for it."""
         return worst(self.violations(information)).ratio
 
     def least(self, information: Array) -> float:
-        """Return a lower bound on the ratio, in the same way."""
+        """Return a lower bound on the largest ratio, without a slow search for it."""
         return worst(self.violations(information)).ratio
 
     def worst(self, information: Array) -> Violation:

@@ -84,7 +84,7 @@ for command in COMMANDS:
 
 
 def main() -> None:
-    """The `idesign` command."""
+    """Run the `idesign` command."""
     prepare_streams()
     prepare_signals()
     use_one_thread()  # numpy, which reads it, has not been imported yet

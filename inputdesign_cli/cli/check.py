@@ -82,7 +82,7 @@ def _compare(
 
 
 def _found(path: Path) -> Path:
-    """The file of this name, or else that of the package, with or without its ending.
+    """Return the file of this name, or else the golden file of the package, with or without its ending.
 
     Raises:
         DataError: `golden-missing`, there is neither.
@@ -107,7 +107,7 @@ def _default_files() -> list[Path]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """The comparison as aligned text; where a number is missing, the reason follows its line."""
+    """Return the comparison as aligned text; where a number is missing, the reason follows its line."""
     from rich.text import Text
 
     cells: list[tuple[str | Text, ...]] = [tuple(Text(name, "bold") for name in HEADER)]
@@ -133,7 +133,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def junit_text(rows: Sequence[Row], seconds: Seconds, error: IdesignError | None = None) -> str:
-    """A suite for each golden file and in it a test case for each quantity.
+    """Return JUnit XML with a suite for each golden file and a test case for each of its quantities.
 
     Args:
         rows: the comparison, file by file.

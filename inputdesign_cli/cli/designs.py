@@ -76,7 +76,7 @@ def simulate(spec: Path, *, changes: Changes, into: Into, workers: Workers, show
 def _results(
     verb: Verb, file: Path, changes: Changes, into: Into, shown: Shown, executor: Executor | None = None
 ) -> tuple[Results, Place]:
-    """Return what a verb makes of a spec file, and its place, which is checked before.
+    """Return the results of a verb for a spec file and the place of the run, which is checked before.
 
     The numerical libraries are imported behind the message.
     """

@@ -74,7 +74,7 @@ def _declared(one: Parameter, kind: type, owner: str, *, is_argument: bool = Fal
 
 
 def path_option(text: str) -> Path:
-    """Return the path that an option gives; an empty text (of a variable that is not set) is none."""
+    """Return the path that an option gives; refuse an empty text, as of a variable that is not set."""
     if not text.strip():
         raise typer.BadParameter("the name is empty")
     return Path(text)
@@ -107,7 +107,7 @@ def _trade_words(text: str | None) -> str | None:
 
 
 def error_codes(incomplete: str) -> list[tuple[str, str]]:
-    """The codes that `idesign explain` knows, with their titles."""
+    """Return the codes that `idesign explain` knows, with their titles."""
     from inputdesign_cli.findings import explanations
 
     known = sorted(explanations().items())
@@ -115,7 +115,7 @@ def error_codes(incomplete: str) -> list[tuple[str, str]]:
 
 
 def spec_keys(incomplete: str) -> list[str]:
-    """The keys of a spec as `--set` takes them, and behind the equals sign the words that a key takes."""
+    """Return the keys of a spec that `--set` takes, and behind the equals sign the words that a key takes."""
     from inputdesign_cli.specification import json_schema
 
     schema = json_schema()
@@ -128,7 +128,7 @@ def spec_keys(incomplete: str) -> list[str]:
 
 
 def _entries(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The paths of all keys that hold values: through references and alternatives, not into lists."""
+    """Yield the paths of all keys that hold values: through references and alternatives, not into lists."""
     if "$ref" in node:
         yield from _entries(root["$defs"][node["$ref"].rpartition("/")[2]], root, path)
     for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
@@ -141,7 +141,7 @@ def _entries(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[
 
 
 def _words(node: dict[str, Any]) -> Iterator[str]:
-    """The texts that a value may be, where it is one of a few."""
+    """Yield the texts that a value may be, where it is one of a few."""
     listed = [*node.get("enum", ()), *([node["const"]] if "const" in node else ())]
     yield from (word for word in listed if isinstance(word, str))
     if node.get("type") == "boolean":
@@ -161,20 +161,20 @@ _CALLS: dict[str, Callable[..., object]] = {
 
 @dataclass(frozen=True)
 class Changes:
-    """What is changed in a spec, and which files it may name."""
+    """Holds the changes of a spec, and the files that it may name."""
 
     overrides: list[str] | None = None
     confine: Path | None = None
 
     def faster(self, fast: bool) -> Changes:
-        """Return the changes, without the bound over every spectrum if it is to go fast."""
+        """Return the changes, without the bound over every spectrum if the run is to be fast."""
         more = ["solver.any_spectrum=false"] * fast
         return replace(self, overrides=[*(self.overrides or []), *more])
 
 
 @dataclass(frozen=True)
 class Into:
-    """Where a run goes."""
+    """Holds the place of a run."""
 
     output: Path | None = None
     overwrite: bool = False
@@ -183,7 +183,7 @@ class Into:
 
 @dataclass(frozen=True)
 class Shown:
-    """What is drawn and printed of a run."""
+    """Holds what is drawn and printed of a run."""
 
     figures: bool = True
     figure_format: Literal["png", "svg", "pdf"] | None = None
@@ -193,14 +193,14 @@ class Shown:
 
 @dataclass(frozen=True)
 class Workers:
-    """Where a command computes: in its own process, in several, or on a cluster."""
+    """Describes where a command computes: in its own process, in several, or on a cluster."""
 
     jobs: int = 1
     cluster: str | None = None
     worker_timeout: float | None = None
 
     def executor(self, *, quiet: bool) -> Executor:
-        """Return what computes; an address comes first."""
+        """Return what computes: a cluster if an address is given, else one or more processes here."""
         from inputdesign_cli.compute.cluster import Cluster
         from inputdesign_cli.compute.executor import InProcess
         from inputdesign_cli.compute.processes import Processes

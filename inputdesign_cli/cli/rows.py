@@ -22,20 +22,20 @@ TimeUnit = Literal["s", "ms", "us", "min", "h", "d"]
 
 @dataclass(frozen=True)
 class Levels:
-    """What the channels of a record vary about."""
+    """Holds the levels about which the channels of a record vary."""
 
     remove_means: bool = False
     operating_point: str = ""
 
     @property
     def point(self) -> dict[str, float]:
-        """The operating point by channel."""
+        """Return the operating point by channel."""
         return levels(self.operating_point)
 
 
 @dataclass(frozen=True)
 class Written:
-    """How a text file is written, where it does not show it, and which column is which."""
+    """Describes how a text file is written, where it does not show it, and which column is which."""
 
     columns: str = ""
     separator: str | None = None
@@ -66,7 +66,7 @@ class Written:
 
 @dataclass(frozen=True)
 class Rows(Written):
-    """How the rows of data files become samples."""
+    """Describes how the rows of data files become samples."""
 
     sample_time: float | None = None
     time_unit: TimeUnit | None = None
@@ -124,7 +124,7 @@ def span(text: str, option: str, form: str) -> tuple[float, float]:
 
 
 def levels(text: str) -> dict[str, float]:
-    """`u1=40,y1=52.3` as numbers; u and y are u1 and y1.
+    """Parse `u1=40,y1=52.3` as numbers by channel; u and y are u1 and y1.
 
     Raises:
         typer.BadParameter: The text is something else.
@@ -141,7 +141,7 @@ def levels(text: str) -> dict[str, float]:
 
 
 def _named(text: str, option: str, example: str) -> dict[str, str]:
-    """`u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
+    """Parse `u1=a,y1=b` by channel; u, y and r are u1, y1 and r1.
 
     Raises:
         typer.BadParameter: A part has no `=`, or names nothing.
@@ -162,7 +162,7 @@ def _named(text: str, option: str, example: str) -> dict[str, str]:
 
 
 def _runs(text: str, data: Sequence[Path]) -> Iterator[Run]:
-    """Rows as in 183-240,310, of several files with the name of one before each run.
+    """Parse rows as in 183-240,310; with several files, the name of one stands before each run.
 
     Raises:
         typer.BadParameter: A part is something else, or its file is not clear.

@@ -56,13 +56,13 @@ def standard_input() -> str:
 
 
 def name_of(file: Path) -> str:
-    """Return the name of a spec in names of directories."""
+    """Return the name of a spec for use in names of directories."""
     return "stdin" if str(file) == STANDARD_STREAM else file.stem
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run goes, else to runs/`name`; what it was made from, the spec first."""
+    """Holds the place of a run, by default runs/`name`, and the files it is made from, the spec first."""
 
     into: Into
     name: str
@@ -77,12 +77,12 @@ class Place:
 
     @property
     def directory(self) -> Path:
-        """The run directory."""
+        """Return the run directory."""
         return self.into.output or Path("runs") / self.name
 
     @property
     def origin(self) -> Origin:
-        """What the run is made from."""
+        """Return the origin of the run: its files and the text of its spec."""
         from inputdesign_cli.outcome.origin import Origin
 
         return Origin(self.sources, self.asked, self.into.overwrite, self.judges)

@@ -26,7 +26,7 @@ _SMALLEST, _LARGEST = 1e-15, 1e15
 
 @dataclass(frozen=True)
 class Kinds:
-    """The kinds of signals, of which one is made."""
+    """Holds the kinds of signals, of which one is made."""
 
     prbs: int | None = None
     multisine: int | None = None
@@ -52,7 +52,7 @@ class Kinds:
 
 @dataclass(frozen=True)
 class Form:
-    """How long a signal is, how far it reaches, and what holds for some kinds only."""
+    """Holds the length and the range of a signal, and what holds for some kinds only."""
 
     samples: int | None = None
     span: str = "-1:1"

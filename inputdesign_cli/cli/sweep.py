@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is swept, and how failures count."""
+    """Holds what is swept, and how failures count."""
 
     settings: list[str] | None = None
     zipped: bool = False
@@ -136,7 +136,7 @@ def _list(points: Iterable[Listing], *, json_output: bool) -> None:
 
 
 def pace(progress: SweepRun, seconds: float) -> str:
-    """The points, the rate, the time left and the failures. Points done before do not count as speed."""
+    """Return the points done, their rate, the time left and the failures. Points done before add no speed."""
     told = [f"{progress.passed}/{progress.total}"]
     if progress.computed and seconds > 0:
         rate = progress.computed / seconds

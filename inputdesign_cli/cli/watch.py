@@ -85,7 +85,7 @@ def watch(
 
 
 def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figures: bool) -> None:
-    """Solve and show, again and again."""
+    """Solve the spec and show its page, again and again."""
     from inputdesign_cli.live.pages import Followed, stamp, wait_for_change
     from inputdesign_cli.questions import run_verb
 
@@ -122,7 +122,7 @@ def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figur
 
 
 def _named_files(spec: Path, overrides: list[str]) -> list[Path]:
-    """The files that the spec includes or names, where it can be read."""
+    """Return the files that the spec includes or names, where it can be read."""
     from inputdesign_cli.specification import read_template
 
     try:
@@ -134,7 +134,7 @@ def _named_files(spec: Path, overrides: list[str]) -> list[Path]:
 
 @contextmanager
 def _given_up_when_saved(files: list[Path], before: Stamp) -> Iterator[None]:
-    """What is computed inside ends at the next round once a file is saved."""
+    """Stop the computation inside at its next round once a file is saved."""
     from inputdesign_cli.compute.time_limit import stoppable
     from inputdesign_cli.live.pages import stamp
 

@@ -102,7 +102,7 @@ def _result(spec: Spec) -> Result:
 
 
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
-    """The draft of somebody at the terminal, who is asked again where an answer cannot be used."""
+    """Ask for a draft at the terminal, again where an answer cannot be used."""
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.composing import Conversation
     talk = Conversation(known, output.stem, output.parent)
@@ -118,7 +118,7 @@ def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
 
 
 def _typed(one: Question) -> str:
-    """What is typed at the prompt of a question; its default stands there greyed until something is."""
+    """Return what is typed at the prompt of a question; its default stands there in grey before."""
     import questionary
 
     default = one.default or ""

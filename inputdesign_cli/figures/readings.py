@@ -71,7 +71,7 @@ def _labels(axes: Axes) -> tuple[str, str]:
 
 
 def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, object]]:
-    """A named curve over the axis; not a limit across it, and no marks."""
+    """Yield the readings of a named curve over the axis; limits across it and marks have none."""
     name = str(line.get_label()).strip()
     if not name or name.startswith("_") or line.get_transform() != axes.transData:
         return
@@ -83,7 +83,7 @@ def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, object]]:
 
 
 def _along(axes: Axes, line: Traced) -> dict[str, object]:
-    """The points of a curve in the plane that are within the axes."""
+    """Return the readings of a curve in the plane at its points within the axes."""
     x, y = (np.asarray(line.get_data()[k], dtype=float) for k in (0, 1))
     across, down = axes.transAxes.inverted().transform(axes.transData.transform(np.stack([x, y], 1))).T
     shown = np.flatnonzero((across >= 0.0) & (across <= 1.0) & (down >= 0.0) & (down <= 1.0))
@@ -108,7 +108,7 @@ def _rounded(values: Array) -> list[float]:
 
 
 def _points(line: Line2D) -> tuple[Array, Array]:
-    """The points (n,) of a curve at which it has a value."""
+    """Return the points x, y (n,) of a curve at which it has a value."""
     x, y = (np.asarray(line.get_data()[k], dtype=float).ravel() for k in (0, 1))
     there = np.isfinite(x) & np.isfinite(y)
     return x[there], y[there]

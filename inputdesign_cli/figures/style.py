@@ -94,14 +94,14 @@ _LABELLED = ("1", "3")
 
 
 def lowered(*indices: str | int) -> str:
-    """Indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
+    """Return indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
     texts = [str(index) for index in indices]
     apart = "," if len(texts) > 1 and any(len(text) > 1 for text in texts) else ""
     return apart.join(texts).translate(_LOWERED)
 
 
 class _LogTicks(LogFormatterSciNotation):
-    """10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
+    """Writes 10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         formula = re.fullmatch(r"\$\\mathdefault\{(.*?)(?:\^\{(.*)\})?\}\$", super().__call__(x, pos))
@@ -114,7 +114,7 @@ _SYMBOL = re.compile(r"\br_(u|adm)\b")
 
 
 class Page(Figure):
-    """A figure that a notebook shows, whether pyplot has been imported or not."""
+    """Makes a figure that a notebook shows, whether pyplot has been imported or not."""
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
@@ -170,7 +170,7 @@ def _look(width: Width) -> dict[Any, Any]:
 
 
 def painted(paint: Callable[[Figure], object], width: Width = "page") -> Figure:
-    """The figure that `paint` draws on an empty page."""
+    """Return the figure that `paint` draws on an empty page."""
     with mpl.rc_context(_look(width)):
         page = Page(figsize=_SIZES[width][:2], dpi=DPI, layout="constrained")
         paint(page)
@@ -202,7 +202,7 @@ def _strokes(axes: Axes) -> None:
 
 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
-    """A logarithmic axis over the positive ones of `frequencies`, in rad per time unit."""
+    """Make the horizontal axis logarithmic over the positive `frequencies`, in rad per time unit."""
     positive = frequencies[frequencies > 0]
     if positive.size:
         log_axes(axes, "x")
@@ -212,7 +212,7 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
 
 
 def frequency_label(time_unit: str) -> str:
-    """What an axis of frequencies is called."""
+    """Return the label of an axis of frequencies."""
     return f"frequency ω (rad/{time_unit})"
 
 
@@ -241,7 +241,7 @@ def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
 
 
 def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
-    """Black or white, which stands out more on the colour of a value, drawn on white."""
+    """Return black or white, whichever stands out more on the colour of a value, drawn on white."""
     colour = cell.to_rgba(np.array(value))
     light = [float(channel) * opaque + 1.0 - opaque for channel in colour[:3]]
     # Relative luminance, and where black and white have the same contrast, by WCAG 2.
@@ -251,7 +251,7 @@ def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
 
 
 def marked(axes: Axes, x: Array, y: Array, *, color: str = BLUE, label: str = "") -> None:
-    """Rings around points of a curve, if there are any."""
+    """Draw rings around points of a curve, if there are any."""
     if x.size:
         (rings,) = axes.plot(x, y, "o", markersize=6, clip_on=False, zorder=5, label=label)
         rings.set(markerfacecolor="white", markeredgecolor=color, markeredgewidth=1.5)
@@ -260,7 +260,7 @@ def marked(axes: Axes, x: Array, y: Array, *, color: str = BLUE, label: str = ""
 def band(
     axes: Axes, x: Array, low: Array, high: Array | float, color: str, alpha: float | None, **more: Any
 ) -> None:
-    """A shade between two curves."""
+    """Draw a shade between two curves."""
     axes.fill_between(x, low, high, color=color, alpha=alpha, linewidth=0, **more)
 
 
@@ -276,7 +276,7 @@ def limiting_label(count: int) -> str:
 
 
 def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> None:
-    """What is admitted, drawn alike wherever it is: a dashed line, and beyond it a shade.
+    """Draw the admitted error r_adm as a dashed line with a shade beyond it, alike in all figures.
 
     To be called last: the shade ends where the axis does.
     """
@@ -296,23 +296,23 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
 def stroke(number: int, colours: Sequence[str] = PALETTE) -> tuple[str, LineStyleType]:
-    """Colour and dashes of a curve by its number from zero: other dashes where the colours are used up."""
+    """Return colour and dashes of a curve by its number from zero; dashes change once colours run out."""
     again, place = divmod(number, len(colours))
     return colours[place], _DASHES[again % len(_DASHES)]
 
 
 def point(number: int) -> tuple[str, str]:
-    """Colour and marker of a set of points by its number from zero: no two of the first 42 are alike."""
+    """Return colour and marker of a set of points by its number from zero; the first 42 are distinct."""
     return PALETTE[number % len(PALETTE)], _MARKERS[number % len(_MARKERS)]
 
 
 def positive(values: Array) -> Array:
-    """`values` with gaps where a logarithmic axis has no place for them (an r_adm below zero, say)."""
+    """Return `values` with NaN where a logarithmic axis has no place for them (an r_adm below zero, say)."""
     return np.where(values > 0, values, np.nan)
 
 
 def labelled(*panels: Axes) -> list[Artist]:
-    """What has a label, in the order in which it was drawn; of equal labels the first."""
+    """Return the artists with a label, in the order in which they were drawn; of equal labels the first."""
     found: dict[str, Artist] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -321,7 +321,7 @@ def labelled(*panels: Axes) -> list[Artist]:
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
-    """A legend over the axes, where it cannot cover a curve: all that has a label, or `handles`."""
+    """Draw a legend over the axes, where it covers no curve: of all that has a label, or of `handles`."""
     page = axes.get_figure(root=True)
     assert page is not None
     handles = labelled(axes) if handles is None else handles
@@ -335,7 +335,7 @@ def _form(handles: Sequence[Artist], page: Figure) -> dict[str, Any]:
 
 
 def _columns(labels: Sequence[str], inches: float) -> int:
-    """The most columns of a legend, filled one after the other, that a page so wide has room for."""
+    """Return the most columns of a legend, filled one after the other, for which the page is wide enough."""
     room = inches * _LETTERS_PER_INCH * TYPE_SIZE / float(mpl.rcParams["font.size"])
     for columns in range(len(labels), 1, -1):
         shared = np.array_split([_width(label) for label in labels], columns)
@@ -346,12 +346,12 @@ def _columns(labels: Sequence[str], inches: float) -> int:
 
 
 def _width(label: str) -> float:
-    """In letters of usual width: capitals are wider."""
+    """Return the width of a label in letters of usual width: capitals are wider."""
     return len(label) + _WIDER * sum(letter.isupper() for letter in label)
 
 
 def title_above(page: Figure, title: str) -> None:
-    """A title of the page, in as many lines as it takes; none if it is empty."""
+    """Draw the title of the page, in as many lines as it takes; none if it is empty."""
     if title:
         page.suptitle(_wrapped(page, title), x=0.01, ha="left")
 
@@ -362,7 +362,7 @@ def _wrapped(page: Figure, title: str) -> str:
 
 
 def legend_over_all(page: Figure, handles: Sequence[Artist] | None = None, title: str = "") -> None:
-    """One legend for all panels of a page, above them: all that has a label, or `handles`."""
+    """Draw one legend for all panels of a page, above them: of all that has a label, or of `handles`."""
     handles = labelled(*page.axes) if handles is None else handles
     title, form = _wrapped(page, title), _form(handles, page)
     page.legend(handles=handles, loc="outside upper left", title=title, alignment="left", **form)

@@ -18,7 +18,7 @@ from inputdesign_cli.plant.model import Listed
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""
 
-# Of a parameter, or of one, for central differences.
+# Step of central differences, times max(|theta|, 1).
 _STEP = 1e-6
 FADED = 2000
 """Samples after which noise that fades has faded."""
@@ -64,7 +64,7 @@ class Kind(ABC):
 
     @property
     def recent(self) -> int:
-        """Return the largest lag at which inputs act directly; at larger lags they act through poles."""
+        """Return the largest lag at which an input enters directly; older inputs act through the poles."""
         return 0
 
     @property

@@ -29,7 +29,7 @@ _OF_RUNS = ("errors", "cloud", "disturbance")
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
+    """Holds a picture for an <img>: its data, a caption, and values for who points at it (JSON)."""
 
     uri: str
     caption: str
@@ -66,7 +66,7 @@ def captioned(curves: Curves) -> str:
 
 
 def _highest(error: Array | None, admitted: Array | None) -> float:
-    """Return the largest ratio (n,) of what there is; zero if something is missing."""
+    """Return the largest of the ratios (n,) that are known; zero if something is missing."""
     return 0.0 if error is None or admitted is None else float(np.nanmax(error / admitted))
 
 

@@ -23,7 +23,7 @@ _WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
 @dataclass(frozen=True)
 class Axis:
-    """A key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
+    """Holds a key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
 
     key: str
     texts: tuple[str, ...]
@@ -31,7 +31,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Grid:
-    """The points as tuples of texts, one per axis; computed when asked for. The last axis runs fastest."""
+    """Generates the points as tuples of texts, one per axis, when asked for. The last axis runs fastest."""
 
     axes: tuple[Axis, ...]
     zipped: bool = False

@@ -28,7 +28,7 @@ _TRIED = 50
 
 @dataclass(frozen=True)
 class Plan:
-    """The points of a sweep, in order; `source` is the file of the spec, or standard input."""
+    """Holds the points of a sweep, in order; `source` is the file of the spec, or standard input."""
 
     draft: SpecTemplate
     grid: Grid
@@ -51,7 +51,7 @@ class Plan:
         return self._keys[index]
 
     def job(self, index: int, root: Path | None, *, figures: str) -> PointJob:
-        """Return a point for a worker; without a `root`, one that may not see our files."""
+        """Return the job of a point for a worker; without `root` it carries the files that the spec names."""
         overrides = tuple(self.grid.overrides(self.grid[index]))
         files = None
         if root is None:
@@ -154,7 +154,7 @@ def build_plan(
     confine: Path | None = None,
     text: str | None = None,
 ) -> Plan:
-    """Read the spec, and the settings as `parse_settings` does.
+    """Build the plan of a sweep from a spec and from settings as of `parse_settings`.
 
     Args:
         spec: the file, or with `text` where it would lie.

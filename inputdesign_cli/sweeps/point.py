@@ -55,7 +55,7 @@ class PointJob:
 
 @dataclass(frozen=True)
 class PointEnd:
-    """The end of a point: its failure, if it failed, and its `files` where ours are out of reach."""
+    """Holds the end of a point: its failure, if it failed, and its `files` where ours are out of reach."""
 
     failure: Mapping[str, object] | None = None
     files: Mapping[str, bytes] | None = None

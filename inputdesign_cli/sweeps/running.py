@@ -39,7 +39,7 @@ _FIRST, _REST, _SHARE = 2.0, 10.0, 30.0
 
 
 class Listing(NamedTuple):
-    """A point of a sweep that has not been run: its settings, its key, and how it stands."""
+    """Holds a point of a sweep that has not been run: its settings, its key, and its status."""
 
     settings: dict[str, str]
     key: str

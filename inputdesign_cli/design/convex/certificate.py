@@ -7,8 +7,8 @@ for the goal "cost",
 
     cost(z) >= t (sum r - sum_s tr(Y_s M0_s) + sum_lower w b) - sum_upper w b
 
-(where the largest of several costs is paid, a mean of them with weights mu >= 0 of the sum one stands for the
-cost, which is no less)
+(for the largest of several costs, "cost" is their mean with weights mu >= 0 of the sum one, which is never
+larger than the largest)
 
 and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0, with the
 sum over the scenarios understood,

@@ -155,7 +155,7 @@ class Lift:
         return (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale, scale
 
     def blocks(self, box: Box, allowed: BoxLimits) -> list[Block]:
-        """Return the blocks: products, Gram matrix and limit, in the order that `_repaired` needs."""
+        """Return the constraint blocks of the semidefinite program, in the order that `_repaired` expects."""
         Y, B = self._unknowns
         size, m = len(Y), self.problem.m
         errors = self._errors(allowed.D)

@@ -35,7 +35,7 @@ _ENDS = (IdesignError, ArithmeticError, ValueError, RuntimeWarning)
 
 @dataclass(frozen=True)
 class Foresight:
-    """Foresees the data of an experiment from the nominal one in raw parameters, its prior included.
+    """Predicts an experiment's data from the nominal plant and prior, both in raw parameters.
 
     `entries` are errors that have r_u where none is bounded, and `earlier` counts along where data are
     assessed. `knowledge` of the parameters rules rivals out.
@@ -65,7 +65,7 @@ class Foresight:
         return entry, list(foreseen_rivals(self.units, estimate, found, self.advice))
 
     def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> Searched | None:
-        """Return the numbers of records that end elsewhere, and that have rivals; None if not known."""
+        """Return how many of `runs` simulations end elsewhere and how many leave rivals; None if unknown."""
         elsewhere, rivals = 0, 0
         for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
             tell(Counted("records searched from several starts", done, runs))

@@ -48,10 +48,15 @@ class Delivery:
 class RecordRequest:
     """Describes the record that a spec asks for, of `samples` samples (None: as the experiment).
 
-    Bounds are on single samples, by `limit_keys`. The band is in rad per sample, the step between samples in
-    the unit of the experiment. A record that `meets` keeps the accuracy itself; else it has the power of the
-    design. Where the length is sought it is `most_samples` at most, and at most `longest` are computed at
-    all. `others` may stand in for a kind of signal that does not fit.
+    A record that `meets` keeps the accuracy itself; else it has the power of the design. Where the length is
+    sought it is `most_samples` at most, and at most `longest` are computed at all.
+
+    Args:
+        bounds: on the samples of the record, on the outputs that it causes, and on powers.
+        band: in rad per sample.
+        step: between samples, in the unit of the experiment.
+        limit_keys: the keys of the spec that limit single samples, for messages.
+        others: may stand in for a kind of signal that does not fit.
     """
 
     settings: SignalSettings

@@ -84,7 +84,7 @@ def reach(record: Record, before: float = np.inf) -> float:
 
 
 def pilot_length(samples: int, block: int) -> int:
-    """Return the length of the short record that predicts the ratio of one of `samples` samples."""
+    """Return the length of the pilot record that predicts the ratio of a record of `samples` samples."""
     return -(-max(samples // _PILOT, _FEWEST) // block) * block
 
 
