@@ -86,7 +86,7 @@ def _reasons(found: Fits, data: Record) -> Iterator[str]:
             test = cross_correlations(found.errors[:, i : i + 1], data.u, lengths=data.lengths)
             if not test.probability >= _SURELY:
                 yield (
-                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain what it "
-                    f"leaves (probability {chance(test.probability)}): the model is not of the plant of "
+                    f"the simulation explains {fit:.1f} % of {output} only, and past inputs explain the "
+                    f"rest (probability {chance(test.probability)}): the model is not of the plant of "
                     "these data, or this acts otherwise here"
                 )
