@@ -97,13 +97,14 @@ def near_zero(kind: FindingKind, model: Model, estimate: Estimate) -> list[Findi
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = np.flatnonzero(deviations > np.abs(estimate.theta))
     quantity, found = quantities(model), []
+    delays = model.dead_times[vague]
     for physical, remedy in (
         (True, "The data hardly determine it. Take more of them, or list what is known in plant.known."),
         (False, "An order may be too high."),
     ):
-        listed = ", ".join(estimate.names[k] for k in vague if quantity[k] == physical)
+        listed = ", ".join(estimate.names[k] for k in vague[~delays] if quantity[k] == physical)
         found += kind.when(listed, listed, where=listed, remedy=remedy)
-    for k in vague[model.dead_times[vague]]:
+    for k in vague[delays]:
         most, name = float(estimate.theta[k] + _NORMAL * deviations[k]), estimate.names[k]
         fact = f"{name} of a dead time is at most {most:.3g} (95 %)"
         found.append(kind.found(fact, where=name, remedy="Nothing", at_most=most))

@@ -49,9 +49,9 @@ def test_the_inverse_of_a_controller_is_no_plant(integral, tmp_path):
 def test_the_plant_of_a_loop_whose_reference_hardly_moves_is_not_the_inverse_of_its_controller(tmp_path):
     """What moves the reference are eight steps; they look like spikes to a model of -1/C."""
     u, y = loop(2, LAWS["PI"], steps=0.3)
-    found = explore(stored(tmp_path / "log.csv", u, y)).results.result
-    assert found["exploration"]["loop"]
-    assert static_gain(found["identification"]["theta"]) == pytest.approx(1.0, abs=0.6)
+    found = explore(stored(tmp_path / "log.csv", u, y))
+    assert found.reasons
+    assert "input-only-answers" in {one["code"] for one in found.results.result["findings"]}
 
 
 @pytest.mark.slow
@@ -93,13 +93,14 @@ def lags(u, plants, rng, noise=0.05):
 
 @pytest.mark.slow
 def test_inputs_between_which_what_they_do_may_be_exchanged_earn_no_trust(tmp_path):
-    """The second input is half of the first but for little: another minimum is about as likely."""
+    """The second input is half of the first but for little."""
     rng = np.random.default_rng(0)
     one = np.repeat(rng.choice([-1.0, 1.0], 40), 8)
     u = np.column_stack([one, 0.5 * one + 0.003 * rng.standard_normal(320)])
     y = lags(u, [(1.0, 8.0, 3), (2.0, 15.0, 1)], rng)
     found = explore(stored(tmp_path / "log.csv", u, y, "u1,u2,y"))
-    assert any("Another set of parameters" in reason for reason in found.reasons)
+    assert found.reasons
+    assert "excitation-too-simple" in {one["code"] for one in found.results.result["findings"]}
 
 
 @pytest.mark.slow
