@@ -21,7 +21,7 @@ from inputdesign_cli.plant.model import DELAY
 
 _CUTOFFS = 5
 # Dead times are tried sample by sample up to _FINE samples, then in steps that grow by _GROWTH.
-_FINE, _GROWTH = 20, 1.2
+_FINE, _GROWTH = 20, 1.1
 _SWEEPS, _MINIMA = 2, 6
 
 Place = tuple[int, int]
