@@ -12,7 +12,8 @@ from inputdesign_cli.identification.response_chance import driven_by_nothing
 from inputdesign_cli.outcome.shares import chance
 
 # A simulation that explains less of data it has not seen is no model; one that is refuted needs more.
-LEAST_FIT, HALF = 5.0, 50.0
+LEAST_FIT, HALF, _MOSTLY = 5.0, 50.0, 90.0
+_SURELY = 1e-6  # the probability below which tests refute a model that explains more than half, too
 # The static gain is within so many deviations of none, that at some frequency of the record is not; and the
 # first is larger by this factor: G still rises there towards low frequencies.
 _OPEN, _CLEAR, _RISING = 3.0, 4.0, 2.0
@@ -84,10 +85,10 @@ def _unrelated(kind: FindingKind, found: Found) -> list[Finding]:
 
 @finding(DOUBT, "structure-unexplained", "Record about one operating point, or what else acts on the output.")
 def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
-    """No tested structure explains an output. The simulation explains less than half of it.
+    """No tested structure explains an output. The simulation explains less than half of it, or than 90 %.
 
-    Every kind of test refutes the model as well. The plant may be nonlinear, time-varying, or have unrecorded
-    inputs.
+    Every kind of test refutes the model as well, beyond doubt where it explains more than half. The plant may
+    be nonlinear, time-varying, or have unrecorded inputs; its output may wander.
     """
     # Enough samples refute every model of a real plant, and a poor fit alone may be strong noise.
     failed = {test.name: test for test in found.estimate.tests.failed}
@@ -97,7 +98,13 @@ def _unexplained(kind: FindingKind, found: Found) -> list[Finding]:
     for i, fit in enumerate(found.validation.simulation):
         output = signal_name("y", i, found.model.outputs)
         fact = f"the simulation explains {fit:.1f} % of {output}, and tests refute it ({chance(least)})"
-        doubtful += kind.when(fit < HALF, fact, where=output, fit_percent=fit, probability=least)
+        doubtful += kind.when(
+            fit < (_MOSTLY if least < _SURELY else HALF),
+            fact,
+            where=output,
+            fit_percent=fit,
+            probability=least,
+        )
     return doubtful
 
 
