@@ -74,14 +74,15 @@ def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[fl
         fitted: (p,), per cent of each output that the simulation explains.
     """
     fits = {_named(units, output): fit for output, fit in enumerate(fitted)}
-    still = {
-        _named(units, output): sum(one.length for one in runs) / len(data.y)
+    long = {
+        _named(units, output)
         for output, runs in _still(estimate, data).items()
+        if sum(one.length for one in runs) >= _BIASING * len(data.y)
     }
     return [
         one
         for one in faults(units, estimate, data)
-        if (fits[one.where] < _HALF if one.code == SPIKES.code else still[one.where] >= _BIASING)
+        if (fits[one.where] < _HALF if one.code == SPIKES.code else one.where in long)
     ]
 
 

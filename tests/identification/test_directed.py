@@ -1,8 +1,5 @@
 """Tests of one parameter more: the regression that they stand for, their power, and how far G would move."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.signal
@@ -10,13 +7,11 @@ import scipy.stats
 
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.levels import level
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
 from tests.support.records import shifted, simulated
 
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 W = np.linspace(0.01, 3.0, 50)
 
 
@@ -158,21 +153,3 @@ def test_a_dead_time_in_s_is_found(hold):
     test = next(one for one in found.tests.directed if "delay" in one.test.name)
     assert test.test in found.tests.failed
     assert test.larger.theta[test.larger.names.index("delay")] == pytest.approx(0.3, abs=0.05)
-
-
-@pytest.mark.slow
-def test_a_level_and_a_state_add_unknowns_not_verdicts():
-    u, y = (x[0] for x in data("oe", 150, np.random.default_rng(7)))
-    found = identify(one_channel([0, 1.0, 0.5], F=[1, -0.7]), u, y + 30.0, rest=False)
-    assert min(one.test.probability for one in found.tests.directed) < level("one parameter")
-
-
-@pytest.mark.slow
-def test_designed_records_seldom_leave_right_models_undecided():
-    """150 of each; the limit is that of 5 % with three standard deviations of chance."""
-    run = runpy.run_path(str(BENCHMARK))
-    right = run["designed_study"](range(150), wrong=False)
-    assert right["undecided"] <= 7.5 + 3 * np.sqrt(7.5)
-    wrong = run["designed_study"](range(150), wrong=True)
-    assert wrong["beyond"] >= 50
-    assert wrong["met though beyond"] <= 0.2 * wrong["beyond"]

@@ -65,4 +65,5 @@ def test_the_benchmark_of_designed_records():
     benchmark = runpy.run_path(str(BENCHMARK))
     right, wrong = (benchmark["designed_study"](range(150), wrong=wrong) for wrong in (False, True))
     assert right["undecided"] <= 7
+    assert wrong["beyond"] >= 50
     assert wrong["met though beyond"] <= 6

@@ -161,21 +161,6 @@ def test_units_of_the_channels_do_not_matter():
     assert scaled.tests.whiteness.statistic == pytest.approx(plain.tests.whiteness.statistic, rel=1e-5)
 
 
-def test_a_batch_reaches_the_covariance_of_theory():
-    model, runs = arx(), 200
-    u, y = simulated(model, 1000, np.random.default_rng(10), runs)
-    found = fit_batch(model, u, y, start=model.theta)
-    assert np.all(found.converged)
-    information = theory(model, 1000)
-    eigenvalues = whitened_eigenvalues(found.theta, information)
-    low, high = wishart_range(10, runs, np.random.default_rng(11))
-    assert low < eigenvalues.min() <= eigenvalues.max() < high
-    np.testing.assert_allclose(found.noise.mean(axis=0), model.covariance, atol=0.02)
-    alone = identify(model, u[3], y[3], start=model.theta)
-    np.testing.assert_allclose(found.theta[3], alone.theta, atol=1e-7)
-    np.testing.assert_allclose(found.information[3], alone.information, rtol=1e-6, atol=1e-6)
-
-
 def _channel(x, index, values):
     x = x.copy()
     x[:, index] = values
@@ -207,18 +192,27 @@ def test_outputs_of_the_same_noise_are_refused():
         identify(same, u, np.stack([y[:, 0], 2.0 * y[:, 0]], axis=1))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
-def test_estimates_reach_the_cramer_rao_bound(model):
-    u, y = simulated(model, 3000, np.random.default_rng(16), 500)
+@pytest.mark.parametrize(
+    ("model", "runs"),
+    [
+        (arx(), 200),
+        *(pytest.param(one, 500, marks=pytest.mark.slow) for one in (arx(per_output=False), box_jenkins())),
+    ],
+    ids=["arx", "common", "bj"],
+)
+def test_estimates_reach_the_cramer_rao_bound(model, runs):
+    u, y = simulated(model, 3000, np.random.default_rng(16), runs)
     found = fit_batch(model, u, y, start=model.theta)
     assert np.all(found.converged)
     information = theory(model, 3000)
-    # The mean square in units of the bound, over all directions: its own error is sqrt(2 / (500 k)).
+    alone = identify(model, u[3], y[3], start=model.theta)
+    np.testing.assert_allclose(found.theta[3], alone.theta, atol=1e-4)
+    np.testing.assert_allclose(found.noise.mean(axis=0), model.covariance, atol=0.02 * model.covariance.max())
+    # The mean square in units of the bound, over all directions: its own error is sqrt(2 / (runs k)).
     whitened = (found.theta - model.theta) @ np.linalg.cholesky(information)
     assert np.sqrt(np.mean(whitened**2)) == pytest.approx(1.0, abs=0.05)
     eigenvalues = whitened_eigenvalues(found.theta, information)
-    low, high = wishart_range(len(model.names), 500, np.random.default_rng(17))
+    low, high = wishart_range(len(model.names), runs, np.random.default_rng(17))
     assert low < eigenvalues.min() <= eigenvalues.max() < high
 
 
