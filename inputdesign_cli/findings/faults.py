@@ -9,16 +9,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
 from inputdesign_cli.findings.places import SHOWN, Samples, file_of, of_file, places, rows_of, without_option
-from inputdesign_cli.identification import (
-    Estimate,
-    Frozen,
-    LevelShift,
-    chance_of_shifts,
-    frozen,
-    shifted,
-    spikes,
-)
+from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.faults import Frozen, frozen, shifted, spikes
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import TransferMatrix

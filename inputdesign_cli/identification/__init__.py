@@ -15,13 +15,6 @@ from inputdesign_cli.identification.estimators import (
     information_begun_anywhere as information_begun_anywhere,
     information_of_data as information_of_data,
 )
-from inputdesign_cli.identification.faults import (
-    Frozen as Frozen,
-    frozen as frozen,
-    resolution_of as resolution_of,
-    shifted as shifted,
-    spikes as spikes,
-)
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
     frequency_response as frequency_response,

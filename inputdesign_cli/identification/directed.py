@@ -127,8 +127,6 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
             found, _ = _score(white, group[0])
     first, column, along = group[0]
     size = float(along @ column)
-    scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
-    explained = np.linalg.lstsq(white.explained / scale, column, rcond=1e-12)[0] / scale
     alternatives = tuple(alternative for alternative, _, _ in group)
     fault = "plant" if any(one.fault == "plant" for one in alternatives) else first.fault
     name = " or ".join(sorted(alternative.name for alternative in alternatives))
@@ -137,7 +135,7 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
         alternatives,
         size=float(found.sizes[0]) / size,
         deviation=1.0 / size,
-        following=-explained[white.starts.shape[1] :][:parameters],
+        following=-(white.spread @ column)[:parameters],
         larger=larger,
     )
 

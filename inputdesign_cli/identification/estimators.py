@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying, factor_of_data
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying
 from inputdesign_cli.identification.coloured import ColouredKind
 from inputdesign_cli.identification.directed import alternative
 from inputdesign_cli.identification.earlier import Earlier
@@ -42,7 +42,7 @@ from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.transfer_matrix import TransferKind
 from inputdesign_cli.identification.variations import variations
-from inputdesign_cli.information.coordinates import triangular_factor
+from inputdesign_cli.information.coordinates import taking_part, triangular_factor
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -59,7 +59,9 @@ Lengths = Sequence[int] | None
 
 # Numbers that unknown starts may take up: inputs of long dead times are taken for known beyond.
 _MOST = 2e7
-# Parameters this share apart are the same to rounding.
+# A direction is not excited where gradients change by more than this share of themselves when they are
+# rounded otherwise. Parameters this share apart are the same to rounding.
+_UNCERTAIN = 0.03
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
 
@@ -364,10 +366,14 @@ def noise_of(records: Records, point: Point) -> Array:
 
 
 def factor_at(records: Records, point: Point, noise: Array) -> Array:
-    """Return the triangular factor of the information matrix of records about the parameters.
+    """Return the triangular factor L (k, k) of the information matrix of records, M = L L^T.
+
+    Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
+    common and mean no lack of excitation. So M is never formed, and directions count as undetermined only
+    if the gradients themselves are rounding.
 
     Raises:
-        SpecError: `not-exciting`.
+        SpecError: `not-exciting`, with the parameters that the data cannot distinguish.
     """
     # What is known besides the data counts as further rows.
     known = np.zeros((0, point.theta.size)) if records.earlier is None else records.earlier.rows
@@ -377,7 +383,25 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
         np.concatenate([(psi @ root.T).reshape(len(psi), -1).T, known])
         for psi in (point.all_psi, records.at(point.theta * (1.0 + last)).all_psi)
     )
-    return factor_of_data(records.kind.model.names, point.theta, rows, again)
+    factor, untold = triangular_factor(rows)
+    if not untold.size:
+        changes = scipy.linalg.solve_triangular(factor, (again - rows).T, lower=True).T
+        _, changed, vectors = np.linalg.svd(changes, full_matrices=False)
+        uncertain = vectors[changed > _UNCERTAIN].T
+        sizes = np.linalg.norm(factor, axis=1)[:, None]
+        untold = sizes * scipy.linalg.solve_triangular(factor, uncertain, lower=True, trans="T")
+    if untold.size:
+        names = records.kind.model.names
+        ended = [f"{name} = {value:.4g}" for name, value in zip(names, point.theta, strict=True)]
+        raise bad_spec(
+            "not-exciting",
+            f"the data cannot distinguish these parameters: {taking_part(names, untold)}",
+            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; or "
+            f"the search went astray ({taking_part(ended, untold)}): start elsewhere, beyond poles of "
+            "expressions too",
+            key="u",
+        )
+    return factor
 
 
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:

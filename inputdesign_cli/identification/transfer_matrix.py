@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import polynomial as ascending
@@ -120,7 +120,11 @@ class TransferKind(Kind):
         slowest, fastest = _LEAST_DECAY / (samples * step), _FASTEST / step
         out, late = theta.copy(), self.model.dead_times
         out[late] = np.clip(out[late], _LEAST_DELAY * step, (samples - 1) * step)
-        for every in self._denominators:
+        groups: dict[tuple[Place, ...], list[int]] = {}
+        for index, parameter in enumerate(self.model.parameters):
+            if parameter.letter == "a":
+                groups.setdefault(parameter.places, []).append(index)
+        for every in map(np.array, groups.values()):
             columns = every[integrators(np.append(theta[every], 1.0)) :]
             poles = polynomial_roots(np.append(theta[columns], 1.0))
             if np.all(poles.real <= -slowest) and np.all(np.abs(poles) <= fastest):
@@ -185,15 +189,6 @@ class TransferKind(Kind):
             shown = SampledModel(one, self.between.sample_time) if self.between.hold else one
             found.append(Extension(shown, TransferKind(one, self.between), name, what))
         return tuple(found)
-
-    @cached_property
-    def _denominators(self) -> list[NDArray[np.int64]]:
-        """Return the indices in theta of the coefficients of each denominator."""
-        groups: dict[tuple[tuple[int, int], ...], list[int]] = {}
-        for index, parameter in enumerate(self.model.parameters):
-            if parameter.letter == "a":
-                groups.setdefault(parameter.places, []).append(index)
-        return [np.array(indices) for indices in groups.values()]
 
 
 @lru_cache(maxsize=32)

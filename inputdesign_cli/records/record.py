@@ -16,7 +16,7 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
 from inputdesign_cli.findings.places import Recorded, Samples
 from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_against_spec
-from inputdesign_cli.identification import resolution_of
+from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.columns import called, rising, roles_of, without_times
 from inputdesign_cli.records.preparation import Preparation

@@ -92,16 +92,10 @@ def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
         x = 0.8 * x + 0.5 * u[:, t - 1] if t else np.zeros(40)
         y[:, t] = x + e[:, t]
         u[:, t] = slow[:, t] - 0.6 * y[:, t]
+    pairs = [(one[:, None], other[:, None]) for one, other in zip(u, y, strict=True)]
     told, untold = (
-        np.array(
-            [
-                identify(
-                    model, u[i, :, None], y[i, :, None], feedback=feedback
-                ).tests.independence.probability
-                for i in range(40)
-            ]
-        )
-        for feedback in (True, False)
+        np.array([identify(model, *pair, feedback=loop).tests.independence.probability for pair in pairs])
+        for loop in (True, False)
     )
     assert 0.3 < np.mean(told) < 0.7
     assert np.mean(told < 0.05) < 0.2

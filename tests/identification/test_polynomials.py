@@ -14,7 +14,6 @@ from inputdesign_cli.identification.records import RecordProblem, Records, evalu
 from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.specification.models.fields import check_delay_stable
 from inputdesign_cli.spectrum import FirBasis
@@ -112,24 +111,6 @@ def test_an_unknown_covariance_is_that_of_the_residuals():
     np.testing.assert_allclose(found.errors, left, atol=1e-7)
     # Unbiased to first order: each output has four parameters of its own and half of the common two.
     np.testing.assert_allclose(found.noise, covariance * 300 / (300 - 5), rtol=1e-6)
-
-
-@pytest.mark.slow
-def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone():
-    model = replace(box_jenkins(), A=(np.ones(1),), D=(np.ones(1),), covariance=np.diag([1.0, 4.0]))
-    u, y = (x[0] for x in simulated(model, 600, np.random.default_rng(7)))
-    both, _ = with_known_noise(model, u, y)
-    for i in range(2):
-        own = PolynomialModel(
-            model.B[i : i + 1],
-            model.A,
-            model.F[i : i + 1],
-            (model.C[i],),
-            model.D,
-            model.covariance[i : i + 1, i : i + 1],
-        )
-        mine = [k for k, p in enumerate(model.parameters) if p.places[0][0] == i]
-        np.testing.assert_allclose(both[mine], with_known_noise(own, u, y[:, i : i + 1])[0], atol=1e-5)
 
 
 MODELS = {"two arx": arx(), "common": arx(per_output=False), "two bj": box_jenkins(), **SYSTEMS}
