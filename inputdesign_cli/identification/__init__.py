@@ -2,6 +2,7 @@
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
 from inputdesign_cli.identification.directed import (
+    RISING as RISING,
     Directed as Directed,
     Moves as Moves,
     that_matter as that_matter,
@@ -31,5 +32,4 @@ from inputdesign_cli.identification.tests import (
     cross_correlations as cross_correlations,
     whiteness as whiteness,
 )
-from inputdesign_cli.identification.variations import RISING as RISING
 from inputdesign_cli.identification.white import Noise as Noise, noises_of_residuals as noises_of_residuals

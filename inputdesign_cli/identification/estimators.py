@@ -19,7 +19,7 @@ from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying
 from inputdesign_cli.identification.coloured import ColouredKind
-from inputdesign_cli.identification.directed import alternative
+from inputdesign_cli.identification.directed import alternative, variations
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import Kind, Starts
@@ -41,7 +41,6 @@ from inputdesign_cli.identification.search import Rival, Search, from_rest_or_fr
 from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.transfer_matrix import TransferKind
-from inputdesign_cli.identification.variations import variations
 from inputdesign_cli.information.coordinates import taking_part, triangular_factor
 from inputdesign_cli.plant import (
     Coloured,

@@ -19,9 +19,9 @@ from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_aga
 from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.columns import called, rising, roles_of, without_times
-from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
+from inputdesign_cli.records.sheet import Preparation
 from inputdesign_cli.records.signals import SHORTEST, Signals, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 

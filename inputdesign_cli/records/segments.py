@@ -20,7 +20,7 @@ from inputdesign_cli.findings.prepared_records import (
     TREND_REMOVED,
 )
 from inputdesign_cli.outcome.shares import per_cent
-from inputdesign_cli.records.preparation import Detrend, Preparation
+from inputdesign_cli.records.sheet import Detrend, Preparation
 from inputdesign_cli.records.signals import SHORTEST, Signals
 
 # Times may be off by this share of the sample time unsaid, and by the second with a finding.
