@@ -187,7 +187,9 @@ def test_estimates_reach_the_cramer_rao_bound(model, runs):
     assert np.all(found.converged)
     information = theory(model, 3000)
     alone = identify(model, u[3], y[3], start=model.theta)
-    np.testing.assert_allclose(found.theta[3], alone.theta, atol=1e-4)
+    # With a noise model the single estimate has the noise before the record as well.
+    apart = (found.theta[3] - alone.theta) / np.sqrt(np.diag(alone.covariance))
+    assert np.abs(apart).max() < (1e-5 if model.C[0].size == model.D[0].size == 1 else 0.1)
     np.testing.assert_allclose(found.noise.mean(axis=0), model.covariance, atol=0.02 * model.covariance.max())
     # The mean square in units of the bound, over all directions: its own error is sqrt(2 / (runs k)).
     whitened = (found.theta - model.theta) @ np.linalg.cholesky(information)
