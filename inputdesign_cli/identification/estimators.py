@@ -22,7 +22,7 @@ from inputdesign_cli.identification.coloured import ColouredKind
 from inputdesign_cli.identification.directed import alternative, variations
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import Kind, Starts
+from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.polynomial_rows import FromRest
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.records import (
@@ -218,7 +218,7 @@ def identify(
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
     best = from_rest_or_free(records, False if ramp else rest, searched, start)
-    return concluded(best, outputs, experiments=experiments or (len(outputs),), feedback=feedback)
+    return concluded(best, parts, experiments=experiments or (len(outputs),), feedback=feedback)
 
 
 def fit_batch(
@@ -299,12 +299,14 @@ def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) ->
     return information_of(free, evaluate(free, model.theta), model.covariance)
 
 
-def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: bool) -> Estimate:
+def concluded(
+    found: Search, parts: Sequence[Part], *, experiments: Sequence[int], feedback: bool
+) -> Estimate:
     """Return the estimate with its covariance and the tests of its residuals.
 
     Args:
         found: where the search ended.
-        y: (samples, p), the outputs as measured.
+        parts: the records as measured.
         experiments: the samples of each experiment.
         feedback: whether u(t) depends on y(t).
 
@@ -315,7 +317,8 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
     noise = noise_of(records, point)
     check_noisy(noise, records.y)
     factor, earlier = factor_at(records, point, noise), records.earlier
-    simulation = _simulation(records, point, y)
+    simulation = _simulation(records, point, np.concatenate([y for _, y in parts]))
+    first = np.array([kind.errors_and_gradient(theta, *part)[0][0] for part in parts])
     known = None if kind.continuous or None in simulation.fit else simulation.outputs
     larger = [alternative(one, records) for one in kind.extensions(theta, feedback=feedback)]
     alternatives = [*larger, *variations(records, theta, known)]
@@ -330,7 +333,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
         point.errors,
         records.lengths,
         Ended(found.converged, found.steps, found.starts, found.rivals),
-        Begun(records.free, found.rest_refuted, found.first),
+        Begun(records.free, found.rest_refuted, first),
         simulation,
         prior,
         tests_of(records, point, noise, alternatives, experiments=experiments, feedback=feedback),
