@@ -9,16 +9,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
 from inputdesign_cli.findings.places import SHOWN, Samples, file_of, of_file, places, rows_of, without_option
-from inputdesign_cli.identification import (
-    Estimate,
-    Frozen,
-    LevelShift,
-    chance_of_shifts,
-    frozen,
-    shifted,
-    spikes,
-)
+from inputdesign_cli.identification import Estimate, LevelShift, chance_of_shifts
 from inputdesign_cli.identification.checks import signal_name
+from inputdesign_cli.identification.faults import Frozen, frozen, shifted, spikes
 from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.plant import TransferMatrix
@@ -74,14 +67,15 @@ def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[fl
         fitted: (p,), per cent of each output that the simulation explains.
     """
     fits = {_named(units, output): fit for output, fit in enumerate(fitted)}
-    still = {
-        _named(units, output): sum(one.length for one in runs) / len(data.y)
+    long = {
+        _named(units, output)
         for output, runs in _still(estimate, data).items()
+        if sum(one.length for one in runs) >= _BIASING * len(data.y)
     }
     return [
         one
         for one in faults(units, estimate, data)
-        if (fits[one.where] < _HALF if one.code == SPIKES.code else still[one.where] >= _BIASING)
+        if (fits[one.where] < _HALF if one.code == SPIKES.code else one.where in long)
     ]
 
 

@@ -47,6 +47,12 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
     return [*PRIOR_LEFT_OUT.when(without, where=_PRIOR), *(contradictions(estimate) if stated else [])]
 
 
+def prior_left_out() -> Finding:
+    """Return the finding that a prior without parameters does not count for a top-up either."""
+    fact = "nor does the experiment below count on it: spec.yaml has the information of the data instead"
+    return PRIOR_LEFT_OUT.found(fact, where="experiment.prior")
+
+
 def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     """Return a finding where the prior and the data are not of one system, or are of one record.
 

@@ -74,8 +74,13 @@ def without_spikes(
         there = np.flatnonzero(~np.isnan(x) & counts)
         inputs, values = u[there], x[there]
         at = single_spikes(values, inputs)
-        found += _replaced(name, values, at, rows[there])
-        values[at] = 0.5 * (values[at - 1] + values[np.minimum(at + 1, len(values) - 1)])
+        between = 0.5 * (values[at - 1] + values[np.minimum(at + 1, len(values) - 1)])
+        lines, was = rows[there][at], values[at].tolist()
+        fact = f"{name} in {listed(lines)}"
+        if at.size == 1:
+            fact += f", {was[0]:.6g} between values about {between[0]:.6g}"
+        found += SPIKES_REPLACED.when(at.size, fact, where=name, rows=lines.tolist(), values=was)
+        values[at] = between
         x[there] = values
         found += [*outlying(name, values, inputs, rows[there]), *sensor_limits(name, values)]
     return plain, found
@@ -99,15 +104,6 @@ def _spikes(y: Array) -> NDArray[np.int64]:
     spread = max(1.4826 * float(np.median(between)), float(np.quantile(between, 0.95)) / 2.0, least)
     far = np.flatnonzero(off[1:-1] > _SPIKE * spread) + 1
     return far[np.maximum(off[far - 1], off[far + 1]) * _ALONE < off[far]]
-
-
-def _replaced(name: str, y: Array, at: NDArray[np.int64], lines: NDArray[np.int64]) -> list[Finding]:
-    """Say which samples of an output y (n,), with their rows in the file, were replaced."""
-    fact = f"{name} in {listed(lines[at])}"
-    if len(at) == 1:
-        around = 0.5 * (y[at[0] - 1] + y[at[0] + 1])
-        fact += f", {y[at[0]]:.6g} between values about {around:.6g}"
-    return SPIKES_REPLACED.when(at.size, fact, where=name, rows=lines[at].tolist(), values=y[at].tolist())
 
 
 def outlying(name: str, x: Array, u: Array | None, lines: NDArray[np.int64]) -> list[Finding]:
@@ -145,17 +141,12 @@ def sensor_limits(name: str, x: Array) -> list[Finding]:
     return found
 
 
-def spread_of(x: Array) -> float:
-    """Return a standard deviation of x (n,) that a few values do not move."""
-    spread = 1.4826 * float(np.median(np.abs(x - np.median(x))))
-    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
-    # Two levels have no spread about the more frequent one.
-    return max(spread, float(high - low) / 4.0)
-
-
 def _far(x: Array) -> NDArray[np.bool_]:
-    spread = spread_of(x)
-    return np.abs(x - np.median(x)) > (_OUTLYING * spread if spread > 0.0 else np.inf)
+    off = np.abs(x - np.median(x))
+    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
+    # A few values do not move this deviation. Two levels have no spread about the more frequent one.
+    spread = max(1.4826 * float(np.median(off)), float(high - low) / 4.0)
+    return off > (_OUTLYING * spread if spread > 0.0 else np.inf)
 
 
 def _caused(u: Array, y: Array) -> Array:
@@ -188,25 +179,18 @@ def beyond_precision(name: str, x: Array) -> tuple[int, str, str] | None:
 
     x is NaN where samples are missing. Return None if all squares stay in range, also relative to each other.
     """
-    row, lost = int(np.nanargmax(np.abs(x))), _absurd(x)
+    row, there = int(np.nanargmax(np.abs(x))), np.flatnonzero(~np.isnan(x))
     size = abs(float(x[row]))
-    if lost is not None:
-        message = f"{x[lost]:.6g} in column {name} is so large that all other values are lost in rounding"
-        return lost, message, "write the value that was meant"
+    scaled = x[there] / max(size, np.finfo(float).tiny)
+    middle = float(np.median(scaled))
+    off = np.abs(scaled - middle)
+    usual = max(float(np.median(off[off > 0.0])), abs(middle)) if np.any(off > 0.0) else np.inf
+    far = there[off > _ABSURD * usual]
+    if 0 < far.size <= _OFTEN * there.size:  # as often as the other level of a signal, it is no fault
+        message = f"{x[far[0]]:.6g} in column {name} is so large that all other values are lost in rounding"
+        return int(far[0]), message, "write the value that was meant"
     if size and not 1.0 / _EXTREME < size < _EXTREME:
         message = f"the column {name} has values up to {size:.3g}: their squares leave the range of numbers"
         hint = f"write it in another unit: below {_EXTREME:.0e}, and the largest value above "
         return row, message, hint + f"{1 / _EXTREME:.0e}"
     return None
-
-
-def _absurd(x: Array) -> int | None:
-    """Return the first value of x (n,), NaN where missing, beside which all others are rounding."""
-    there = np.flatnonzero(~np.isnan(x))
-    scaled = x[there] / max(float(np.abs(x[there]).max()), np.finfo(float).tiny)
-    middle = float(np.median(scaled))
-    off = np.abs(scaled - middle)
-    usual = max(float(np.median(off[off > 0.0])), abs(middle)) if np.any(off > 0.0) else np.inf
-    far = there[off > _ABSURD * usual]
-    # As often as the other level of a signal, it is no fault.
-    return int(far[0]) if 0 < far.size <= _OFTEN * there.size else None

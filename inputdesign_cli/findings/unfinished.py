@@ -49,23 +49,20 @@ RAISED_PLANTS = doubt(
 def ended_early(status: str, objective: Objective) -> list[Finding]:
     """Return what the end of the time left open: the proof, or the bound over every spectrum."""
     if status == "gap_open":
-        fact = f"{what_ended()} ended the design, {_how_far(objective)}"
-        remedy, gap = f"To close the gap, {more_time()}.", objective.relative_gap
-        return [DESIGN_UNFINISHED.found(fact, where="solver", remedy=remedy, relative_gap=gap)]
+        best, far = objective.lower_bound, "nothing is proved yet of other designs"
+        if objective.upper_bound:
+            far = f"no other design gets above {objective.upper_bound:.6g}"
+        elif best:
+            gap = 1.0 if objective.relative_gap is None else objective.relative_gap
+            far = f"no other design gets below {best:.6g} ({per_cent(gap, 2)} lower)"
+        fact = f"{what_ended()} ended the design, and {far}"
+        remedy, share = f"To close the gap, {more_time()}.", objective.relative_gap
+        return [DESIGN_UNFINISHED.found(fact, where="solver", remedy=remedy, relative_gap=share)]
     remedy = f"To have it, {more_time()}, or write solver.any_spectrum_tolerance: 0.01."
     fact = f"{what_ended()} came before it"
     return OTHER_SPECTRA_LEFT_OUT.when(
         objective.any_spectrum_bound is None, fact, where="solver", remedy=remedy
     )
-
-
-def _how_far(objective: Objective) -> str:
-    if objective.upper_bound:
-        return f"and no other design gets above {objective.upper_bound:.6g}"
-    if not objective.lower_bound:
-        return "and nothing is proved yet of other designs"
-    gap = per_cent(1.0 if objective.relative_gap is None else objective.relative_gap, 2)
-    return f"and no other design gets below {objective.lower_bound:.6g} ({gap} lower)"
 
 
 def other_spectra_left_out() -> Finding:

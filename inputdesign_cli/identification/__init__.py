@@ -2,6 +2,7 @@
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
 from inputdesign_cli.identification.directed import (
+    RISING as RISING,
     Directed as Directed,
     Moves as Moves,
     that_matter as that_matter,
@@ -14,13 +15,6 @@ from inputdesign_cli.identification.estimators import (
     identify as identify,
     information_begun_anywhere as information_begun_anywhere,
     information_of_data as information_of_data,
-)
-from inputdesign_cli.identification.faults import (
-    Frozen as Frozen,
-    frozen as frozen,
-    resolution_of as resolution_of,
-    shifted as shifted,
-    spikes as spikes,
 )
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
@@ -38,5 +32,4 @@ from inputdesign_cli.identification.tests import (
     cross_correlations as cross_correlations,
     whiteness as whiteness,
 )
-from inputdesign_cli.identification.variations import RISING as RISING
 from inputdesign_cli.identification.white import Noise as Noise, noises_of_residuals as noises_of_residuals

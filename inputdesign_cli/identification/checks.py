@@ -5,15 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.information.coordinates import taking_part, triangular_factor
 
-# A direction is not excited where gradients change by more than this share of themselves when they are
-# rounded otherwise.
-_UNCERTAIN = 0.03
 # Residuals of this power relative to the output are rounding, of files with eight digits.
 _EXACT = 1e-16
 # Correlation matrices of residuals with a smaller eigenvalue are singular but for rounding.
@@ -98,38 +93,3 @@ def check_noisy(covariance: Array, y: Array) -> None:
             hint="is one of the outputs computed from the others? Leave it out",
             key="y",
         )
-
-
-def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array) -> Array:
-    """Return the triangular factor L (k, k) of the information matrix of the data, M = L L^T.
-
-    Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
-    common and mean no lack of excitation. So M is never formed, and directions count as undetermined only
-    if the gradients themselves are rounding.
-
-    Args:
-        theta: (k,), where the search ended.
-        rows: gradients in white units, (samples, k).
-        again: these gradients with other rounding.
-
-    Raises:
-        SpecError: `not-exciting`, with the parameters that the data cannot distinguish.
-    """
-    factor, untold = triangular_factor(rows)
-    if not untold.size:
-        changes = scipy.linalg.solve_triangular(factor, (again - rows).T, lower=True).T
-        _, shares, vectors = np.linalg.svd(changes, full_matrices=False)
-        uncertain = vectors[shares > _UNCERTAIN].T
-        sizes = np.linalg.norm(factor, axis=1)[:, None]
-        untold = sizes * scipy.linalg.solve_triangular(factor, uncertain, lower=True, trans="T")
-    if untold.size:
-        ended = [f"{name} = {value:.4g}" for name, value in zip(names, theta, strict=True)]
-        raise bad_spec(
-            "not-exciting",
-            f"the data cannot distinguish these parameters: {taking_part(names, untold)}",
-            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; or "
-            f"the search went astray ({taking_part(ended, untold)}): start elsewhere, beyond poles of "
-            "expressions too",
-            key="u",
-        )
-    return factor

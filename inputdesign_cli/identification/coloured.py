@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +96,11 @@ class ColouredKind(Kind):
         """Return theta, changed where its predictor would be unstable."""
         out = theta.copy()
         out[: self._first] = self.plant.stabilised(theta[: self._first], samples)
-        for columns in self._monic:
+        groups: dict[tuple[str, tuple[tuple[int, int], ...]], list[int]] = {}
+        for index, parameter in enumerate(self.model.own_parameters, start=self._first):
+            if self.model.below(parameter.letter, parameter.places[0][0])[0] is not None:
+                groups.setdefault((parameter.letter, parameter.places), []).append(index)
+        for columns in map(np.array, groups.values()):
             monic = np.append(1.0, theta[columns])
             if not is_stable(monic[None])[0]:
                 out[columns] = reflected(monic)[1:]
@@ -146,15 +150,6 @@ class ColouredKind(Kind):
     def _first(self) -> int:
         """Return the number of parameters of the plant, which come before C and D."""
         return len(self.model.plant.parameters)
-
-    @cached_property
-    def _monic(self) -> list[NDArray[np.int64]]:
-        """Return the indices in theta of the coefficients of each C, and of each D that is estimated."""
-        groups: dict[tuple[str, tuple[tuple[int, int], ...]], list[int]] = {}
-        for index, parameter in enumerate(self.model.own_parameters, start=self._first):
-            if self.model.below(parameter.letter, parameter.places[0][0])[0] is not None:
-                groups.setdefault((parameter.letter, parameter.places), []).append(index)
-        return [np.array(indices) for indices in groups.values()]
 
 
 def _clear(known: Array, signals: Array) -> Array:

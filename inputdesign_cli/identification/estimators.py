@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying, factor_of_data
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.identification.checks import check_length, check_noisy, check_varying
 from inputdesign_cli.identification.coloured import ColouredKind
-from inputdesign_cli.identification.directed import alternative
+from inputdesign_cli.identification.directed import alternative, variations
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import Kind, Starts
+from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.polynomial_rows import FromRest
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.records import (
@@ -41,8 +41,7 @@ from inputdesign_cli.identification.search import Rival, Search, from_rest_or_fr
 from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.transfer_matrix import TransferKind
-from inputdesign_cli.identification.variations import variations
-from inputdesign_cli.information.coordinates import triangular_factor
+from inputdesign_cli.information.coordinates import taking_part, triangular_factor
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -59,7 +58,9 @@ Lengths = Sequence[int] | None
 
 # Numbers that unknown starts may take up: inputs of long dead times are taken for known beyond.
 _MOST = 2e7
-# Parameters this share apart are the same to rounding.
+# A direction is not excited where gradients change by more than this share of themselves when they are
+# rounded otherwise. Parameters this share apart are the same to rounding.
+_UNCERTAIN = 0.03
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
 
@@ -217,7 +218,7 @@ def identify(
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
     best = from_rest_or_free(records, False if ramp else rest, searched, start)
-    return concluded(best, outputs, experiments=experiments or (len(outputs),), feedback=feedback)
+    return concluded(best, parts, experiments=experiments or (len(outputs),), feedback=feedback)
 
 
 def fit_batch(
@@ -298,12 +299,14 @@ def information_begun_anywhere(model: Model, u: Array, y: Array, step: float) ->
     return information_of(free, evaluate(free, model.theta), model.covariance)
 
 
-def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: bool) -> Estimate:
+def concluded(
+    found: Search, parts: Sequence[Part], *, experiments: Sequence[int], feedback: bool
+) -> Estimate:
     """Return the estimate with its covariance and the tests of its residuals.
 
     Args:
         found: where the search ended.
-        y: (samples, p), the outputs as measured.
+        parts: the records as measured.
         experiments: the samples of each experiment.
         feedback: whether u(t) depends on y(t).
 
@@ -314,7 +317,8 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
     noise = noise_of(records, point)
     check_noisy(noise, records.y)
     factor, earlier = factor_at(records, point, noise), records.earlier
-    simulation = _simulation(records, point, y)
+    simulation = _simulation(records, point, np.concatenate([y for _, y in parts]))
+    first = np.array([kind.errors_and_gradient(theta, *part)[0][0] for part in parts])
     known = None if kind.continuous or None in simulation.fit else simulation.outputs
     larger = [alternative(one, records) for one in kind.extensions(theta, feedback=feedback)]
     alternatives = [*larger, *variations(records, theta, known)]
@@ -329,7 +333,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
         point.errors,
         records.lengths,
         Ended(found.converged, found.steps, found.starts, found.rivals),
-        Begun(records.free, found.rest_refuted, found.first),
+        Begun(records.free, found.rest_refuted, first),
         simulation,
         prior,
         tests_of(records, point, noise, alternatives, experiments=experiments, feedback=feedback),
@@ -364,10 +368,14 @@ def noise_of(records: Records, point: Point) -> Array:
 
 
 def factor_at(records: Records, point: Point, noise: Array) -> Array:
-    """Return the triangular factor of the information matrix of records about the parameters.
+    """Return the triangular factor L (k, k) of the information matrix of records, M = L L^T.
+
+    Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
+    common and mean no lack of excitation. So M is never formed, and directions count as undetermined only
+    if the gradients themselves are rounding.
 
     Raises:
-        SpecError: `not-exciting`.
+        SpecError: `not-exciting`, with the parameters that the data cannot distinguish.
     """
     # What is known besides the data counts as further rows.
     known = np.zeros((0, point.theta.size)) if records.earlier is None else records.earlier.rows
@@ -377,7 +385,25 @@ def factor_at(records: Records, point: Point, noise: Array) -> Array:
         np.concatenate([(psi @ root.T).reshape(len(psi), -1).T, known])
         for psi in (point.all_psi, records.at(point.theta * (1.0 + last)).all_psi)
     )
-    return factor_of_data(records.kind.model.names, point.theta, rows, again)
+    factor, untold = triangular_factor(rows)
+    if not untold.size:
+        changes = scipy.linalg.solve_triangular(factor, (again - rows).T, lower=True).T
+        _, changed, vectors = np.linalg.svd(changes, full_matrices=False)
+        uncertain = vectors[changed > _UNCERTAIN].T
+        sizes = np.linalg.norm(factor, axis=1)[:, None]
+        untold = sizes * scipy.linalg.solve_triangular(factor, uncertain, lower=True, trans="T")
+    if untold.size:
+        names = records.kind.model.names
+        ended = [f"{name} = {value:.4g}" for name, value in zip(names, point.theta, strict=True)]
+        raise bad_spec(
+            "not-exciting",
+            f"the data cannot distinguish these parameters: {taking_part(names, untold)}",
+            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high; or "
+            f"the search went astray ({taking_part(ended, untold)}): start elsewhere, beyond poles of "
+            "expressions too",
+            key="u",
+        )
+    return factor
 
 
 def _over_minima(found: Search, factor: Array, noise: Array) -> Array:

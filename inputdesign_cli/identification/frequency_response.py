@@ -162,8 +162,7 @@ def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
 
 def _local_polynomial(records: _Records) -> FrequencyResponse | None:
     """Return the response at lines of the longest record, NaN where inputs are not separable."""
-    (_, u, y), longest = records[0], max(len(y) for *_, y in records)
-    window = _window(records)
+    inputs, longest, window = records[0][1].shape[1], max(len(y) for *_, y in records), _window(records)
     if min(len(y) for *_, y in records) < 2 * window + 4:
         return None
     transformed = [
@@ -181,15 +180,10 @@ def _local_polynomial(records: _Records) -> FrequencyResponse | None:
     frequency = np.asarray(2.0 * np.pi * lines / longest)
     found: list[_Found] = []
     for w in frequency:
-        one = _at(w, transformed, window, u.shape[1], _PARABOLA)
-        if one is None:
-            unknown, each = np.full((y.shape[1], u.shape[1]), np.nan), np.full(y.shape[1], np.nan)
-            found.append((unknown + 0j, unknown, each, each))
-            continue
-        G, radius, noise, coherence = one
+        G, radius, noise, coherence = _at(w, transformed, window, inputs, _PARABOLA)
         # What a parabola may be off where G bends: as much as a line is off it, beyond the noise.
-        straight = _at(w, transformed, window, u.shape[1], _PARABOLA - 1)
-        apart = 0.0 if straight is None else np.abs(G - straight[0]) ** 2
+        straight = _at(w, transformed, window, inputs, _PARABOLA - 1)[0]
+        apart = np.nan_to_num(np.abs(G - straight) ** 2)
         found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), noise, coherence))
     responses, discs, spectra, shares = (np.array(values) for values in zip(*found, strict=True))
     return FrequencyResponse(frequency, responses, discs, spectra, shares, "local_polynomial")
@@ -228,8 +222,8 @@ def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse 
     return FrequencyResponse(frequency, G, radius, noise, coherence, "local_polynomial")
 
 
-def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> _Found | None:
-    """Return the local estimate at w from polynomials of some terms; None if inputs are not separable."""
+def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> _Found:
+    """Return the local estimate at w from polynomials of some terms; NaN if inputs are not separable."""
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):
         last = (lines.size - 1) // 2
@@ -244,15 +238,16 @@ def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> 
     matrix, target = np.concatenate(rows), np.concatenate(targets)
     scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
     left, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
+    outputs = target.shape[1] - inputs
+    entries, each = np.full((outputs, inputs), np.nan), np.full(outputs, np.nan)
     if singular[-1] <= _DEPENDENT * singular[0]:
-        return None
+        return entries + 0j, entries, each, each
     inverse = (right.conj().T / singular) @ left.conj().T / scale[:, None]
     found = inverse @ target
-    outputs = target.shape[1] - inputs
     from_x = found[:inputs].T
     to_u = from_x[outputs:]
     if np.linalg.cond(to_u) > 1.0 / _DEPENDENT:
-        return None
+        return entries + 0j, entries, each, each
     back = np.linalg.inv(to_u)
     G = from_x[:outputs] @ back
     residuals = target - matrix @ found

@@ -71,7 +71,7 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: fl
 
     Args:
         idle: the decrease of -2 log likelihood in ten steps below which a run has settled. It has settled as
-            well where no step, however short, decreases the cost. At zero such a run is given up.
+            well where no step, however short, decreases the cost. At zero this run is given up.
     """
     theta = problem.stabilised(start)
     runs = theta.shape[0]

@@ -141,7 +141,9 @@ def cubes(
     )
     excited = np.zeros_like(Y)
     excited[lines] = Y[lines]
-    of_input, of_output = (_cubed(X, periods.period) for X in (U, excited))
+    varying = (np.concatenate([0.0 * X[:1], X[1:]]) * periods.period for X in (U, excited))
+    signals = (np.fft.irfft(X, periods.period, axis=0) for X in varying)  # about zero
+    of_input, of_output = (np.fft.rfft(x**3, axis=0) / periods.period for x in signals)
     at_silent, at_lines = (
         # What the cube of each input does at the outputs (candidates, lines, p, blocks), then of the output.
         np.stack([*np.einsum("npr,nrb->rnpb", G, of_input[at]), of_output[at]])
@@ -156,12 +158,6 @@ def cubes(
         np.minimum(len(probability) * probability[best, outputs], 1.0),
         np.where(best == len(at_silent) - 1, -1, best),
     )
-
-
-def _cubed(X: ComplexArray, period: int) -> ComplexArray:
-    """Return the transforms of the cubes of signals about zero, harmonics first."""
-    signal = np.fft.irfft(np.concatenate([0.0 * X[:1], X[1:]]) * period, period, axis=0)
-    return np.asarray(np.fft.rfft(signal**3, axis=0) / period)
 
 
 def _carried(

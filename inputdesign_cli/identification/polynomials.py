@@ -134,9 +134,8 @@ class PolynomialKind(Kind):
                 earlier[i, j] -= 1
                 sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
                 larger.append((sooner, "coefficient in B before the others"))
-        for i, row in enumerate(model.A):
-            if row.size > 1:
-                larger.append((replace(model, A=_longer(model.A, i)), "pole in A"))
+        for i in (i for i, row in enumerate(model.A) if row.size > 1):
+            larger.append((replace(model, A=_longer(model.A, i)), "pole in A"))
         for i in range(len(model.C)):
             larger.append((replace(model, C=_longer(model.C, i)), "coefficient in C"))
         for i in range(len(model.D)):

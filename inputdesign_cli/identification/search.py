@@ -61,7 +61,6 @@ class Search:
     converged: bool
     steps: int
     starts: int
-    first: Array  # (parts, p), the first residuals if each record began at rest about zero, noise as well
     rivals: tuple[Rival, ...]  # other minima that explain the records nearly as well, far from the best
     beside: tuple[tuple[Point, float], ...]  # those beyond instants near it, with their excess
     rest_refuted: bool = False  # whether the records say that they do not begin at rest about zero
@@ -79,20 +78,15 @@ def search(records: Records, points: Array, *, starts: int, quick: int | None = 
     found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS, idle=idle)
     found = found if quick else _beyond_instants(records, found)
     best = best_run(found)
-    steps, first = int(found.steps[best]), _first(records, found.theta[best])
-    point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])
+    steps, converged = int(found.steps[best]), bool(found.converged[best])
+    point = evaluate(records, found.theta[best])
     if quick:
-        return Search(records, point, converged, steps, starts, first, (), ())
+        return Search(records, point, converged, steps, starts, (), ())
     if not converged and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
-        first = _first(records, point.theta)
     others = rivals(point, found), _minima_beside(records, point, found)
-    return Search(records, point, converged, steps, starts, first, *others)
-
-
-def _first(records: Records, theta: Array) -> Array:
-    return np.array([records.kind.errors_and_gradient(theta, *part)[0][0] for part in records.parts])
+    return Search(records, point, converged, steps, starts, *others)
 
 
 def _likely(point: Point, found: Minimum) -> Iterator[tuple[int, Array, float]]:
@@ -285,11 +279,10 @@ def from_rest_or_free(
             # Unknown inputs may explain half of a record, whatever the model.
             swamped = 2 * now * records.u.shape[1] > records.longest
             if now in tried or len(tried) > _MOST_COUNTS or swamped:
-                found = tried[min(tried)]  # the fewest unknown inputs explain the least by chance
-                break
+                return tried[min(tried)]  # the fewest unknown inputs explain the least by chance
             late = now
             tried[late] = found = searched(deviations.begun_freely(late), found.point.theta)
-        return replace(found, first=_first(records, found.point.theta))
+        return found
 
     if rest is False:
         return begun_free(None, later(about))

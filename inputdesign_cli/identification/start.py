@@ -31,8 +31,6 @@ _INSIDE = 1e-5
 # Directions of the unknown starts below this size, columns scaled, are linearly dependent.
 _DEPENDENT = 1e-7
 _MOST_ROUNDS = 30
-# Normal equations of outputs whose errors are alike beyond this lose too many digits.
-_ALIKE = 1e-6
 
 
 class Start(NamedTuple):
@@ -247,12 +245,8 @@ class FreeStarts:
                 if weights is not None or abs(size - previous) <= 1e-14 * size:
                     break
                 previous = size
-            # An orthonormal basis of columns of unit length, whose products are known.
             directions = (plain[:, None] * scaled[:, of]).reshape(-1, of.size)
-            if of.size and np.linalg.eigvalsh(gram)[0] < _ALIKE:
-                directions = np.linalg.qr(directions)[0]
-            else:
-                directions = directions @ np.linalg.inv(np.linalg.cholesky(gram)).T
+            directions = np.linalg.qr(directions)[0]
         coefficients = [np.zeros((len(self.lengths), len(x.free) + len(x.noise))) for x in self.starts]
         ends = np.cumsum([basis.directions.shape[1] for _, _, basis in self._blocks])[:-1]
         for (record, i, basis), own in zip(self._blocks, np.split(shares, ends), strict=True):

@@ -1,12 +1,19 @@
-"""Estimate transfer matrices in s from sampled records, with white noise of an unknown covariance."""
+"""Estimate transfer matrices in s from sampled records, with white noise of an unknown covariance.
+
+A search begins at estimates that need no start themselves. Derivatives of inputs and outputs are had through
+a state-variable filter 1 / (s + cutoff)^m, and a model with one denominator for the whole row of an output
+follows by least squares ([young-jakeman-1980]; [garnier-wang-2008], Chapter 1). Entries of lower order have
+its slowest poles.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial import polynomial as ascending
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
@@ -14,9 +21,8 @@ from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts, late_samples
 from inputdesign_cli.identification.polynomials import with_entry
-from inputdesign_cli.identification.records import RecordProblem, Records
+from inputdesign_cli.identification.records import RecordProblem, Records, shifted
 from inputdesign_cli.identification.start import Start
-from inputdesign_cli.identification.transfer_starts import starting_points
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
@@ -32,6 +38,12 @@ _FASTEST = 1e4
 _STEP = 1e-6
 # Of a sample: a dead time of zero would be none, and no parameter.
 _LEAST_DELAY = 1e-12
+_CUTOFFS = 5
+# Dead times are tried sample by sample up to _FINE samples, then in steps that grow by _GROWTH.
+_FINE, _GROWTH = 20, 1.1
+_SWEEPS, _MINIMA = 2, 6
+
+Place = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -41,7 +53,7 @@ class TransferKind(Kind):
     model: ContinuousModel
     between: Intersample
     # Known dead times of entries, which starts keep.
-    held: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    held: Mapping[Place, float] = field(default_factory=dict)
 
     @property
     def continuous(self) -> bool:
@@ -108,7 +120,11 @@ class TransferKind(Kind):
         slowest, fastest = _LEAST_DECAY / (samples * step), _FASTEST / step
         out, late = theta.copy(), self.model.dead_times
         out[late] = np.clip(out[late], _LEAST_DELAY * step, (samples - 1) * step)
-        for every in self._denominators:
+        groups: dict[tuple[Place, ...], list[int]] = {}
+        for index, parameter in enumerate(self.model.parameters):
+            if parameter.letter == "a":
+                groups.setdefault(parameter.places, []).append(index)
+        for every in map(np.array, groups.values()):
             columns = every[integrators(np.append(theta[every], 1.0)) :]
             poles = polynomial_roots(np.append(theta[columns], 1.0))
             if np.all(poles.real <= -slowest) and np.all(np.abs(poles) <= fastest):
@@ -124,7 +140,7 @@ class TransferKind(Kind):
         above = np.array([parameter.letter == "b" for parameter in self.model.parameters])
         made = []
         for u, y in parts:
-            for theta in starting_points(self.model, self.between, self.held, u, y):
+            for theta in _starting_points(self.model, self.between, self.held, u, y):
                 begun = self.stabilised(theta, len(y))
                 # The errors are linear in the numerators, which are zero so far.
                 errors, psi = self.errors_and_gradient(begun, u, y)
@@ -174,15 +190,6 @@ class TransferKind(Kind):
             found.append(Extension(shown, TransferKind(one, self.between), name, what))
         return tuple(found)
 
-    @cached_property
-    def _denominators(self) -> list[NDArray[np.int64]]:
-        """Return the indices in theta of the coefficients of each denominator."""
-        groups: dict[tuple[tuple[int, int], ...], list[int]] = {}
-        for index, parameter in enumerate(self.model.parameters):
-            if parameter.letter == "a":
-                groups.setdefault(parameter.places, []).append(index)
-        return [np.array(indices) for indices in groups.values()]
-
 
 @lru_cache(maxsize=32)
 def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int) -> Array:
@@ -192,3 +199,121 @@ def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int)
     entering = np.concatenate([impulses, np.ones((int(entry.order > 0), samples))])
     poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
     return filtered([1.0], poles, entering)
+
+
+def _starting_points(
+    model: ContinuousModel, between: Intersample, held: Mapping[Place, float], u: Array, y: Array
+) -> Array:
+    """Return dead times and denominators (points, k), numerators zero, for each cutoff, from one record.
+
+    Cutoffs lie between the record's length and its step. Dead times are searched on a grid, one after the
+    other, by the residuals of the regression of the row. A single one also takes its next best minima.
+
+    Args:
+        model: gives the structure.
+        held: known dead times of entries.
+        u, y: (N, r), (N, p).
+    """
+    samples, step, points = len(y), between.sample_time, []
+    for cutoff in np.geomspace(8.0 * np.pi / (samples * step), 0.5 * np.pi / step, _CUTOFFS):
+        behind = _Filtered(model, between, u, y, float(cutoff))
+        for delays in _delays(model, behind, held, _grid(samples) * step):
+            theta = np.zeros(len(model.parameters))
+            for index, parameter in enumerate(model.parameters):
+                i, j = parameter.places[0]
+                if parameter.letter == DELAY:
+                    theta[index] = delays[i, j]
+                elif parameter.letter == "a":
+                    theta[index] = behind.denominator(i, j, delays)[parameter.power]
+            points.append(theta)
+    return np.array(points)
+
+
+def _delays(
+    model: ContinuousModel, filtered: _Filtered, held: Mapping[Place, float], grid: Array
+) -> list[dict[Place, float]]:
+    """Return dead times of all entries: the best on the grid, and for a single one its next best minima."""
+    best = {place: held.get(place, model.dead_time(*place)) for place in model.active}
+    groups = [
+        p.places for p in model.parameters if p.letter == DELAY and not any(x in held for x in p.places)
+    ]
+    if not groups:
+        return [best]
+    ranked, alone = grid, len(groups) == 1
+    for _ in range(1 if alone else _SWEEPS):
+        for places in groups:
+            outputs = {i for i, _ in places}
+            tried = [best | dict.fromkeys(places, float(delay)) for delay in grid]
+            left = np.array([sum(filtered.regression(i, delays)[1] for i in outputs) for delays in tried])
+            padded = np.concatenate([[np.inf], left, [np.inf]])
+            minima = np.flatnonzero((left <= padded[:-2]) & (left <= padded[2:]))
+            ranked = grid[minima[np.argsort(left[minima])]]
+            best |= dict.fromkeys(places, float(ranked[0]))
+    beside = ranked[1:_MINIMA].tolist() if alone else []
+    return [best, *(best | dict.fromkeys(groups[0], delay) for delay in beside)]
+
+
+def _grid(samples: int) -> Array:
+    """Return dead times in samples: one by one, then ever longer ones, up to a third of the record."""
+    longest = max(samples // 3, 1)
+    fine = np.arange(min(_FINE, longest))
+    steps = 1 + int(np.log(max(longest / _FINE, 1.0)) / np.log(_GROWTH))
+    far = np.rint(np.geomspace(_FINE, longest, steps)) if longest > _FINE else np.zeros(0)
+    return np.concatenate([fine, far])
+
+
+@dataclass
+class _Filtered:
+    """Derivatives of the signals of a record behind one state-variable filter, in units of its cutoff."""
+
+    model: ContinuousModel
+    between: Intersample
+    u: Array
+    y: Array
+    cutoff: float
+    _columns: dict[tuple[int, int, float], Array] = field(default_factory=dict)
+
+    def denominator(self, output: int, input: int, delays: Mapping[Place, float]) -> Array:
+        """Return the denominator of an entry, ascending in s: of the slowest poles that do not integrate."""
+        own = self.model.denominator[output][input]
+        zeros = integrators(own)
+        below = np.append(self.regression(output, delays)[0], 1.0)
+        poles = self.cutoff * np.array(sorted(polynomial_roots(below), key=abs))
+        found = np.atleast_1d(np.poly(poles[zeros : own.size - 1])).real[::-1]
+        return np.concatenate([np.zeros(zeros), found])
+
+    def regression(self, output: int, delays: Mapping[Place, float]) -> tuple[Array, float]:
+        """Return the denominator of a row, and the unexplained share of the power of its highest derivative.
+
+        This derivative of the output is regressed on lower ones and on derivatives of the inputs.
+        """
+        places = [place for place in self.model.active if place[0] == output]
+        m = max(self.model.denominator[i][j].size - 1 for i, j in places)
+        y = self._derivatives(-1 - output, m, 0.0, hold=False)
+        hold, above = self.between.hold, [self.model.numerator[i][j].size for i, j in places]
+        parts = [
+            self._derivatives(j, m, delays[i, j], hold=hold)[:, :most]
+            for (i, j), most in zip(places, above, strict=True)
+        ]
+        matrix, target = np.column_stack([-y[:, :m], *parts]), y[:, m]
+        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+        solution = np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale
+        left = float(np.sum((target - matrix @ solution) ** 2))
+        return solution[:m], left / max(float(np.sum(target**2)), 1e-300)
+
+    def _derivatives(self, signal: int, m: int, delay: float, *, hold: bool) -> Array:
+        """Return derivatives (N, m + 1) of input j >= 0 or output -1 - j, filtered by 1 / (s + 1)^m."""
+        key = (signal, m, delay)
+        if key not in self._columns:
+            step = self.between.sample_time
+            x = self.u[:, signal] if signal >= 0 else self.y[:, -1 - signal]
+            chain = HeldEntry.of(np.ones(1), _power(self.cutoff, m), step, delay or None)
+            low = self.between.responses(chain, x, hold=hold)[:, :m]
+            late = shifted(x, int(np.rint(delay / step)), (x.size,))
+            self._columns[key] = np.column_stack([low, late - low @ _power(1.0, m)[:-1]])
+        return self._columns[key]
+
+
+def _power(cutoff: float, order: int) -> Array:
+    """Return the coefficients of (s + cutoff)^order, ascending."""
+    return np.asarray(ascending.polypow([cutoff, 1.0], order), dtype=float)

@@ -64,8 +64,18 @@ class Whitening:
 
     @classmethod
     def of(cls, errors: Array, lengths: tuple[int, ...]) -> Whitening:
-        """Return the filters for residuals (N, p): autoregressions, of the orders that BIC prefers."""
-        return cls(tuple(_autoregression(v, lengths) for v in errors.T), lengths)
+        """Return the filters for residuals (N, p): autoregressions by least squares, of orders by BIC."""
+        most = max(min(_MOST, len(errors) // _SAMPLES_A_COEFFICIENT), 1)
+        found, orders = [], np.arange(most + 1)
+        for v in errors.T:
+            past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
+            # Squares of orders that nest, from one triangle.
+            triangle = np.linalg.qr(np.column_stack([past, v]))[1]
+            left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
+            order = int(np.argmin(v.size * np.log(left[: most + 1]) + orders * np.log(v.size)))
+            ahead = scipy.linalg.solve_triangular(triangle[:order, :order], triangle[:order, -1])
+            found.append(reflected(np.append(1.0, -ahead)))
+        return cls(tuple(found), lengths)
 
     def through(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return signals (.., N + M, p) filtered record by record; the M errors before the records stay.
@@ -95,19 +105,6 @@ class Whitening:
         alone, impulse = replace(self, lengths=(samples,)), np.eye(1, samples)[0]
         coloured = np.stack([filtered([1.0], filter, impulse) for filter in self.filters], axis=1)
         return alone.slopes(coloured)[:, :, :, None] * np.eye(p)
-
-
-def _autoregression(v: Array, lengths: Sequence[int]) -> Array:
-    """Return the monic polynomial of the order that BIC prefers, by least squares over all records."""
-    most = max(min(_MOST, v.size // _SAMPLES_A_COEFFICIENT), 1)
-    past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
-    # Squares of orders that nest, from one triangle.
-    triangle = np.linalg.qr(np.column_stack([past, v]))[1]
-    left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
-    orders = np.arange(most + 1)
-    order = int(np.argmin(v.size * np.log(left[: most + 1]) + orders * np.log(v.size)))
-    ahead = scipy.linalg.solve_triangular(triangle[:order, :order], triangle[:order, -1])
-    return reflected(np.append(1.0, -ahead))
 
 
 @dataclass(frozen=True)
@@ -199,13 +196,13 @@ class White:
         freedom, v = directions.shape[1], 0.0
         if np.any(self.echoes):
             slopes = 2.0 * _traces(self.echoes, self._correlations(directions)) / freedom
-            v = self.variance * float(np.sum((slopes @ self._spread) ** 2))
+            v = self.variance * float(np.sum((slopes @ self.spread) ** 2))
         if v <= _WELL_KNOWN:
             return float(scipy.special.chdtrc(freedom, statistic))
         return float(scipy.special.fdtrc(freedom, 2.0 / v, statistic / freedom))
 
     @cached_property
-    def _spread(self) -> Array:
+    def spread(self) -> Array:
         """Return the matrix (k, (N + M) p) that maps residuals to parameters if starts are unknown."""
         scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
         inverse = np.linalg.pinv(self.explained / scale, rcond=1e-12) / scale[:, None]
@@ -226,9 +223,7 @@ class White:
         """Return the means (m,) of scores of columns (N p, m) less the part that parameters explain."""
         if not np.any(means) and not np.any(self.means):
             return np.zeros(columns.shape[1])
-        scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
-        shares = np.linalg.lstsq(self.explained / scale, columns, rcond=1e-12)[0] / scale[:, None]
-        return np.asarray(means - self.means @ shares[-self.means.size :])
+        return np.asarray(means - self.means @ (self.spread @ columns))
 
     @property
     def errors(self) -> Array:

@@ -1,7 +1,6 @@
 """Files of data become records: tables, times, columns, segments, and what was done to them."""
 
 from inputdesign_cli.records.columns import with_channels as with_channels
-from inputdesign_cli.records.preparation import Preparation as Preparation, Run as Run
 from inputdesign_cli.records.reading import read_sheet as read_sheet
 from inputdesign_cli.records.record import (
     Record as Record,
@@ -9,4 +8,4 @@ from inputdesign_cli.records.record import (
     read_log as read_log,
     read_logs as read_logs,
 )
-from inputdesign_cli.records.sheet import Sheet as Sheet
+from inputdesign_cli.records.sheet import Preparation as Preparation, Run as Run, Sheet as Sheet

@@ -211,7 +211,9 @@ def with_days(sheet: Sheet) -> Sheet:
     fall by more than half a day belong to the next day.
     """
     columns = list(sheet.columns)
-    dates = [i for i, column in enumerate(columns) if _of_dates(column)]
+    days = [column.numbers[~np.isnan(column.numbers)] / _A_DAY for column in columns]
+    whole = [bool(np.all(np.abs(each - np.round(each)) < 1e-6)) for each in days]
+    dates = [i for i, one in enumerate(columns) if one.dated and not one.of_day and whole[i]]
     clocks = [i for i, column in enumerate(columns) if column.of_day]
     for i in clocks:
         clock = columns[i]
@@ -229,11 +231,6 @@ def with_days(sheet: Sheet) -> Sheet:
         done = f"{sheet.name_of(i)} passes midnight {int(falls.sum())} times: a day was added each time"
         columns[i] = replace(clock, numbers=numbers, done=(done,) if np.any(falls) else ())
     return replace(sheet, columns=tuple(columns))
-
-
-def _of_dates(column: Column) -> bool:
-    days = column.numbers[~np.isnan(column.numbers)] / _A_DAY
-    return column.dated and not column.of_day and bool(np.all(np.abs(days - np.round(days)) < 1e-6))
 
 
 def is_date_in_digits(x: Array) -> bool:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import STANDARD_STREAM, DataError
 from inputdesign_cli.records.arrays import MOST_UNPACKED, arrays_of_mat, columns_of_arrays
 from inputdesign_cli.records.cells import with_days
-from inputdesign_cli.records.preparation import Preparation
-from inputdesign_cli.records.sheet import Sheet, Source
+from inputdesign_cli.records.sheet import Preparation, Sheet, Source
 from inputdesign_cli.records.text import decoded, sheet_of, table_in
 from inputdesign_cli.regular_file import read_regular
 

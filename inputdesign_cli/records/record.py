@@ -16,12 +16,12 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
 from inputdesign_cli.findings.places import Recorded, Samples
 from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_against_spec
-from inputdesign_cli.identification import resolution_of
+from inputdesign_cli.identification.faults import resolution_of
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.records.columns import called, rising, roles_of, without_times
-from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.reading import read_sheet
 from inputdesign_cli.records.segments import EVEN, segments_of
+from inputdesign_cli.records.sheet import Preparation
 from inputdesign_cli.records.signals import SHORTEST, Signals, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
@@ -42,9 +42,9 @@ class Record(Samples):
         header: the names of the columns of the first file, in small letters.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
         repeated: files that have samples in common.
+        remarks: what a question did to the record later.
         lined: whether a line was taken away from an output. Its slope is then estimated with the model, since
             the inputs cause a part of it.
-        remarks: what a question did to the record later.
     """
 
     names: dict[str, str] = field(default_factory=dict)
@@ -68,14 +68,10 @@ class Record(Samples):
         at = np.cumsum(self.lengths)[:-1]
         return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
 
-    def files_of(self, samples: NDArray[np.int64]) -> tuple[tuple[str, int], ...]:
-        """Return the name of each file, and how many of these samples it has."""
-        ends = np.cumsum([count for _, count in self.files])
-        counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends))
-        return tuple((name, int(count)) for (name, _), count in zip(self.files, counts, strict=True))
-
     def at(self, samples: NDArray[np.int64], lengths: tuple[int, ...]) -> Record:
         """Return the record at some of the samples, in segments of these lengths."""
+        ends = np.cumsum([count for _, count in self.files])
+        counts = np.bincount(np.searchsorted(ends, samples, side="right"), minlength=len(ends)).tolist()
         return replace(
             self,
             u=self.u[samples],
@@ -83,7 +79,7 @@ class Record(Samples):
             y=self.y[samples],
             time=self.time[samples],
             lengths=lengths,
-            files=self.files_of(samples),
+            files=tuple((name, count) for (name, _), count in zip(self.files, counts, strict=True)),
             recorded=None if self.recorded is None else self.recorded.at(samples),
         )
 

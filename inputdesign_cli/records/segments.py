@@ -20,7 +20,7 @@ from inputdesign_cli.findings.prepared_records import (
     TREND_REMOVED,
 )
 from inputdesign_cli.outcome.shares import per_cent
-from inputdesign_cli.records.preparation import Detrend, Preparation
+from inputdesign_cli.records.sheet import Detrend, Preparation
 from inputdesign_cli.records.signals import SHORTEST, Signals
 
 # Times may be off by this share of the sample time unsaid, and by the second with a finding.
@@ -68,9 +68,9 @@ def segments_of(
             hint = f"add --resample to even out more than {MOST_JITTER:.0%}; or give the right --sample-time"
             raise sheet.error("data-not-uniform", f"{fact}, and gaps begin at {_GAP} steps", hint, row)
         evened = [JITTER_EVENED.found(fact, step=step, largest=off)]
-        moved = sum(_moves_between(part, step) for part in parts)
+        parts, moves = map(list, zip(*(_resampled(part, step) for part in parts), strict=True))
+        moved = sum(moves)
         evened += INPUTS_MOVE_BETWEEN.when(moved, f"between {moved} of the even times", instants=moved)
-        parts = [_resampled(part, step) for part in parts]
     taken = [_detrended(part, signals.names, preparation) for part in parts]
     trends = [one for _, found in taken for one in found]
     return [part for part, _ in taken], [*evened, *cuts, *seen, *dict.fromkeys(trends)]
@@ -109,26 +109,18 @@ def _cut(
     return [Segment(time[part], signals.u[part], signals.y[part]) for part in longer], found
 
 
-def _resampled(part: Segment, step: float) -> Segment:
-    """Resample a segment at even times: outputs by linear interpolation, inputs at the nearest sample."""
-    even, nearest = _even_instants(part, step)
-    y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
-    return Segment(even, part.u[nearest], y)
+def _resampled(part: Segment, step: float) -> tuple[Segment, int]:
+    """Resample a segment at even times: outputs by linear interpolation, inputs at the nearest sample.
 
-
-def _moves_between(part: Segment, step: float) -> int:
-    """Count the even times after which inputs differ at samples that are left out."""
-    nearest = _even_instants(part, step)[1]
-    last = np.searchsorted(nearest, np.arange(nearest[-1] + 1), side="right") - 1
-    moved = np.any(part.u[: nearest[-1] + 1] != part.u[nearest[last]], axis=1)
-    return int(np.unique(last[moved]).size)
-
-
-def _even_instants(part: Segment, step: float) -> tuple[Array, NDArray[np.int64]]:
-    """Return times (n,) that are `step` apart, and the sample (n,) nearest to each."""
+    The number is that of even times after which inputs differ at samples that are left out.
+    """
     count = int(np.floor((part.time[-1] - part.time[0]) / step + 0.5)) + 1
     even = part.time[0] + step * np.arange(count)
-    return even, np.searchsorted(0.5 * (part.time[1:] + part.time[:-1]), even)
+    nearest = np.searchsorted(0.5 * (part.time[1:] + part.time[:-1]), even)
+    last = np.searchsorted(nearest, np.arange(nearest[-1] + 1), side="right") - 1
+    moved = np.any(part.u[: nearest[-1] + 1] != part.u[nearest[last]], axis=1)
+    y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
+    return Segment(even, part.u[nearest], y), int(np.unique(last[moved]).size)
 
 
 def _detrended(

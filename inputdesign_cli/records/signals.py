@@ -16,8 +16,7 @@ from inputdesign_cli.findings.outlying_values import beyond_precision
 from inputdesign_cli.findings.prepared_records import COLUMNS_JOINED, SHEETS_UNREAD, TIMES_READ
 from inputdesign_cli.records.cells import SAY_TIME, is_date_in_digits
 from inputdesign_cli.records.columns import TIME_UNITS, called, column_named, columns_of, rising, time_unit_in
-from inputdesign_cli.records.preparation import Preparation, Run
-from inputdesign_cli.records.sheet import Sheet
+from inputdesign_cli.records.sheet import Preparation, Run, Sheet
 
 # Steps of time differ from a round number by less than this share of it by rounding alone.
 _ROUND = 1e-4

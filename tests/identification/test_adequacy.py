@@ -1,4 +1,4 @@
-"""Tests of the structure: their level, their power, and the regression that they stand for."""
+"""Tests of the structure: their level, their power, their regression; noise that the model does not have."""
 
 import runpy
 from pathlib import Path
@@ -8,10 +8,10 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from inputdesign_cli.identification import identify
+from inputdesign_cli.identification import identify, noises_of_residuals
 from inputdesign_cli.identification.adequacy import ScoreTest, failed
-from inputdesign_cli.identification.white import White
-from inputdesign_cli.levels import level
+from inputdesign_cli.identification.white import White, Whitening
+from inputdesign_cli.levels import RATE, SHARES, level
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
@@ -88,20 +88,6 @@ def test_noise_is_known_no_better_than_its_zero(w):
     variance = slope**2 / np.sum(psi**2)
     expected = scipy.stats.f.sf(11.0, 1, 2.0 / variance) if variance > 1e-3 else scipy.stats.chi2.sf(11.0, 1)
     assert white.probability(11.0, along / np.linalg.norm(along)) == pytest.approx(expected, rel=0.02)
-
-
-@pytest.mark.slow
-def test_slow_noise_that_is_hardly_known_is_no_drift():
-    """Taken for known, the noise below its zero had a probability below 0.05 in 9 of these 25 records."""
-    rng, model = np.random.default_rng(9), one_channel([0, 1.0], C=[1, -0.9])
-    found = []
-    for _ in range(25):
-        u, e = rng.standard_normal((200, 1)), rng.standard_normal((200, 1))
-        y = scipy.signal.lfilter([0, 1.0], [1.0], u, axis=0) + scipy.signal.lfilter(
-            [1, -0.9], [1.0], e, axis=0
-        )
-        found.append(by_name(identify(model, u, y, start=model.theta))["trend"].probability)
-    assert np.sum(np.array(found) < 0.05) <= 4
 
 
 @pytest.mark.first(1)
@@ -204,3 +190,86 @@ def test_the_right_model_of_a_plant_that_only_its_loop_holds_is_not_refuted(pole
     right, wrong = np.sum(refuted, axis=0)
     assert right <= 1
     assert wrong >= 3
+
+
+LENGTHS = (250, 150)
+FIR = one_channel([0, 1.0, 0.5])
+
+
+def record(seed, *, distorted=lambda u: u, samples=400):
+    """Slow inputs, a plant of two coefficients, and noise that fades in ten samples."""
+    rng = np.random.default_rng(seed)
+    u = scipy.signal.lfilter([0.4], [1.0, -0.9], rng.standard_normal(samples))
+    noise = scipy.signal.lfilter([0.1], [1.0, -0.9], rng.standard_normal(samples))
+    return u[:, None], (scipy.signal.lfilter([0.0, 1.0, 0.5], [1.0], distorted(u)) + noise)[:, None]
+
+
+def blamed(found):
+    return {test.fault for test in (*found.tests.failed, *found.tests.answering)} - {"noise"}
+
+
+@pytest.mark.slow
+def test_no_plant_is_blamed_for_slow_noise():
+    """White residuals are a wrong model in all records; a right plant fails no more often than the rate."""
+    found = [identify(FIR, *record(seed), rest=True) for seed in range(25)]
+    assert all(one.tests.coloured for one in found)
+    assert sum(bool(blamed(one)) for one in found) <= scipy.stats.binom.ppf(0.999, len(found), RATE)
+
+
+@pytest.mark.first(2)
+@pytest.mark.parametrize(
+    ("fault", "distorted"),
+    [
+        ("nonlinear", lambda u: np.clip(u, -0.6, 0.6)),
+        ("plant", lambda u: u + 0.3 * np.append(np.zeros(4), u[:-4])),
+        ("change", lambda u: np.linspace(0.75, 1.25, u.size) * u),
+        ("feedback", lambda u: u + 0.5 * np.append(u[3:], np.zeros(3))),
+    ],
+)
+def test_slow_noise_hides_no_fault(fault, distorted):
+    found = [blamed(identify(FIR, *record(seed, distorted=distorted), rest=True)) for seed in range(4)]
+    assert sum(fault in one for one in found) >= 3
+
+
+def test_units_do_not_matter():
+    u, y = record(3)
+    one, other = identify(FIR, u, y, rest=True), identify(FIR, 1e3 * u, 1e-4 * y, rest=True)
+    for mine, its in zip(
+        (*one.tests.scores, *one.tests.future), (*other.tests.scores, *other.tests.future), strict=True
+    ):
+        assert its.statistic == pytest.approx(mine.statistic, rel=1e-6)
+
+
+def test_residuals_become_white_record_by_record():
+    rng = np.random.default_rng(5)
+    parts = [scipy.signal.lfilter([1.0], [1.0, -1.2, 0.5], rng.standard_normal(n)) for n in LENGTHS]
+    v = np.concatenate(parts)[:, None]
+    whitening = Whitening.of(v, LENGTHS)
+    assert whitening.filters[0][:3] == pytest.approx([1.0, -1.2, 0.5], abs=0.15)
+    order = whitening.filters[0].size - 1
+    apart = [np.convolve(part, whitening.filters[0])[: len(part)] for part in parts]
+    for part in apart:
+        part[:order] = 0.0
+    assert whitening.through(v)[:, 0] == pytest.approx(np.concatenate(apart))
+
+
+def test_slopes_of_filtered_residuals_are_differences():
+    v = np.random.default_rng(6).standard_normal((400, 1))
+    whitening, step = Whitening((np.array([1.0, -0.4, 0.2]),), LENGTHS), 1e-6
+    for k, slope in enumerate(whitening.slopes(v), start=1):
+        moved = [whitening.filters[0] + sign * step * (np.arange(3) == k) for sign in (1.0, -1.0)]
+        above, below = (Whitening((filter,), LENGTHS).through(v) for filter in moved)
+        inside = np.r_[2:250, 252:400]
+        assert slope[inside] == pytest.approx(((below - above) / (2.0 * step))[inside], abs=1e-6)
+
+
+def test_the_noise_of_residuals_is_found():
+    e = np.random.default_rng(7).standard_normal(4000)
+    v = scipy.signal.lfilter([1.0, 0.5], [1.0, -0.8], e)[:, None]
+    ((C, D),) = noises_of_residuals(v, (4000,))[0]
+    assert pytest.approx([1.0, 0.5], abs=0.1) == C[:2]
+    assert pytest.approx([1.0, -0.8], abs=0.1) == D[:2]
+
+
+def test_the_shares_of_all_tests_are_no_more_than_one():
+    assert sum(SHARES.values()) <= 1.0

@@ -1,22 +1,20 @@
-"""Tests of one parameter more: the regression that they stand for, their power, and how far G would move."""
+"""Tests of one parameter more: their regression, their power, how far G would move, and when that matters."""
 
 import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.signal
 import scipy.stats
 
-from inputdesign_cli.identification import identify
+from inputdesign_cli.identification import Moves, identify, that_matter
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.levels import level
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
-from tests.support.plants import arx
-from tests.support.records import shifted, simulated
+from tests.support.records import shifted
 
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 W = np.linspace(0.01, 3.0, 50)
 
 
@@ -107,20 +105,6 @@ def test_what_acts_alike_where_it_is_small_shares_a_test():
     assert set(by_name(found)) == {"b3 or f3", "b0", "c2 or d2"}
 
 
-@pytest.mark.slow
-def test_probabilities_of_right_models_are_uniform():
-    """Kolmogorov and Smirnov over 12 records of one output; the share below 5 % in 8 of two."""
-    rng = np.random.default_rng(4)
-    u, y = data("bj", 300, rng, runs=12)
-    found = [identify(SYSTEMS["bj"], u[i], y[i], start=SYSTEMS["bj"].theta, rest=True) for i in range(12)]
-    for name in by_name(found[0]):
-        assert scipy.stats.kstest([by_name(f)[name].test.probability for f in found], "uniform").pvalue > 1e-3
-    u, y = simulated(arx(), 300, rng, 8)
-    found = [identify(arx(), u[i], y[i], start=arx().theta, rest=True) for i in range(8)]
-    below = [one.test.probability < 0.05 for f in found for one in f.tests.directed]
-    assert scipy.stats.binomtest(sum(below), len(below), 0.05).pvalue > 1e-3
-
-
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("B", "F", "first"),
@@ -160,19 +144,60 @@ def test_a_dead_time_in_s_is_found(hold):
     assert test.larger.theta[test.larger.names.index("delay")] == pytest.approx(0.3, abs=0.05)
 
 
-@pytest.mark.slow
-def test_a_level_and_a_state_add_unknowns_not_verdicts():
-    u, y = (x[0] for x in data("oe", 150, np.random.default_rng(7)))
-    found = identify(one_channel([0, 1.0, 0.5], F=[1, -0.7]), u, y + 30.0, rest=False)
-    assert min(one.test.probability for one in found.tests.directed) < level("one parameter")
+BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
+
+
+def integrated(estimate, deviation, known):
+    """Odds of a parameter of standard deviation one a priori, and of |error| > 1, by a plain sum."""
+    size = np.linspace(-12.0, 12.0, 40001)
+    weight = scipy.stats.norm.pdf(size) * scipy.stats.norm.pdf(estimate, size, deviation)
+    beyond = scipy.stats.norm.sf(1.0, size, known) + scipy.stats.norm.cdf(-1.0, size, known)
+    return np.sum(weight * beyond) * (size[1] - size[0]) / scipy.stats.norm.pdf(estimate, 0.0, deviation)
+
+
+@pytest.mark.parametrize("estimate", [0.0, 0.3, 0.8, 1.6])
+@pytest.mark.parametrize("deviation", [0.1, 0.4, 3.0])
+@pytest.mark.parametrize("known", [0.05, 0.35])
+def test_odds_are_those_of_an_integral_over_the_parameter(estimate, deviation, known):
+    moves = Moves(*(np.array([0.0, x]) for x in (estimate, deviation, known)))
+    probability = 2.0 * scipy.stats.norm.sf(estimate / deviation)
+    assert moves.odds(probability) == pytest.approx(integrated(estimate, deviation, known), rel=1e-6)
+
+
+def test_what_moves_nothing_or_is_not_told_by_the_data_does_not_matter():
+    none = np.zeros(3)
+    assert Moves(none, none, none + 0.2).odds(1e-9) == 0.0
+    assert Moves(none + 500.0, none + 1000.0, none + 0.4).odds(0.617) < 0.7
+    assert Moves(none + 1e6, none + 1.0, none).odds(0.0) > 1e6
+
+
+@pytest.mark.parametrize("of_structure", [True, False])
+@pytest.mark.parametrize("place", range(3))
+def test_what_is_not_a_number_is_no_promise(of_structure, place):
+    parts = [np.full(2, 1e-3), np.full(2, 1e-3), np.full(2, 0.1)]
+    tried = [SimpleNamespace(of_structure=of_structure, lag=False, test=SimpleNamespace(probability=1e-4))]
+    assert that_matter(tried, [Moves(*parts)]) == []
+    parts[place][0] = np.nan
+    # A gain that varies is judged by its move alone.
+    assert that_matter(tried, [Moves(*parts)]) == ([0] if of_structure or place == 0 else [])
 
 
 @pytest.mark.slow
-def test_designed_records_seldom_leave_right_models_undecided():
-    """150 of each; the limit is that of 5 % with three standard deviations of chance."""
-    run = runpy.run_path(str(BENCHMARK))
-    right = run["designed_study"](range(150), wrong=False)
-    assert right["undecided"] <= 7.5 + 3 * np.sqrt(7.5)
-    wrong = run["designed_study"](range(150), wrong=True)
+def test_a_lag_that_moves_g_almost_out_of_what_is_admitted_is_not_promised_away():
+    """Designed records of plants with a pole more: the estimate's own error does the rest."""
+    benchmark = runpy.run_path(str(BENCHMARK))
+    for seed in (17, 70, 76):
+        rng = np.random.default_rng([seed, 78])
+        one = benchmark["judged"](benchmark["designed_trial"](seed, wrong=True, rng=rng), rng)
+        assert (one.met, one.beyond, one.found.tests.failed) == (True, True, ())
+        assert one.undecided
+
+
+@pytest.mark.slow
+def test_the_benchmark_of_designed_records():
+    """Of 150 right models at most 5 % are undecided, of 150 wrong ones at most 4 % are met though beyond."""
+    benchmark = runpy.run_path(str(BENCHMARK))
+    right, wrong = (benchmark["designed_study"](range(150), wrong=wrong) for wrong in (False, True))
+    assert right["undecided"] <= 7
     assert wrong["beyond"] >= 50
-    assert wrong["met though beyond"] <= 0.2 * wrong["beyond"]
+    assert wrong["met though beyond"] <= 6

@@ -38,26 +38,22 @@ def test_arx_with_known_noise_is_ridge_regression():
     assert differing == pytest.approx(scipy.stats.chi2.sf(statistic, 4), rel=1e-6)
 
 
-def test_one_record_after_the_other_is_both_at_once_in_the_limit():
-    u, y = simulated(JENKINS, 1500, np.random.default_rng(3), runs=2)
-    first = identify(JENKINS, u[0], y[0], rest=True)
-    then = identify(JENKINS, u[1], y[1], rest=True, earlier=of(first))
-    joint = identify(JENKINS, np.concatenate(u), np.concatenate(y), rest=True, lengths=[1500, 1500])
-    deviation = np.sqrt(np.diag(joint.covariance))
-    assert np.all(np.abs(then.theta - joint.theta) < 0.15 * deviation)
-    np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)
-
-
-def test_the_same_in_s():
-    between = Intersample(0.4, hold=False)
+def in_s(rng):
     model = ContinuousModel.monic(((np.array([2.0]),),), ((np.array([1.0, 0.8, 1.0]),),), np.eye(1))
-    rng = np.random.default_rng(4)
     u = rng.standard_normal((2, 800, 1))
-    y = np.array([model.driven(x, between) for x in u])
-    y = y + 0.3 * rng.standard_normal(y.shape)
+    y = np.array([model.driven(x, Intersample(0.4, hold=False)) for x in u])
+    return model, u, y + 0.3 * rng.standard_normal(y.shape)
+
+
+@pytest.mark.parametrize(
+    "made", [lambda rng: (JENKINS, *simulated(JENKINS, 1500, rng, runs=2)), in_s], ids=["q", "s"]
+)
+def test_one_record_after_the_other_is_both_at_once_in_the_limit(made):
+    model, u, y = made(np.random.default_rng(3))
     first = identify(model, u[0], y[0], 0.4, rest=True)
     then = identify(model, u[1], y[1], 0.4, rest=True, earlier=of(first))
-    joint = identify(model, np.concatenate(u), np.concatenate(y), 0.4, rest=True, lengths=[800, 800])
+    both = np.concatenate(u), np.concatenate(y)
+    joint = identify(model, *both, 0.4, rest=True, lengths=[len(u[0])] * 2)
     deviation = np.sqrt(np.diag(joint.covariance))
     assert np.all(np.abs(then.theta - joint.theta) < 0.15 * deviation)
     np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)

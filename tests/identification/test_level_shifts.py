@@ -150,18 +150,6 @@ def test_lines_and_single_samples_are_no_shifts():
     assert found.tests.shifted == ()
 
 
-@pytest.mark.slow
-def test_what_the_unit_of_an_output_is_does_not_matter():
-    u, y = lag_of(250, 8)
-    y[120:] += 0.4
-    one, other = (
-        shift_of(LAG.replace("K: 1", f"K: {unit}") + f"noise: {{variance: {0.01 * unit**2}}}", u, unit * y)
-        for unit in (1.0, 1000.0)
-    )
-    assert other.test.statistic == pytest.approx(one.test.statistic, rel=1e-4)
-    assert (other.sample, other.rises) == (one.sample, one.rises)
-
-
 def test_a_record_too_short_for_any_has_none():
     rng = np.random.default_rng(2)
     u = rng.choice([-1.0, 1.0], (10, 1))

@@ -125,12 +125,19 @@ def one_way(u, x, *, delay=1, pole=0.8):
     return y
 
 
-def test_of_a_plant_slower_one_way_it_is_the_finite_difference():
-    """Up to what a level and another gain explain: these are taken off."""
+@pytest.fixture(scope="module")
+def alike_both_ways():
+    """An input, the model of a plant as fast both ways, and what it would be if one way were slower."""
     u = np.repeat(np.random.default_rng(6).choice([-1.0, 0.3, 1.0], 80), 5)
     y = one_way(u, 0.0) + 1e-3 * np.random.default_rng(7).standard_normal(u.size)
-    found = identify(one_channel([0, 0.2], F=[1, -0.8]), u[:, None], y[:, None], rest=True)
-    (way,) = varying(found)["direction of y"].alternatives
+    model = one_channel([0, 0.2], F=[1, -0.8])
+    (way,) = varying(identify(model, u[:, None], y[:, None], rest=True))["direction of y"].alternatives
+    return u, model, way
+
+
+def test_of_a_plant_slower_one_way_it_is_the_finite_difference(alike_both_ways):
+    """Up to what a level and another gain explain: these are taken off."""
+    u, _, way = alike_both_ways
     column = way.column[:, 0]
     difference = (one_way(u, 1e-4) - one_way(u, -1e-4)) / 2e-4
     through_plant = [scipy.signal.lfilter([0, 0.2], [1, -0.8], x) for x in (np.ones(u.size), u)]
@@ -153,13 +160,9 @@ def test_a_plant_that_is_slower_one_way_is_found(levels, delay):
     assert not alike.tests.failed
 
 
-def test_how_such_a_plant_moves_g_is_told_of_both_ways():
+def test_how_such_a_plant_moves_g_is_told_of_both_ways(alike_both_ways):
     """In each way G is a lag with its own pole: the derivative of it, a line in G apart."""
-    u = np.repeat(np.random.default_rng(6).choice([-1.0, 0.3, 1.0], 80), 5)
-    y = one_way(u, 0.0) + 1e-3 * np.random.default_rng(7).standard_normal(u.size)
-    model = one_channel([0, 0.2], F=[1, -0.8])
-    found = identify(model, u[:, None], y[:, None], rest=True)
-    (way,) = varying(found)["direction of y"].alternatives
+    _, model, way = alike_both_ways
     w = np.linspace(0.01, 3.0, 40)
     falls, rises = way.slopes(model, w)[:, :, 0, 0]
     z, step = np.exp(-1j * w), 1e-6

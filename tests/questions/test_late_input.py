@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import assess, identify, parse_spec
-from tests.identification.test_control_law import GAIN, loop
+from tests.identification.test_faults import GAIN, loop
 
 # The plant of `loop`, whose controller is a gain.
 SPEC = """

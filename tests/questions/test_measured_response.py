@@ -7,7 +7,7 @@ import pytest
 
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.findings.periods import silent_lines_answer
+from inputdesign_cli.findings.frequency_responses import silent_lines_answer
 from inputdesign_cli.identification.periodic_response import periodic_response
 from inputdesign_cli.questions.frequency_response.build import build_measurement
 from inputdesign_cli.questions.frequency_response.measure import Counted, judge_lines, silent_of

@@ -54,7 +54,7 @@ def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow
 def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, of_the_pole, narrow):
     """No test sees the missing pole; the true error is beyond what the top-up would leave, as is told.
 
-    `of_the_pole` are the odds for it, see `test_mattering.py`: what has less than 0.7 is no reason to act.
+    `of_the_pole` are the odds for it, see `test_directed.py`: what has less than 0.7 is no reason to act.
     """
     found = assess(parse_spec(NARROW), narrow(seed, 0.5, 0.8))
     assert (found.verdict, found.results.result["identification"]["failed"]) == ("missed", [])

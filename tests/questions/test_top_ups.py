@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
-from inputdesign_cli.findings.top_up_levels import level_notes
+from inputdesign_cli.findings.designed_records import level_notes
 from tests.support.heater import HEATER, STRUCTURE, said
 
 

@@ -19,11 +19,12 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.finding import Finding, reasons
+from inputdesign_cli.findings.designed_records import level_notes
 from inputdesign_cli.findings.far_from_nominal import Distance, far_from_nominal, from_nominal, of_first_part
 from inputdesign_cli.findings.faults import faults
 from inputdesign_cli.findings.frequency_responses import response_note
 from inputdesign_cli.findings.neglected import Neglected, neglected, objections, unseen
-from inputdesign_cli.findings.top_up_levels import level_notes, prior_left_out
+from inputdesign_cli.findings.other_systems import prior_left_out
 from inputdesign_cli.outcome import Assessment as Judged, RequirementMet
 from inputdesign_cli.outcome.curves import Curves
 from inputdesign_cli.outcome.estimate import Verdict

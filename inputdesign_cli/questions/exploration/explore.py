@@ -11,11 +11,9 @@ import numpy as np
 
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.explore import Family, Found, answers_output, explore_records, levelled
-from inputdesign_cli.findings.explored_inputs import DRIVE, doubtful_inputs, undriven
-from inputdesign_cli.findings.explored_models import doubtful_model
+from inputdesign_cli.findings.explored_logs import DRIVE, doubtful_inputs, doubtful_model, undriven
 from inputdesign_cli.findings.faults import biasing, left_out, shifted_levels
-from inputdesign_cli.findings.frequency_responses import contradicted, response_note
-from inputdesign_cli.findings.periods import silent_lines_answer
+from inputdesign_cli.findings.frequency_responses import contradicted, response_note, silent_lines_answer
 from inputdesign_cli.findings.refuted_structure import refutations
 from inputdesign_cli.findings.unrelated_inputs import late_inputs
 from inputdesign_cli.identification import silent_in

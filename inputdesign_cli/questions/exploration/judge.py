@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.explore import Fits, fits
-from inputdesign_cli.findings.explored_models import HALF, LEAST_FIT
+from inputdesign_cli.findings.explored_logs import HALF, LEAST_FIT
 from inputdesign_cli.identification import cross_correlations
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.outcome import Outcome

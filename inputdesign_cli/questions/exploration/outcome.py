@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore import Candidate, Fits, Found
-from inputdesign_cli.findings.explored_inputs import open_parameters
+from inputdesign_cli.findings.explored_logs import open_parameters
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driving_nothing
 from inputdesign_cli.outcome.curves import Curves, OrderCurves

@@ -17,7 +17,7 @@ from inputdesign_cli.design.convex.response_lines import ResponseLines
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.finding import Finding, reasons, trusted, verdict
 from inputdesign_cli.findings import frequency_responses as responses
-from inputdesign_cli.findings.periods import (
+from inputdesign_cli.findings.frequency_responses import (
     Distorted,
     distorted,
     drifting_periods,
