@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -24,6 +24,7 @@ from inputdesign_cli.outcome.curves import (
     ErrorBandCurves,
     ErrorBandPanel,
     FanCurves,
+    Panel,
     ResponseCurves,
     ResponsePanel,
 )
@@ -39,22 +40,6 @@ _FAR_BELOW = 0.25
 _FAR = 1e-2
 # Plants drawn as lines of their own, those with a colour, and the least ratio beside the largest one.
 _MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
-
-
-class Panel(Protocol):
-    """Holds curves over frequency that belong to one entry of G."""
-
-    @property
-    def frequency(self) -> Array:
-        """Return the frequencies (n,) in rad per time unit."""
-
-    @property
-    def entry(self) -> tuple[int, int] | None:
-        """Return output and input, from zero; None for the only entry, or for all of them together."""
-
-    @property
-    def names(self) -> str:
-        """Return the names of its input and output; empty if there are none."""
 
 
 P = TypeVar("P", bound=Panel)

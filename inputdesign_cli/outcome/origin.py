@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from filecmp import cmp
 from pathlib import Path
@@ -89,9 +89,7 @@ def check_place(directory: Path, origin: Origin, spec: str) -> None:
             f"{directory} cannot be written: {there}: {why}",
             hint="choose another place, or change the permissions",
         )
-    foreign = [n for n in (SPEC, RESULT) if n not in owned_files(target) and os.path.lexists(target / n)]
-    if RESULT in foreign or (foreign and _content(target / SPEC) != encoded(spec)):
-        raise not_a_run(foreign, directory)
+    check_foreign(target, {SPEC: encoded(spec), RESULT: b""}, shown=directory)
     if not origin.overwrite:
         check_origin(origin, spec, target, shown=directory)
 
@@ -127,11 +125,19 @@ def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
             )
 
 
-def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
-    """Return the error about files of the user's that would be written over."""
-    message = f"{directory} already has {', '.join(foreign)}, written by something other than an earlier run"
-    hint = "choose another directory with -o, or move these files away"
-    return OutputError.because("output-not-a-run", message, hint)
+def check_foreign(target: Path, contents: Mapping[str, bytes], *, shown: Path) -> None:
+    """Refuse to write over files that are of no run, unless that changes nothing.
+
+    Raises:
+        OutputError: `output-not-a-run`.
+    """
+    owned = owned_files(target)
+    there = [name for name in contents if name not in owned and os.path.lexists(target / name)]
+    foreign = [name for name in there if _content(target / name) != contents[name]]
+    if foreign:
+        message = f"{shown} already has {', '.join(foreign)}, written by something other than an earlier run"
+        hint = "choose another directory with -o, or move these files away"
+        raise OutputError.because("output-not-a-run", message, hint)
 
 
 def _content(path: Path) -> bytes | None:
