@@ -11,7 +11,6 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from filecmp import cmp
 from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError, OutputError
@@ -117,7 +116,8 @@ def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
         return
     before = [spec.parent / str(name) for name in counted[1:]]
     for file in data:
-        if any(one.is_file() and file.is_file() and cmp(one, file, shallow=False) for one in before):
+        content = _content(file)
+        if content is not None and any(_content(one) == content for one in before):
             raise DataError.because(
                 "data-repeated",
                 f"{file} counts as experiment.prior of {spec} already, and would count twice",

@@ -20,7 +20,7 @@ from inputdesign_cli.report.charts import Chart, chart
 from inputdesign_cli.report.facts import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
-from inputdesign_cli.sweeps.layout import checked_run
+from inputdesign_cli.sweeps.points import checked_run
 
 MOST_ROWS = 200
 _SHOWN = (

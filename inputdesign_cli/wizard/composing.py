@@ -11,18 +11,11 @@ from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.wizard import questions as asking
 from inputdesign_cli.wizard.grammar import Phrase, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
-from inputdesign_cli.wizard.questions import (
-    QUESTIONS,
-    Question,
-    bad_answer,
-    chosen,
-    complete,
-    in_their_words,
-    known_from,
-)
+from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, in_their_words
 from inputdesign_cli.wizard.wishes import controller, input_range, limited, quantisation, wished
 
 _MOST, LEAST = 5000, 50  # samples
@@ -102,7 +95,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    said = complete(answers)
+    said = asking.complete(answers)
     span, there = input_range(said["range"]), Phrase(said["time"], "time").seconds()
     plant = plant or understand_plant(said["plant"], stem, folder)
     step, why = plant.sample_time, plant.why_sampling
@@ -132,7 +125,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "duration": there if nonparametric else duration,
         "there": there,
         "most": _MOST,
-        "made": chosen("signals", said["signals"], _TYPES),
+        "made": asking.chosen("signals", said["signals"], _TYPES),
         "converter": quantisation(said["converter"]),
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
@@ -194,7 +187,7 @@ class Conversation:
     @property
     def question(self) -> Question | None:
         """Return the next question; None if all are answered."""
-        there = {*self._answers, *known_from(self._answers)}
+        there = {*self._answers, *asking.known_from(self._answers)}
         return next((one for one in QUESTIONS if one.key not in there), None)
 
     def answer(self, text: str) -> IdesignError | None:
