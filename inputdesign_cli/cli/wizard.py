@@ -98,9 +98,9 @@ def _result(spec: Spec) -> Result:
 
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
     """Ask for a draft at the terminal, again where an answer cannot be used."""
-    import questionary
-
     with status("thinking ...", quiet=quiet):
+        import questionary
+
         from inputdesign_cli.wizard.composing import Conversation
     talk = Conversation(known, output.stem, output.parent)
     while (one := talk.question) is not None:

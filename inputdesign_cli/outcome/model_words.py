@@ -88,7 +88,7 @@ def _(model: plant.Reparametrised) -> Blocks:
         values = dict(zip(at.labels, at.values.tolist(), strict=True))
         for label, place in words.places.items():
             *steps, last = place
-            block = written
+            block: Plain = written
             for step in steps:
                 block = block[step]
             block[last] = values[label]

@@ -146,7 +146,12 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     if draft.spectrum is None:
         return draft
     tried: list[tuple[Draft, float, float, bool]] = []
-    for words, what in _spectra(draft.spec().experiment.samples):
+    most = max(draft.spec().experiment.samples // 2, 1)
+    lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
+    # Each in the words of a spec and of a comment.
+    spectra = [(f"{{type: fir, order: {n}}}", f"filtered noise of order {n}") for n in _ORDERS]
+    spectra += [(f"{{type: multisine, lines: {n}}}", f"{n} sinusoids") for n in lines]
+    for words, what in spectra:
         one = replace(draft, spectrum=words, why=what)
         with in_their_words(draft.said):
             result = solve(one.spec().with_(uncertainty=None, **{"signal.candidates": 1}))
@@ -163,16 +168,6 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
         gap = max(value / bound - 1.0, _LEAST_GAP)
         comment = f"{best.why}: no other is better by more than {per_cent(gap, 2)}"
     return replace(best, why=comment)
-
-
-def _spectra(samples: int) -> list[tuple[str, str]]:
-    """Return the spectra to try, each in the words of a spec and of a comment."""
-    most = max(samples // 2, 1)
-    lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
-    return [
-        *((f"{{type: fir, order: {order}}}", f"filtered noise of order {order}") for order in _ORDERS),
-        *((f"{{type: multisine, lines: {number}}}", f"{number} sinusoids") for number in lines),
-    ]
 
 
 class Conversation:
@@ -200,7 +195,13 @@ class Conversation:
         assert asked is not None
         self._answers[asked.key] = text
         try:
-            self._understand()
+            # The plant, which may be a log to be explored, is read once only.
+            if self._plant is None and self._answers["plant"].strip():
+                self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
+            draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)
+            if self.question is None:
+                draft.validate()
+                self.draft = draft
         except OutputError:
             raise  # no answer can help
         except IdesignError as error:
@@ -211,12 +212,3 @@ class Conversation:
                 self._plant = None
             return error
         return None
-
-    def _understand(self) -> None:
-        """Try the answers; read the plant, which may be a log to be explored, once only."""
-        if self._plant is None and self._answers["plant"].strip():
-            self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
-        draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)
-        if self.question is None:
-            draft.validate()
-            self.draft = draft
