@@ -19,7 +19,7 @@ from inputdesign_cli import load_spec
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.outcome.record import load_result
 from inputdesign_cli.outcome.results import Table
-from inputdesign_cli.outcome.text_formats import csv_text, read_csv
+from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.campaign.build import build_campaign
 from inputdesign_cli.questions.campaign.trials import energy_of
 
@@ -45,7 +45,7 @@ def campaign_in_a_loop(folder: Path) -> None:
     noise = np.sqrt(study.true.model.covariance[0, 0]) * np.random.default_rng(8).standard_normal((3000, 1))
     r = np.zeros((0, 1))
     while (run / "signal.csv").exists():
-        signal = read_csv(run / "signal.csv")
+        signal = csv_columns((run / "signal.csv").read_bytes())
         part = signal["r1"][:, None]
         r = np.concatenate([r, part])
         y, u = (x[-len(part) :, 0] for x in study.true.loop.signals(r, noise[: len(r)]))

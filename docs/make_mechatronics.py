@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.results import Table
-from inputdesign_cli.outcome.text_formats import csv_text, read_csv
+from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from pages import Terminal, filled, keep, write
 
 STEP, GAIN, LAG = 0.02, 8.0, 0.575
@@ -112,7 +112,7 @@ def mechatronics(folder: Path, images: Path) -> str:
     begin = next(n for n, line in enumerate(lines) if line.startswith("uncertainty:"))
     end = next(n for n, line in enumerate(lines) if line.startswith("objective:"))
     found["deduced"] = "\n".join(["```", *lines[begin:end], "```"])
-    u = read_csv(folder / "runs" / "speed" / "signal.csv")["u1"]
+    u = csv_columns((folder / "runs" / "speed" / "signal.csv").read_bytes())["u1"]
     found["levels"] = str(np.unique(u).size)
     recorded(folder / "log.csv", u1=u, y1=speed(u, rng))
     found["assess"], _ = terminal.run(

@@ -18,7 +18,7 @@ import scipy.signal
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.outcome.results import Table
-from inputdesign_cli.outcome.text_formats import csv_text, read_csv
+from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from pages import DOCS, Terminal, filled, keep, write
 
 LOG = DOCS / "data" / "tclab" / "two_heaters.txt"
@@ -149,7 +149,7 @@ def fitted_board() -> tuple[Array, float]:
 def experiment(signal: Path, record: Path, seed: int) -> None:
     """Apply a signal to the settled board and write the record; the control loop takes a sample to act."""
     parameters, step = fitted_board()
-    applied = read_csv(signal)
+    applied = csv_columns(signal.read_bytes())
     time, u = applied["time_s"], applied["u1"]
     q = np.concatenate([np.full(SETTLED + 1, u.mean()), u[:-1]])
     room = float(parameters[3])

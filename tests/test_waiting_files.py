@@ -12,7 +12,7 @@ import pytest
 from inputdesign_cli.errors import DataError, IdesignError, OutputError
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
-from inputdesign_cli.sweeps.layout import at_work
+from inputdesign_cli.sweeps.points import at_work
 from tests.support.campaigns import SPEC
 from tests.support.commands import caller
 from tests.support.outcomes import typed
@@ -27,14 +27,10 @@ OPENED = {
     "cli/options.py": (1, "a file of the package"),
     "cli/reference.py": (2, "files of the package"),
     "cli/streams.py": (3, "the null device and the standard streams"),
-    "outcome/origin.py": (1, "a comparison of plain files"),
     "outcome/replacing.py": (1, "files that were just written into a folder of its own"),
-    "outcome/run_directory.py": (
-        2,
-        "a new file, which has the name of the process; a comparison of plain files",
-    ),
+    "outcome/run_directory.py": (1, "a new file, which has the name of the process"),
     "report/sources.py": (1, "a file of the package"),
-    "sweeps/point.py": (1, "a temporary folder of its own"),
+    "sweeps/points.py": (1, "a temporary folder of its own"),
     "wizard/questions.py": (1, "a file of the package"),
 }
 # Functions of ours with one of these names read by `read_regular`.

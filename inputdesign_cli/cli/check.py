@@ -39,8 +39,18 @@ def check(
     seconds: dict[tuple[str, str], float] = {}
     stopped: IdesignError | None = None
     try:
-        named = [_found(path) for path in files or ()]
-        _compare(named or _default_files(), rows, seconds, quiet=quiet)
+        from inputdesign_cli.outcome.golden import compare, load_golden
+        from inputdesign_cli.questions import execute
+
+        named = [_found(path) for path in files or ()] or _default_files()
+        for golden in [load_golden(path) for path in named]:
+            results = {}
+            for run in golden.runs:
+                started = time.perf_counter()
+                with status(f"{golden.file}: {run.name} ...", quiet=quiet):
+                    results[run.name] = execute(golden, run)
+                seconds[golden.file.stem, run.name] = time.perf_counter() - started
+            rows += compare(golden, results)
     except IdesignError as error:
         stopped = error
     if junit is not None:
@@ -58,27 +68,6 @@ def check(
         typer.echo(f"\n{len(rows) - failed} of {len(rows)} quantities agree")
     if failed:
         raise typer.Exit(EXIT_MISSED)
-
-
-def _compare(
-    files: Sequence[Path], rows: list[Row], seconds: dict[tuple[str, str], float], *, quiet: bool
-) -> None:
-    """Run what the golden files name; rows and times are added file by file.
-
-    Raises:
-        IdesignError: a file, or a spec that it names, is not good.
-    """
-    from inputdesign_cli.outcome.golden import compare, load_golden
-    from inputdesign_cli.questions import execute
-
-    for golden in [load_golden(path) for path in files]:
-        results = {}
-        for run in golden.runs:
-            started = time.perf_counter()
-            with status(f"{golden.file}: {run.name} ...", quiet=quiet):
-                results[run.name] = execute(golden, run)
-            seconds[golden.file.stem, run.name] = time.perf_counter() - started
-        rows += compare(golden, results)
 
 
 def _found(path: Path) -> Path:
@@ -146,7 +135,14 @@ def junit_text(rows: Sequence[Row], seconds: Seconds, error: IdesignError | None
         for row in of_file:
             taken = 0.0 if row.run in timed else seconds.get((golden, row.run), 0.0)
             timed.add(row.run)
-            _add(suite, golden, row, taken)
+            quantity = row.quantity
+            name = f"{row.run}: {quantity.name} ({quantity.source})"
+            case = SubElement(suite, "testcase", classname=golden, name=name, time=f"{taken:.3f}")
+            if not row.passed:
+                message = row.note or f"computed {row.computed:.10g}, expected {quantity.expected:.10g}"
+                failure = SubElement(case, "failure", message=message)
+                why = f"tolerance {quantity.tolerance:.3g} ({quantity.why})"
+                failure.text = f"{quantity.path}: {message}; {why}"
     if error is not None:
         suite = SubElement(root, "testsuite", name="idesign check")
         case = SubElement(suite, "testcase", classname="idesign check", name="golden files", time="0")
@@ -160,13 +156,3 @@ def junit_text(rows: Sequence[Row], seconds: Seconds, error: IdesignError | None
             part.set(f"{kind}s", str(sum(one.find(kind) is not None for one in cases)))
     indent(root)
     return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _add(suite: Element, golden: str, row: Row, taken: float) -> None:
-    quantity = row.quantity
-    name = f"{row.run}: {quantity.name} ({quantity.source})"
-    case = SubElement(suite, "testcase", classname=golden, name=name, time=f"{taken:.3f}")
-    if not row.passed:
-        message = row.note or f"computed {row.computed:.10g}, expected {quantity.expected:.10g}"
-        failure = SubElement(case, "failure", message=message)
-        failure.text = f"{quantity.path}: {message}; tolerance {quantity.tolerance:.3g} ({quantity.why})"

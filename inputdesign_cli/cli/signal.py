@@ -116,7 +116,12 @@ def signal(
     persistent excitation and the band of each channel; -o writes the samples, a C header for hardware among
     the kinds. With several inputs a prbs is shifted, a multisine has a period for each input.
     """
-    files = _files(output or [], overwrite)
+    files = [path_option(name) for name in output or ()]
+    for file in files:
+        if file.suffix.removeprefix(".").lower() not in _ENDINGS:
+            listed = ", ".join(f".{ending}" for ending in _ENDINGS)
+            refuse(f"{file.name} ends with none of {listed}", "--output")
+        refuse_existing(file, overwrite)
     asked = form.asked(kinds)
     from inputdesign_cli.questions.ready_made import make_signal
 
@@ -129,22 +134,6 @@ def signal(
         typer.echo(json_text(results.result), nl=False)
     elif not quiet:
         typer.echo(_summary(results, files))
-
-
-def _files(names: Sequence[str], overwrite: bool) -> list[Path]:
-    """Return where to write; every name is checked before anything is computed.
-
-    Raises:
-        typer.BadParameter: An ending that stands for no kind of file.
-        OutputError: `output-exists`.
-    """
-    files = [path_option(name) for name in names]
-    for file in files:
-        if file.suffix.removeprefix(".").lower() not in _ENDINGS:
-            listed = ", ".join(f".{ending}" for ending in _ENDINGS)
-            raise typer.BadParameter(f"{file.name} ends with none of {listed}", param_hint="--output")
-        refuse_existing(file, overwrite)
-    return files
 
 
 def _pair(text: str, option: str, least: float = -_LARGEST) -> tuple[float, float]:

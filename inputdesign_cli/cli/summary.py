@@ -8,7 +8,7 @@ from pathlib import Path
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.report.evidence import BREAK, Rows, estimate_table, requirement_table, simulation_table
-from inputdesign_cli.report.facts import Fact, asked, campaign_facts, estimate_facts, facts, proofs, verdict
+from inputdesign_cli.report.facts import Fact, facts, said
 
 _NONE = Rows((), ())
 Line = tuple[str, str]
@@ -23,11 +23,11 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
         replaced: whether a run with other values stood there before.
     """
     lines = [
-        *_lines(campaign_facts(outcome)),
+        *_lines(facts(outcome, part="campaign_stands")),
         *_data(outcome, time_unit),
-        *_lines(asked(outcome)),
+        *(("asked", text) for text in said("asked", outcome)),
         *_lines(facts(outcome, time_unit)),
-        *_named("proved", proofs(outcome)),
+        *_named("proved", said("proofs", outcome)),
         *_simulated(outcome),
         *(("note", text) for text in outcome.notes or ()),
         *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
@@ -46,13 +46,13 @@ def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     estimate = estimate_table(outcome)
     if estimate:
         yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
-    yield from _lines(estimate_facts(outcome))
+    yield from _lines(facts(outcome, part="estimate"))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(outcome, time_unit) or _NONE).rows:
         where = f" at {frequency} rad/{time_unit}" if frequency else ""
         verdicts.append(f"{name} {found}: the error that these data give is {ratio} of the admissible{where}")
     yield from _named("assessed", verdicts)
-    yield from _named("verdict", verdict(outcome))
+    yield from _named("verdict", said("verdict", outcome))
 
 
 def _simulated(outcome: Outcome) -> Iterator[Line]:

@@ -6,9 +6,7 @@ import json
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -22,27 +20,19 @@ from inputdesign_cli.errors import STANDARD_STREAM
 from inputdesign_cli.regular_file import read_regular
 
 if TYPE_CHECKING:
-    from inputdesign_cli.figures.sweep_table import Trade
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.sweeps.running import Listing, SweepRun
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Holds what is swept, and how failures count."""
-
-    settings: list[str] | None = None
-    zipped: bool = False
-    confine: Path | None = None
-    output: Path | None = None
-    overwrite: bool = False
-    verb: Literal["solve", "analyse", "simulate"] = "solve"
 
 
 def sweep(
     spec: Path,
     *,
-    asked: Asked,
+    settings: list[str] | None = None,
+    zipped: bool = False,
+    confine: Path | None = None,
+    output: Path | None = None,
+    overwrite: bool = False,
+    verb: Literal["solve", "analyse", "simulate"] = "solve",
     workers: Workers,
     fail_fast: bool = False,
     rerun_failed: bool = False,
@@ -61,45 +51,38 @@ def sweep(
     from inputdesign_cli.sweeps.plan import build_plan
     from inputdesign_cli.sweeps.running import SweepRun, list_points
 
-    directory = asked.output or Path("runs") / f"{name_of(spec)}-sweep"
+    directory = output or Path("runs") / f"{name_of(spec)}-sweep"
     stdin = str(spec) == STANDARD_STREAM
     plan = build_plan(
         Path("<stdin>") if stdin else spec,
-        asked.settings or [],
-        zipped=asked.zipped,
-        verb=asked.verb,
-        confine=asked.confine,
+        settings or [],
+        zipped=zipped,
+        verb=verb,
+        confine=confine,
         text=standard_input() if stdin else None,
     )
     if dry_run:
         _list(list_points(plan, directory), json_output=json_output)
         return
-    with _watched(directory, quiet=quiet) as line:
-        done = SweepRun(
-            plan,
-            directory,
-            workers.executor(quiet=quiet),
-            fail_fast,
-            rerun_failed,
-            figures=plots,
-            figure_format=figure_format,
-            overwrite=asked.overwrite,
-            watch=line,
-        ).run()
-    _show(done, json_output=json_output, quiet=quiet)
-
-
-@contextmanager
-def _watched(directory: Path, *, quiet: bool) -> Iterator[Callable[[SweepRun], None]]:
-    """Show how far a sweep is; where it is ended by Ctrl-C or SIGTERM, say how to finish it."""
     started = time.monotonic()
     try:
         with status(f"{directory}: sweeping ...", quiet=quiet) as show:
-            yield lambda progress: show(pace(progress, time.monotonic() - started))
+            done = SweepRun(
+                plan,
+                directory,
+                workers.executor(quiet=quiet),
+                fail_fast,
+                rerun_failed,
+                figures=plots,
+                figure_format=figure_format,
+                overwrite=overwrite,
+                watch=lambda progress: show(pace(progress, time.monotonic() - started)),
+            ).run()
     except (KeyboardInterrupt, SystemExit):
         if not quiet:
             typer.echo(f"what is done is in {directory}; the same command finishes the rest", err=True)
         raise
+    _show(done, json_output=json_output, quiet=quiet)
 
 
 def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
@@ -114,7 +97,14 @@ def _show(done: SweepRun, *, json_output: bool, quiet: bool) -> None:
     if json_output:
         typer.echo(read_regular(done.directory / "sweep.json").decode(), nl=False)
     elif not quiet:
-        typer.echo(_summary(done))
+        statuses = ", ".join(f"{n} {status}" for status, n in done.statuses.items())
+        before = done.total - done.computed
+        lines = [("points", f"{done.total}: {statuses}{f' ({before} done before)' if before else ''}")]
+        if done.first_failure is not None:
+            diagnostic = done.first_failure.diagnostics[0]
+            lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
+        lines.append(("files", f"{done.directory}: {', '.join(path.name for path in done.files)}"))
+        typer.echo("\n".join(aligned(lines, gap=3, wrap=True)))
     if done.statuses.get("error") or done.statuses.get("lost"):
         raise typer.Exit(EXIT_INTERNAL)
     if done.first_failure is not None and done.failures == done.total:
@@ -147,17 +137,6 @@ def pace(progress: SweepRun, seconds: float) -> str:
     return "  ".join(told)
 
 
-def _summary(done: SweepRun) -> str:
-    statuses = ", ".join(f"{n} {status}" for status, n in done.statuses.items())
-    before = done.total - done.computed
-    lines = [("points", f"{done.total}: {statuses}{f' ({before} done before)' if before else ''}")]
-    if done.first_failure is not None:
-        diagnostic = done.first_failure.diagnostics[0]
-        lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
-    lines.append(("files", f"{done.directory}: {', '.join(path.name for path in done.files)}"))
-    return "\n".join(aligned(lines, gap=3, wrap=True))
-
-
 def show_trade(
     file: Path, spec: Spec, words: Sequence[str], run: Path, changes: Changes, shown: Shown
 ) -> None:
@@ -184,17 +163,12 @@ def show_trade(
             directory, "trade", lambda page: draw_trade(found, page), shown.figure_format or "png"
         )
     if not quiet:
-        typer.echo("\n" + trade_table(found))
+        heads = [f"{length:g} {found.unit}" for length in found.lengths]
+        rows = [["criterion" if found.criterion else "error / asked", *heads]]
+        for text, values in zip(found.amplitudes, found.values, strict=True):
+            cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
+            rows.append([f"amplitude {text}" if text else "best record", *cells])
+        typer.echo("\n" + "\n".join(aligned(rows, right=range(len(heads) + 1))))
         if not found.criterion:
             typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")
         typer.echo(f"\nfiles   {directory}: {drawn.name}, sweep.csv, sweep.yaml")
-
-
-def trade_table(trade: Trade) -> str:
-    """Return the table with lengths across and amplitudes down."""
-    heads = [f"{length:g} {trade.unit}" for length in trade.lengths]
-    rows = [["criterion" if trade.criterion else "error / asked", *heads]]
-    for text, values in zip(trade.amplitudes, trade.values, strict=True):
-        cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
-        rows.append([f"amplitude {text}" if text else "best record", *cells])
-    return "\n".join(aligned(rows, right=range(len(heads) + 1)))

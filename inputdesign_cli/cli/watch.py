@@ -32,9 +32,9 @@ def report(directory: Path, *, output: Path | None = None, bibtex: bool = False,
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.outcome.record import PAGE
+        from inputdesign_cli.outcome.record import PAGE, is_page
         from inputdesign_cli.outcome.run_directory import replace_text
-        from inputdesign_cli.report.render import bibtex_text, is_page, report_text
+        from inputdesign_cli.report.render import bibtex_text, report_text
 
         if bibtex:
             typer.echo(bibtex_text(directory), nl=False)

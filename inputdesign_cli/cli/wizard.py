@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from inputdesign_cli.outcome.results import Result
     from inputdesign_cli.specification import Spec
     from inputdesign_cli.wizard.composing import Draft
-    from inputdesign_cli.wizard.questions import Question
 
 
 def wizard(
@@ -37,7 +36,10 @@ def wizard(
     """
     from inputdesign_cli.wizard.questions import Answers, needed_of, read_answers
 
-    _check_place(output, answers, overwrite)
+    if answers is not None and output.exists() and output.samefile(answers):
+        hint = "choose another name for the spec with -o"
+        raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
+    refuse_existing(output, overwrite)
     said = read_answers(answers, given or [])
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     draft, known = None, said.texts
@@ -45,7 +47,12 @@ def wizard(
     if unanswered and terminal:
         draft, said = _asked(known, output, quiet), Answers()  # what is typed stands in no file
     elif unanswered and not known:
-        _refuse(unanswered)
+        raise SpecError.because(
+            "no-terminal",
+            "there is no terminal to ask in, and no answers are given",
+            "write them into a file (--answers answers.yaml) or behind --answer KEY=TEXT; needed are "
+            f"{', '.join(unanswered)}",
+        )
     with said.located(), computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.outcome.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose, with_spectrum
@@ -60,18 +67,6 @@ def wizard(
         typer.echo("\n".join([*draft.notes, done]))
     if solve or (solve is None and terminal and typer.confirm("Design the experiment now?", default=True)):
         _solve(output, draft.there, trade=trade, overwrite=overwrite, quiet=quiet)
-
-
-def _check_place(output: Path, answers: Path | None, overwrite: bool) -> None:
-    """Check that the spec may be written.
-
-    Raises:
-        OutputError: `output-exists`.
-    """
-    if answers is not None and output.exists() and output.samefile(answers):
-        hint = "choose another name for the spec with -o"
-        raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
-    refuse_existing(output, overwrite)
 
 
 def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
@@ -104,36 +99,22 @@ def _result(spec: Spec) -> Result:
 def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
     """Ask for a draft at the terminal, again where an answer cannot be used."""
     with status("thinking ...", quiet=quiet):
+        import questionary
+
         from inputdesign_cli.wizard.composing import Conversation
     talk = Conversation(known, output.stem, output.parent)
     while (one := talk.question) is not None:
         typer.echo(f"  {one.allowed}", err=True)
-        text = _typed(one)
+        default = one.default or ""  # stands in grey at the prompt
+        asks = f"{one.asks} (Enter: {default})" if default else one.asks
+        try:
+            text = questionary.text(asks, placeholder=[("class:placeholder", default)]).unsafe_ask()
+        except EOFError:  # Ctrl-D
+            raise KeyboardInterrupt from None
+        text = text if text.strip() else default
         with status("thinking ...", quiet=quiet):
             wrong = talk.answer(text)
         if wrong is not None:
             complain(wrong)
     assert talk.draft is not None
     return talk.draft
-
-
-def _typed(one: Question) -> str:
-    """Return what is typed at the prompt of a question; its default stands there in grey before."""
-    import questionary
-
-    default = one.default or ""
-    asks = f"{one.asks} (Enter: {default})" if default else one.asks
-    try:
-        text: str = questionary.text(asks, placeholder=[("class:placeholder", default)]).unsafe_ask()
-    except EOFError:  # Ctrl-D
-        raise KeyboardInterrupt from None
-    return text if text.strip() else default
-
-
-def _refuse(unanswered: list[str]) -> None:
-    raise SpecError.because(
-        "no-terminal",
-        "there is no terminal to ask in, and no answers are given",
-        "write them into a file (--answers answers.yaml) or behind --answer KEY=TEXT; needed are "
-        f"{', '.join(unanswered)}",
-    )

@@ -10,14 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures import style
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE
-from inputdesign_cli.outcome.curves import (
-    CloudCurves,
-    EllipseCurves,
-    ErrorCurves,
-    EstimateCurves,
-    MomentsCurves,
-    OrderCurves,
-)
+from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.results import Array
 
 _POINTS = 200  # of an ellipse
@@ -50,7 +43,7 @@ def boundary(center: Array, covariance: Array, probability: float) -> Array:
     return center[:, None] + radius * root @ circle
 
 
-def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
+def draw_ellipses(page: Figure, curves: of.EllipseCurves, time_unit: str) -> None:
     """Draw for each pair of parameters the ellipse that holds the estimate with the title's probability."""
     label = f"{100 * curves.probability:g} % of estimates"
     for axes, pair in zip(_panels(page, len(curves.pairs), 3), curves.pairs, strict=True):
@@ -65,7 +58,7 @@ def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
     style.legend_over_all(page)
 
 
-def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
+def draw_cloud(page: Figure, curves: of.CloudCurves, time_unit: str) -> None:
     """Draw for each pair of parameters the estimates as dots, with the ellipse that theory predicts."""
     for axes, (i, j) in zip(_panels(page, len(curves.pairs), 2), curves.pairs, strict=True):
         pair = np.array([i, j])
@@ -83,7 +76,7 @@ def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
     style.legend_over_all(page, handles)
 
 
-def draw_estimates(page: Figure, curves: EstimateCurves, time_unit: str) -> None:
+def draw_estimates(page: Figure, curves: of.EstimateCurves, time_unit: str) -> None:
     """Draw each parameter in a panel: the estimate after each part, with two standard deviations."""
     for axes, name in zip(_panels(page, len(curves.estimates), 3), curves.estimates, strict=True):
         middle, spread = curves.estimates[name], 2.0 * curves.deviations[name]
@@ -97,7 +90,7 @@ def draw_estimates(page: Figure, curves: EstimateCurves, time_unit: str) -> None
     style.legend_over_all(page)
 
 
-def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
+def draw_orders(page: Figure, curves: of.OrderCurves, time_unit: str) -> None:
     """Draw the fit of simulations to validation data over the number of parameters, family by family."""
     axes = page.subplots()
     least = 0.0
@@ -116,7 +109,7 @@ def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
     style.legend_over_all(page)
 
 
-def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
+def draw_moments(page: Figure, curves: of.MomentsCurves, time_unit: str) -> None:
     """Draw R as a coloured matrix, its estimated block framed, and the power of each line of the input."""
     if curves.line_frequency is None or curves.line_power is None:
         _draw_matrix(page.add_subplot(), curves)
@@ -130,7 +123,7 @@ def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
     lines.set(xlabel=style.frequency_label(time_unit), ylabel="power of each line (mean square)")
 
 
-def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
+def _draw_matrix(axes: Axes, curves: of.MomentsCurves) -> None:
     R, n, m = curves.R, len(curves.R), curves.estimated
     largest = float(np.abs(R).max())
     drawn = axes.imshow(R, cmap="RdBu", vmin=-largest, vmax=largest, alpha=_OPAQUE)
@@ -146,7 +139,7 @@ def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
         axes.text(j, i, f"{value:.3g}", ha="center", va="center", color=colour)
 
 
-def draw_error(page: Figure, curves: ErrorCurves, time_unit: str) -> None:
+def draw_error(page: Figure, curves: of.ErrorCurves, time_unit: str) -> None:
     """Draw squared bias and variance stacked over energy, the error of white regressors, and the design."""
     axes = page.add_subplot()
     energy, bias = curves.energy, curves.bias_squared

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,17 +16,7 @@ from matplotlib.typing import LineStyleType
 
 from inputdesign_cli.figures import style
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, OTHERS, lowered
-from inputdesign_cli.outcome.curves import (
-    BoundCurves,
-    BoundPanel,
-    DeviationCurves,
-    DeviationPanel,
-    ErrorBandCurves,
-    ErrorBandPanel,
-    FanCurves,
-    ResponseCurves,
-    ResponsePanel,
-)
+from inputdesign_cli.outcome import curves as of
 from inputdesign_cli.outcome.results import Array
 
 # How much higher a page is with a panel under one other, or under several.
@@ -41,23 +31,7 @@ _FAR = 1e-2
 _MOST_LINES, MOST_NAMED, _LEAST = 200, 5, 1e-3
 
 
-class Panel(Protocol):
-    """Holds curves over frequency that belong to one entry of G."""
-
-    @property
-    def frequency(self) -> Array:
-        """Return the frequencies (n,) in rad per time unit."""
-
-    @property
-    def entry(self) -> tuple[int, int] | None:
-        """Return output and input, from zero; None for the only entry, or for all of them together."""
-
-    @property
-    def names(self) -> str:
-        """Return the names of its input and output; empty if there are none."""
-
-
-P = TypeVar("P", bound=Panel)
+P = TypeVar("P", bound=of.Panel)
 
 
 def draw_panels(
@@ -111,7 +85,7 @@ def draw_panels(
             style.legend_above(lowest)
 
 
-def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
+def draw_bound(page: Figure, curves: of.BoundCurves, time_unit: str) -> None:
     """Draw r_u of design, record and white excitation against r_adm, and their ratios on a linear axis.
 
     Where nothing is asked of the error, r_u is drawn against |G|.
@@ -137,7 +111,7 @@ class _Error:
         return axes.plot(w, values, color=self.color, linewidth=self.width, linestyle=self.style, label=label)
 
 
-def _errors(curves: BoundPanel) -> list[_Error]:
+def _errors(curves: of.BoundPanel) -> list[_Error]:
     """Return the curves of r_u that are known, the widest line first, so that the others show on it."""
     needed, equal = curves.white_labels
     found = [_Error(curves.label, curves.r_u, BLUE, 2.4)]
@@ -150,7 +124,7 @@ def _errors(curves: BoundPanel) -> list[_Error]:
     return found
 
 
-def _plot_error(axes: Axes, curves: BoundPanel) -> None:
+def _plot_error(axes: Axes, curves: of.BoundPanel) -> None:
     """Draw the curves of one entry, in the range of the errors."""
     w, errors = curves.frequency, _errors(curves)
     style.log_axes(axes, "y")
@@ -166,7 +140,7 @@ def _plot_error(axes: Axes, curves: BoundPanel) -> None:
     style.marked(axes, curves.active, height, label=style.limiting_label(curves.active.size))
 
 
-def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> None:
+def _plot_ratios(axes: Axes, panels: Sequence[of.BoundPanel]) -> None:
     """Draw r_u / r_adm, the largest in the legend: all curves of one entry, or of several the design's."""
     handles: list[Artist] = []
     tops, ratios = [1.0], [np.zeros(0)]
@@ -199,12 +173,12 @@ def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> None:
     style.legend_above(axes, handles)
 
 
-def draw_deviations(page: Figure, curves: DeviationCurves, time_unit: str) -> None:
+def draw_deviations(page: Figure, curves: of.DeviationCurves, time_unit: str) -> None:
     """Draw |G|, the standard deviations and r_adm at every line."""
     draw_panels(page, curves.panels, _plot_deviations, time_unit, magnitude="magnitude")
 
 
-def _plot_deviations(axes: Axes, panel: DeviationPanel) -> None:
+def _plot_deviations(axes: Axes, panel: of.DeviationPanel) -> None:
     w = panel.frequency
     style.log_axes(axes, "y")
     axes.plot(w, panel.G_abs, ".-", color=BLACK, linewidth=1.0, markersize=4, label="|G|")
@@ -214,7 +188,7 @@ def _plot_deviations(axes: Axes, panel: DeviationPanel) -> None:
     style.plot_admitted(axes, w, panel.r_adm)
 
 
-def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
+def draw_response(page: Figure, curves: of.ResponseCurves, time_unit: str) -> None:
     """Draw the magnitudes with a 95 % band for the true one; below them the phases."""
     if len(curves.panels) > 1:
         draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude", below=_phases)
@@ -229,7 +203,7 @@ def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
     style.frequency_axis(below, panel.frequency, time_unit)
 
 
-def _magnitude(axes: Axes, panel: ResponsePanel) -> None:
+def _magnitude(axes: Axes, panel: of.ResponsePanel) -> None:
     w, size, modelled = panel.frequency, np.abs(panel.G), np.abs(panel.model)
     style.log_axes(axes, "y")
     axes.plot(w, size, ".", color=BLUE, markersize=4, label="|G|, data alone")
@@ -238,7 +212,7 @@ def _magnitude(axes: Axes, panel: ResponsePanel) -> None:
     style.band(axes, w, np.maximum(size - panel.radius, least), size + panel.radius, BLUE, 0.15)
 
 
-def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> None:
+def _phases(axes: Axes, panels: Sequence[of.ResponsePanel]) -> None:
     """Draw the phases of all entries; a negative gain begins half a turn away from a positive one."""
     for number, panel in enumerate(panels):
         color, dashes = style.stroke(number)
@@ -248,7 +222,7 @@ def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> None:
     axes.set_ylabel("phase (degrees)")
 
 
-def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
+def _phase(axes: Axes, panel: of.ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
     """Draw the phase of the model without jumps, and of the data, if known, on the nearest turn."""
     model = np.degrees(np.unwrap(np.angle(panel.model)))
     known = panel.radius < np.abs(panel.G)
@@ -258,7 +232,7 @@ def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> lis
     return axes.plot(panel.frequency, model, color=of_model, linewidth=1.2)
 
 
-def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
+def draw_fan(page: Figure, curves: of.FanCurves, time_unit: str) -> None:
     """Draw a line for every plant, the binding plants in colour; no ratio may exceed one."""
     axes = page.add_subplot()
     style.plain_decades(axes, "y")
@@ -280,13 +254,13 @@ def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
     style.legend_above(axes)
 
 
-def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
+def draw_error_bands(page: Figure, curves: of.ErrorBandCurves, time_unit: str) -> None:
     """Draw the median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
     plot, title = partial(_plot_bands, runs=curves.runs), f"Errors of the models: {curves.name}"
     draw_panels(page, curves.panels, plot, time_unit, magnitude="|Ĝ − G₀|", title=title)
 
 
-def _plot_bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> None:
+def _plot_bands(axes: Axes, curves: of.ErrorBandPanel, *, runs: int) -> None:
     w, (low, *between, high) = curves.frequency, sorted(curves.quantiles)
     outer = curves.quantiles[high]
     style.log_axes(axes, "y")

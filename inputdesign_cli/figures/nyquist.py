@@ -9,19 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 from numpy.typing import NDArray
 
+from inputdesign_cli.figures import style
 from inputdesign_cli.figures.readings import Traced
-from inputdesign_cli.figures.style import (
-    BLACK,
-    BLUE,
-    DASHED,
-    GREY,
-    ORANGE,
-    frequency_label,
-    labelled,
-    legend_over_all,
-    limiting_label,
-    marked,
-)
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE
 from inputdesign_cli.outcome.curves import NyquistCurves
 
 _DISCS = 36
@@ -60,7 +50,7 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
         "radius of its disc": radius,
         "distance of the disc from −1": np.abs(1.0 + L) - radius,
     }
-    line = Traced(L.real, L.imag, curves.frequency, frequency_label(time_unit), told, color=BLUE)
+    line = Traced(L.real, L.imag, curves.frequency, style.frequency_label(time_unit), told, color=BLUE)
     line.set_label("C G, nominal")
     axes.add_line(line)
     handles: list[Artist] = [line, Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)")]
@@ -74,14 +64,15 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     limiting = np.interp(curves.limiting, curves.frequency, L)
     limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
     if limiting.size:
-        marked(axes, limiting.real, limiting.imag, color=BLUE, label=limiting_label(limiting.size))
+        label = style.limiting_label(limiting.size)
+        style.marked(axes, limiting.real, limiting.imag, label=label)
     axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)
     axes.annotate("−1", (-1.0, 0.0), (4, 5), textcoords="offset points")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.6)
     axes.set_xlabel("real part of C G")
     axes.set_ylabel("imaginary part of C G")
-    legend_over_all(page, list(dict.fromkeys([*handles, *labelled(axes)])))
+    style.legend_over_all(page, list(dict.fromkeys([*handles, *style.labelled(axes)])))
 
 
 def _shown(L: NDArray[np.complex128]) -> NDArray[np.bool_]:

@@ -3,28 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from inputdesign_cli.figures.style import (
-    BLACK,
-    BLUE,
-    DASHED,
-    DOTTED,
-    GREEN,
-    GREY,
-    ORANGE,
-    band,
-    legend_above,
-    legend_over_all,
-    lowered,
-)
+from inputdesign_cli.figures import style
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE
 from inputdesign_cli.outcome.curves import FitCurves, FitPanel, PredictedPanel, ResidualCurves, SignalCurves
 from inputdesign_cli.outcome.results import Array
 
@@ -78,7 +65,7 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     last.set_xlabel(f"time ({time_unit}); {part}")
     counts.tick_params(labelbottom=True)
     grid[0][1].set_title("share (%)", loc="left")
-    legend_over_all(page)
+    style.legend_over_all(page)
 
 
 def _mark(time: Array) -> str:
@@ -88,7 +75,7 @@ def _mark(time: Array) -> str:
 
 def _name(axes: Axes, name: str, label: str, what: str) -> None:
     """Label the axis with the user's name and unit of a channel, or with its symbol and unit."""
-    symbol = f"{name[0]}{lowered(name[1:])}(t)"
+    symbol = f"{name[0]}{style.lowered(name[1:])}(t)"
     nameless = not label or label.startswith("(")  # a unit alone
     axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
 
@@ -96,7 +83,7 @@ def _name(axes: Axes, name: str, label: str, what: str) -> None:
 def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, *, levels: bool) -> None:
     y, noise = panel.values[: time.size], _BAND * panel.deviation[: time.size]
     label = f"± 2 standard deviations of noise{' since the start' if noise[0] < noise[-1] else ''}"
-    band(axes, time, y - noise, y + noise, GREY, 0.3, label=label)
+    style.band(axes, time, y - noise, y + noise, GREY, 0.3, label=label)
     # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
     said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
     axes.plot(time, y, _mark(time), color=GREEN, linewidth=1.0, markersize=4, label=said)
@@ -125,25 +112,6 @@ def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> No
     axes.set_ylim(shown)
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """Holds the samples that are drawn, and those at which a record begins, counted from the first drawn."""
-
-    samples: slice
-    begins: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, curves: FitCurves) -> _Shown:
-        """Choose the samples in which the outputs move most."""
-        samples = _stretch([panel.y for panel in curves.panels])
-        begins = np.cumsum(curves.lengths, dtype=np.int64)[:-1]
-        return cls(samples, begins[(begins > samples.start) & (begins < samples.stop)] - samples.start)
-
-    def broken(self, values: Array) -> Array:
-        """Return values (n,) of all samples for drawing: no curve goes from one record to the next."""
-        return np.insert(values[self.samples], self.begins, np.nan)
-
-
 def _stretch(outputs: Sequence[Array]) -> slice:
     """Return the first samples of outputs (n,), or the window where they vary most, if that is far more."""
     size = len(outputs[0])
@@ -167,21 +135,30 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
     single = len(curves.panels) == 1
     rows = 2 if single else len(curves.panels)
     axes = page.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[2, 1] if single else None)[:, 0]
-    shown = _Shown.of(curves)
-    part, size, unit = shown.samples, curves.time.size, time_unit
+    part, size, unit = _stretch([panel.y for panel in curves.panels]), curves.time.size, time_unit
+    begins = np.cumsum(curves.lengths, dtype=np.int64)[:-1]
+    begins = begins[(begins > part.start) & (begins < part.stop)] - part.start
+
+    def shown(values: Array) -> Array:
+        return np.insert(values[part], begins, np.nan)  # no curve goes from one record to the next
+
     if part.stop - part.start < size:
         told = f"samples {part.start + 1} to {part.stop}" if part.start else f"first {_PART}"
         unit = f"{time_unit}; {told} of {size}{'' if part.start else ' samples'}"
     axes[-1].set_xlabel(f"time ({unit})")
     axes[-1].set_xlim(curves.time[part][0], curves.time[part][-1])
-    time = shown.broken(curves.time)
+    time = shown(curves.time)
     same = all(_coincide(panel, part) for panel in curves.panels)
     for panel, place in zip(curves.panels, axes, strict=False):
         percent = "" if panel.fit is None else f"fit {panel.fit:.1f} %"
         recorded, simulated = ("y" if single else "recorded"), "simulated from u"
         if single and percent:
             simulated += f" ({percent})"
-        _plot_fit(place, time, panel, shown, recorded, simulated, same=same)
+        place.plot(time, shown(panel.y), color=BLACK, linewidth=1.0, label=recorded)
+        label = "predicted one step ahead" + f", and {simulated}" * same
+        place.plot(time, shown(panel.predicted), color=BLUE, linewidth=1.0, label=label)
+        if panel.simulated is not None and not same:
+            place.plot(time, shown(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated)
         place.set_ylabel(panel.label or "output")
         if not single:
             name = f"y{panel.output + 1}"
@@ -189,27 +166,16 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
             place.set_label(name)
     if single:
         (panel,) = curves.panels
-        axes[1].plot(time, shown.broken(panel.y - panel.predicted), color=BLUE, linewidth=0.8)
+        axes[1].plot(time, shown(panel.y - panel.predicted), color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
     drawn = curves.time[part]
-    borders = 0.5 * (drawn[shown.begins - 1] + drawn[shown.begins])
+    borders = 0.5 * (drawn[begins - 1] + drawn[begins])
     for place, at in product(axes, borders.tolist()):
         place.axvline(at, color=GREY, linestyle=DOTTED, linewidth=1.2, label="another record begins")
     if single:
-        legend_above(axes[0])
+        style.legend_above(axes[0])
     else:
-        legend_over_all(page)
-
-
-def _plot_fit(
-    axes: Axes, time: Array, panel: FitPanel, shown: _Shown, recorded: str, simulated: str, *, same: bool
-) -> None:
-    """Draw an output, its prediction and its simulation: one curve if the `same` in all panels."""
-    axes.plot(time, shown.broken(panel.y), color=BLACK, linewidth=1.0, label=recorded)
-    label = f"predicted one step ahead, and {simulated}" if same else "predicted one step ahead"
-    axes.plot(time, shown.broken(panel.predicted), color=BLUE, linewidth=1.0, label=label)
-    if panel.simulated is not None and not same:
-        axes.plot(time, shown.broken(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated)
+        style.legend_over_all(page)
 
 
 def _coincide(panel: FitPanel, shown: slice) -> bool:

@@ -9,20 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
 
-from inputdesign_cli.figures.style import (
-    BLACK,
-    BLUE,
-    DASHED,
-    GREEN,
-    GREY,
-    ORANGE,
-    PALETTE,
-    frequency_axis,
-    legend_above,
-    log_axes,
-    lowered,
-    marked,
-)
+from inputdesign_cli.figures import style
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREEN, GREY, ORANGE, PALETTE
 from inputdesign_cli.outcome.curves import DirectionCurves, OptimalityCurves, SpectrumCurves
 from inputdesign_cli.outcome.results import Array
 
@@ -45,34 +33,27 @@ def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     shown = curves.frequency > 0
     w, power = curves.frequency[shown], curves.spectrum[shown, 0, 0].real
     if curves.lines:
-        _plot_lines(axes, w, power, curves)
+        few = w.size <= FEW
+        total = f"sinusoids, total power {power.sum():.4g}"
+        if curves.white is not None:
+            total += f" (white: {curves.white:.4g})"
+        axes.vlines(w, 0.0, power, color=BLUE, linewidth=1.8 if few else 0.8)
+        axes.plot(w, power, "o", color=BLUE, markersize=5 if few else 2.5, label=total)
+        axes.set_ylim(0.0, 1.08 * float(power.max(initial=0.0)) or 1.0)
+        axes.set_ylabel(f"power of each sinusoid of {curves.symbol} (mean square)")
         margins = [] if curves.band is None or not w.size else [w.min() / 3, curves.band[1]]
         w = np.append(w, margins) if margins else _room(w)
     else:
-        _plot_density(axes, w, power, None if curves.record is None else curves.record[shown, 0], curves)
-    frequency_axis(axes, w, time_unit)
-    legend_above(axes)
-
-
-def _plot_density(axes: Axes, w: Array, density: Array, record: Array | None, curves: SpectrumCurves) -> None:
-    phi = f"Φ{lowered(curves.symbol)}"
-    axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"{phi}, {curves.label}")
-    if record is not None:
-        axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
-    _plot_white(axes, curves.white, f"{phi}, white")
-    axes.set_ylabel(f"spectral density {phi}(ω)")
-    _scale(axes, density, curves.white or float(np.median(density)))
-
-
-def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> None:
-    few = w.size <= FEW
-    total = f"sinusoids, total power {power.sum():.4g}"
-    if curves.white is not None:
-        total += f" (white: {curves.white:.4g})"
-    axes.vlines(w, 0.0, power, color=BLUE, linewidth=1.8 if few else 0.8)
-    axes.plot(w, power, "o", color=BLUE, markersize=5 if few else 2.5, label=total)
-    axes.set_ylim(0.0, 1.08 * float(power.max(initial=0.0)) or 1.0)
-    axes.set_ylabel(f"power of each sinusoid of {curves.symbol} (mean square)")
+        phi = f"Φ{style.lowered(curves.symbol)}"
+        axes.plot(w, power, color=BLUE, linewidth=2.0, label=f"{phi}, {curves.label}")
+        if curves.record is not None:
+            record = curves.record[shown, 0]
+            axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
+        _plot_white(axes, curves.white, f"{phi}, white")
+        axes.set_ylabel(f"spectral density {phi}(ω)")
+        _scale(axes, power, curves.white or float(np.median(power)))
+    style.frequency_axis(axes, w, time_unit)
+    style.legend_above(axes)
 
 
 def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
@@ -90,16 +71,16 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     above.set_ylabel(of if curves.lines else f"density of {curves.symbol}")
     shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
     _scale(above, shown, float(np.median(shown)))
-    legend_above(above)
+    style.legend_above(above)
     values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
     for number in range(min(r, MOST)):
-        label = f"λ{lowered(number + 1)}"
+        label = f"λ{style.lowered(number + 1)}"
         _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
     _plot_white(below, curves.white)
     _logarithmic(below, values)
     below.set_ylabel("eigenvalues")
-    legend_above(below)
-    frequency_axis(below, _room(w) if curves.lines else w, time_unit)
+    style.legend_above(below)
+    style.frequency_axis(below, _room(w) if curves.lines else w, time_unit)
 
 
 def _room(w: Array) -> Array:
@@ -119,7 +100,7 @@ def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[
         values = entries[:, i, j]
         if float(values.max(initial=0.0)) <= NOTHING * peak:
             continue
-        name = f"|Φ{lowered(i + 1, j + 1)}|"
+        name = f"|Φ{style.lowered(i + 1, j + 1)}|"
         same = [names for names, other in found if np.abs(values - other).max() <= NOTHING * peak]
         if same:
             same[0].append(name)
@@ -133,17 +114,17 @@ def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> No
     w = curves.frequency
     upper, lower = page.subplots(2, 1, sharex=True)
     for i, (gain, power) in enumerate(zip(curves.gain.T, curves.power.T, strict=True)):
-        upper.plot(w, gain, color=PALETTE[i % MOST], label=f"σ{lowered(i + 1)}(G)")
-        label = "v{0}* Φᵤ v{0}".format(lowered(i + 1))
+        upper.plot(w, gain, color=PALETTE[i % MOST], label=f"σ{style.lowered(i + 1)}(G)")
+        label = "v{0}* Φᵤ v{0}".format(style.lowered(i + 1))
         _plot_power(lower, w, power, lines=curves.lines, number=i, label=label)
-    log_axes(upper, "y", "mask")
+    style.log_axes(upper, "y", "mask")
     upper.set_ylabel("gains of the plant")
-    legend_above(upper)
+    style.legend_above(upper)
     _plot_white(lower, curves.white)
     _logarithmic(lower, curves.power)
     lower.set_ylabel("input along them")
-    frequency_axis(lower, w, time_unit)
-    legend_above(lower)
+    style.frequency_axis(lower, w, time_unit)
+    style.legend_above(lower)
 
 
 def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> None:
@@ -154,17 +135,17 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     axes.axhline(1.0, color=BLACK, linewidth=1.0, label="the most that is allowed")
     if support.size:
         label = "where the optimum has its power"
-        marked(axes, support, np.interp(support, w, ratio), color=ORANGE, label=label)
+        style.marked(axes, support, np.interp(support, w, ratio), color=ORANGE, label=label)
     axes.set_ylim(0.0, 1.08 * max(1.0, float(ratio.max())))
     axes.set_ylabel("relative worth of excitation")
-    frequency_axis(axes, w, time_unit)
+    style.frequency_axis(axes, w, time_unit)
     page.suptitle(
         "A unit of cost buys nowhere more than where the optimum has its power:\n"
         "no other spectrum can do better than the proved bound",
         x=0.01,
         ha="left",
     )
-    legend_above(axes)
+    style.legend_above(axes)
 
 
 def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> None:
@@ -196,6 +177,6 @@ def _logarithmic(axes: Axes, values: Array) -> None:
     """Make the axis logarithmic over the leading decades; zeros of a spectrum would stretch it endlessly."""
     peak = float(values.max(initial=0.0))
     if peak > 0.0:
-        log_axes(axes, "y", "mask")
+        style.log_axes(axes, "y", "mask")
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, peak * 10.0**-DECADES), max(high, 2.0 * peak))

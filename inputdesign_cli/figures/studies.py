@@ -5,19 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import (
-    BLACK,
-    BLUE,
-    DASHED,
-    DOTTED,
-    GREEN,
-    GREY,
-    ORANGE,
-    PALETTE,
-    legend_above,
-    legend_over_all,
-    plain_decades,
-)
+from inputdesign_cli.figures import style
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, PALETTE
 from inputdesign_cli.outcome.curves import CampaignCurves, LossCurves, RatioCurves, TradeCurves
 
 _COLOURS = (BLUE, ORANGE, GREEN, GREY)
@@ -33,14 +22,14 @@ def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
     upper, lower = page.subplots(2, 1, sharex=True)
     upper.plot(curves.samples, curves.ratio, "o-", color=BLUE, markersize=4, label="after each part")
     upper.axhline(1.0, color=ORANGE, linestyle=DASHED, label="what is asked")
-    plain_decades(upper, "y")
+    style.plain_decades(upper, "y")
     upper.set_ylabel("worst ratio")
     lower.plot(curves.samples, curves.energy, "o-", color=BLUE, markersize=4)
     lower.set_ylim(bottom=0.0)
     lower.set(xlabel="samples applied", ylabel="energy applied")
     if 2 * curves.samples[-1] > curves.end:
         lower.axvline(curves.end, color=BLACK, linestyle=DASHED)
-    legend_above(upper)
+    style.legend_above(upper)
 
 
 def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
@@ -67,7 +56,7 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
     axes.axvline(1.0, color=BLACK, linestyle=DASHED)
     axes.set_xlabel("largest r_u / r_adm of the true plant\n(beyond the last bin: in it)")
     axes.set_ylabel("share of the runs (%)")
-    legend_over_all(page)
+    style.legend_over_all(page)
 
 
 def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
@@ -82,11 +71,11 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
     if curves.record is not None:
         axes.axvline(curves.record, color=BLACK, linestyle=DOTTED, label="knows the plant: its record")
     if max(dear for _, _, dear, *_ in curves.points.values()) > _WIDE:
-        plain_decades(axes, "x")
+        style.plain_decades(axes, "x")
     axes.set_xlabel("cost over that of the spectrum that knows the plant\n(mean, 5 to 95 %)")
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)
-    legend_over_all(page)
+    style.legend_over_all(page)
 
 
 def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
@@ -104,4 +93,4 @@ def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
             axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
     axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
     axes.set(ylabel="share of the runs (%)", xlim=(0.0, top))
-    legend_above(axes)
+    style.legend_above(axes)

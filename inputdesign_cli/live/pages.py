@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from inputdesign_cli.errors import Diagnostic, IdesignError, Location
+from inputdesign_cli.errors import Diagnostic, IdesignError
 from inputdesign_cli.report.render import filled
 from inputdesign_cli.report.run_page import run_page
 
@@ -105,7 +105,10 @@ def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str
     if place is not None:
         stands = place.file == file and 1 <= place.line <= len(lines)
         where = f"{Path(place.file).name}, line {place.line}, column {place.column}"
-        shown = _about(place, lines) if stands else [(str(place.line), place.text.rstrip(), True)]
+        shown = [(str(place.line), place.text.rstrip(), True)]
+        if stands:
+            first, last = max(place.line - _AROUND, 1), min(place.line + _AROUND, len(lines))
+            shown = [(str(n), lines[n - 1].rstrip(), n == place.line) for n in range(first, last + 1)]
     return {
         "code": diagnostic.code,
         "message": diagnostic.message,
@@ -113,8 +116,3 @@ def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str
         "where": where or diagnostic.key,
         "lines": shown,
     }
-
-
-def _about(place: Location, lines: Sequence[str]) -> list[tuple[str, str, bool]]:
-    first, last = max(place.line - _AROUND, 1), min(place.line + _AROUND, len(lines))
-    return [(str(n), lines[n - 1].rstrip(), n == place.line) for n in range(first, last + 1)]

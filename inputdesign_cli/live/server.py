@@ -116,7 +116,10 @@ class _Handler(BaseHTTPRequestHandler):
         except ValueError:  # such as http://[::1
             self._answer("text/plain", "this is no address\n", HTTPStatus.BAD_REQUEST)
             return
-        if not self._from_here():
+        # The browser must ask for this machine by its own name, and not from another site's page.
+        named = self.headers.get_all("Host") or []
+        ours = len(named) == 1 and named[0] in self.hosts
+        if not ours or self.headers.get("Sec-Fetch-Site") == "cross-site":
             self._answer("text/plain", "this page is for the machine that it runs on\n", HTTPStatus.FORBIDDEN)
         elif asked.path == self.path_prefix:
             page, version = self.shown.page
@@ -132,13 +135,6 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer("text/plain", "there is nothing here\n", HTTPStatus.NOT_FOUND)
 
     do_HEAD = do_GET
-
-    def _from_here(self) -> bool:
-        """Return whether the browser asked for this machine by its own name, not from another site's page."""
-        named = self.headers.get_all("Host") or []
-        return (
-            len(named) == 1 and named[0] in self.hosts and self.headers.get("Sec-Fetch-Site") != "cross-site"
-        )
 
     def _answer(self, kind: str, text: str, status: HTTPStatus = HTTPStatus.OK) -> None:
         body = text.encode("utf-8", "backslashreplace")

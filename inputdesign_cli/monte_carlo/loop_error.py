@@ -25,7 +25,7 @@ from inputdesign_cli.identification.polynomial_rows import estimated_polynomials
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial import delay_of, determinant_and_adjugate, multiply, roots_in_z
 from inputdesign_cli.plant.transfer import product_of
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise
@@ -81,7 +81,14 @@ def study_losses(
     tried = partial(_losses, problem, problem.law.desired, roots, samples)
     size = max(1, _BATCH_SAMPLES // samples)
     parts = run_batches(tried, runs=runs, size=size, seed=seed, executor=executor)
-    return {name: _joined([part[name] for part in parts]) for name in inputs}
+    studies = {}
+    for name in inputs:
+        columns = zip(*(part[name] for part in parts), strict=True)
+        loss, exact, theta, power = map(np.concatenate, columns)
+        stable = np.isfinite(loss)
+        unstable = int(np.sum(~stable))
+        studies[name] = LossStudy(loss[stable], exact[stable], theta, unstable, power.mean(axis=0))
+    return studies
 
 
 def _losses(
@@ -102,7 +109,7 @@ def _losses(
         u = shaped_noise(root, drive, samples)
         theta = least_squares(plant, u, plant.simulate(u, np.zeros((1, 1, plant.outputs)), 1.0)[0] + noise)
         filters = error_filters(plant, desired, *estimated_polynomials(plant, theta))
-        radius = _largest_root(filters[1])
+        radius = np.array([np.abs(roots_in_z(row)).max(initial=0.0) for row in filters[1]])
         loss = _simulated(*filters, entering, radius < 1)
         exact = np.sqrt(samples * _mean_square(problem, desired, *filters, radius))
         found[name] = (loss, exact, theta, np.mean(u * u, axis=1))
@@ -115,17 +122,6 @@ def _noise(plant: MatrixPlant, runs: int, samples: int, rng: np.random.Generator
     e = np.tensordot(np.linalg.cholesky(plant.covariance), white, axes=1)
     silent = np.zeros((1, 1, plant.inputs))
     return plant.simulate(silent, np.moveaxis(e, 0, -1), 1.0)[1]
-
-
-def _largest_root(denominator: Array) -> Array:
-    """Return the largest modulus of the roots in z of each polynomial (runs, m) in q^-1, (runs,)."""
-    order = denominator.shape[1] - 1
-    if order == 0:
-        return np.zeros(denominator.shape[0])
-    companion = np.zeros((denominator.shape[0], order, order))
-    companion[:, 0] = -denominator[:, 1:] / denominator[:, :1]
-    companion[:, np.arange(1, order), np.arange(order - 1)] = 1.0
-    return np.asarray(np.abs(np.linalg.eigvals(companion)).max(axis=1), dtype=float)
 
 
 def _entering(
@@ -178,12 +174,6 @@ def _mean_square(
     power = np.sum((response @ entering[:, None] * response.conj()).real, axis=(2, 3))
     energy = np.abs(np.fft.rfft(denominator, points).T) ** 2
     return np.where(stable, np.sum(power / energy, axis=0), np.inf)
-
-
-def _joined(parts: list[tuple[Array, Array, Array, Array]]) -> LossStudy:
-    loss, exact, theta, power = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    stable = np.isfinite(loss)
-    return LossStudy(loss[stable], exact[stable], theta, int(np.sum(~stable)), power.mean(axis=0))
 
 
 def error_filters(plant: MatrixPlant, desired: DesiredLoop, A: Array, B: Array) -> tuple[Array, Array]:
@@ -254,10 +244,7 @@ def _trimmed(polynomials: Array) -> Array:
 
 def _times(left: Array, right: Array) -> Array:
     """Return polynomials (.., l) times one polynomial (m,)."""
-    product = np.zeros((*left.shape[:-1], left.shape[-1] + right.size - 1))
-    for lag, factor in enumerate(right):
-        product[..., lag : lag + left.shape[-1]] += factor * left
-    return product
+    return np.apply_along_axis(np.convolve, -1, left, right)
 
 
 def _plus(left: Array, right: Array) -> Array:
@@ -267,10 +254,8 @@ def _plus(left: Array, right: Array) -> Array:
 
 def _resized(polynomial: Array, size: int) -> Array:
     """Return polynomials padded with zeros at the end, or cut there."""
-    missing = size - polynomial.shape[-1]
-    if missing <= 0:
-        return polynomial[..., :size]
-    return np.concatenate([polynomial, np.zeros((*polynomial.shape[:-1], missing))], axis=-1)
+    more = [(0, 0)] * (polynomial.ndim - 1) + [(0, max(size - polynomial.shape[-1], 0))]
+    return np.pad(polynomial, more)[..., :size]
 
 
 def _on_diagonal(polynomials: Array, n: int) -> Array:

@@ -53,10 +53,18 @@ class LossCurves(Curves):
 
 
 @dataclass(frozen=True)
-class BoundPanel:
-    """Holds model error and admissible error over frequency, of one entry of G; all arrays (n,)."""
+class Panel:
+    """Holds curves over frequency that belong to one entry of G, or to the norm of all."""
 
     frequency: Array
+    entry: tuple[int, int] | None = field(default=None, kw_only=True)  # output and input, from zero
+    names: str = field(default="", kw_only=True)  # of the input and the output, where the user gave them
+
+
+@dataclass(frozen=True)
+class BoundPanel(Panel):
+    """Holds model error and admissible error over frequency, of one entry of G; all arrays (n,)."""
+
     r_u: Array
     G_abs: Array
     r_adm: Array | None = None
@@ -66,8 +74,6 @@ class BoundPanel:
     label: str = "design"  # what gave r_u
     r_u_equal: Array | None = None  # of white excitation at the cost, or of the length, of the design
     white_labels: tuple[str, str] = ("white", "white, same cost")  # what r_u_white and r_u_equal are called
-    entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
-    names: str = ""  # of the input and the output, where the user gave them
 
 
 @dataclass(frozen=True)
@@ -90,15 +96,12 @@ class NyquistCurves(Curves):
 
 
 @dataclass(frozen=True)
-class ResponsePanel:
+class ResponsePanel(Panel):
     """Holds an entry of G from data alone, the radius of its confidence disc, and a model's; all (n,)."""
 
-    frequency: Array
     G: NDArray[np.complex128]
     radius: Array
     model: NDArray[np.complex128]
-    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
-    names: str = ""
 
 
 @dataclass(frozen=True)
@@ -109,17 +112,14 @@ class ResponseCurves(Curves):
 
 
 @dataclass(frozen=True)
-class DeviationPanel:
+class DeviationPanel(Panel):
     """Holds standard deviations of an entry of G at lines, and the admitted ones; all (n,)."""
 
-    frequency: Array
     G_abs: Array
     r_adm: Array
     deviation: Array
     found: Array | None = None  # of data, or of simulated experiments
     label: str = ""  # what gave them
-    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
-    names: str = ""
 
 
 @dataclass(frozen=True)
@@ -217,15 +217,12 @@ class CloudCurves(Curves):
 
 
 @dataclass(frozen=True)
-class ErrorBandPanel:
+class ErrorBandPanel(Panel):
     """Holds quantiles over many runs of |G_hat - G_0| over frequency, and the prediction; arrays (n,)."""
 
-    frequency: Array
     quantiles: Mapping[float, Array]  # probability -> (n,)
     r_u: Array | None = None
     r_adm: Array | None = None
-    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
-    names: str = ""
 
 
 @dataclass(frozen=True)

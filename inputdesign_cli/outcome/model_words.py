@@ -7,17 +7,8 @@ from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any
 
+from inputdesign_cli import plant
 from inputdesign_cli.arrays import Array, Rows
-from inputdesign_cli.plant import (
-    Coloured,
-    ContinuousModel,
-    Model,
-    PolynomialModel,
-    Reparametrised,
-    SampledModel,
-    StateSpaceModel,
-)
-from inputdesign_cli.plant.reparametrised import Place
 
 Plain = Any
 """A value as YAML has it: a number, a text, a list or a mapping."""
@@ -25,7 +16,7 @@ Blocks = dict[str, dict[str, Plain]]
 
 
 @singledispatch
-def blocks_of(model: Model) -> Blocks:
+def blocks_of(model: plant.Model) -> Blocks:
     """Return `plant` and `noise` of a model; polynomials that are 1 are left out.
 
     Raises:
@@ -35,7 +26,7 @@ def blocks_of(model: Model) -> Blocks:
 
 
 @blocks_of.register
-def _(model: PolynomialModel) -> Blocks:
+def _(model: plant.PolynomialModel) -> Blocks:
     single = model.outputs == model.inputs == 1
     everything: dict[str, tuple[Plain, bool]] = {
         "A": (_rows(model.A), _matter(model.A)),
@@ -50,7 +41,7 @@ def _(model: PolynomialModel) -> Blocks:
 
 
 @blocks_of.register
-def _(model: ContinuousModel) -> Blocks:
+def _(model: plant.ContinuousModel) -> Blocks:
     below = _matrix(model.denominator, descending=True)
     i, j = model.active[0]
     matrix: dict[str, Plain] = {
@@ -64,18 +55,18 @@ def _(model: ContinuousModel) -> Blocks:
 
 
 @blocks_of.register
-def _(model: SampledModel) -> Blocks:
+def _(model: plant.SampledModel) -> Blocks:
     blocks = blocks_of(model.continuous_plant)
     return {**blocks, "plant": {**blocks["plant"], "sample": "zoh"}}
 
 
 @blocks_of.register
-def _(model: StateSpaceModel) -> Blocks:
+def _(model: plant.StateSpaceModel) -> Blocks:
     return {"plant": {}, "noise": _variance(model)}  # the plant is in the words of its parameters
 
 
 @blocks_of.register
-def _(model: Coloured) -> Blocks:
+def _(model: plant.Coloured) -> Blocks:
     blocks = blocks_of(model.plant)
     own: dict[str, Plain] = {
         name: _rows(rows) for name, rows in (("C", model.C), ("D", model.D)) if _matter(rows)
@@ -89,52 +80,48 @@ def _(model: Coloured) -> Blocks:
 
 
 @blocks_of.register
-def _(model: Reparametrised) -> Blocks:
+def _(model: plant.Reparametrised) -> Blocks:
     words, blocks = model.words, blocks_of(model.coefficients)
     if words.plant is not None:
-        plant = copy.deepcopy(dict(words.plant))
+        written = copy.deepcopy(dict(words.plant))
         at = model.parametrisation
         values = dict(zip(at.labels, at.values.tolist(), strict=True))
         for label, place in words.places.items():
-            _put(plant, place, values[label])
-        blocks["plant"] = plant
+            *steps, last = place
+            block: Plain = written
+            for step in steps:
+                block = block[step]
+            block[last] = values[label]
+        blocks["plant"] = written
     for section, known in words.known.items():
         if known:
             blocks[section]["known"] = list(known)
     return blocks
 
 
-def _put(block: Plain, place: Place, value: float) -> None:
-    """Put the value at its place in nested mappings and lists."""
-    *steps, last = place
-    for step in steps:
-        block = block[step]
-    block[last] = value
-
-
 @singledispatch
-def predictor_of(model: Model) -> dict[str, list[Array]]:
+def predictor_of(model: plant.Model) -> dict[str, list[Array]]:
     """Return the polynomials of a model that must be stable, by letter: C, D, F; none of a plant in s."""
     return {}
 
 
 @predictor_of.register
-def _(model: PolynomialModel) -> dict[str, list[Array]]:
+def _(model: plant.PolynomialModel) -> dict[str, list[Array]]:
     return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
 
 
 @predictor_of.register
-def _(model: Coloured) -> dict[str, list[Array]]:
+def _(model: plant.Coloured) -> dict[str, list[Array]]:
     free = [d for d, held in zip(model.D, model.held, strict=True) if not held]
     return {**predictor_of(model.plant), "C": list(model.C), "D": free}
 
 
 @predictor_of.register
-def _(model: Reparametrised) -> dict[str, list[Array]]:
+def _(model: plant.Reparametrised) -> dict[str, list[Array]]:
     return predictor_of(model.coefficients)
 
 
-def _variance(model: Model) -> dict[str, Plain]:
+def _variance(model: plant.Model) -> dict[str, Plain]:
     covariance = model.covariance
     return {"variance": float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()}
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from filecmp import cmp
 from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_STREAM, DataError, OutputError
@@ -89,9 +88,7 @@ def check_place(directory: Path, origin: Origin, spec: str) -> None:
             f"{directory} cannot be written: {there}: {why}",
             hint="choose another place, or change the permissions",
         )
-    foreign = [n for n in (SPEC, RESULT) if n not in owned_files(target) and os.path.lexists(target / n)]
-    if RESULT in foreign or (foreign and _content(target / SPEC) != encoded(spec)):
-        raise not_a_run(foreign, directory)
+    check_foreign(target, {SPEC: encoded(spec), RESULT: b""}, shown=directory)
     if not origin.overwrite:
         check_origin(origin, spec, target, shown=directory)
 
@@ -119,7 +116,8 @@ def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
         return
     before = [spec.parent / str(name) for name in counted[1:]]
     for file in data:
-        if any(one.is_file() and file.is_file() and cmp(one, file, shallow=False) for one in before):
+        content = _content(file)
+        if content is not None and any(_content(one) == content for one in before):
             raise DataError.because(
                 "data-repeated",
                 f"{file} counts as experiment.prior of {spec} already, and would count twice",
@@ -127,11 +125,19 @@ def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
             )
 
 
-def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
-    """Return the error about files of the user's that would be written over."""
-    message = f"{directory} already has {', '.join(foreign)}, written by something other than an earlier run"
-    hint = "choose another directory with -o, or move these files away"
-    return OutputError.because("output-not-a-run", message, hint)
+def check_foreign(target: Path, contents: Mapping[str, bytes], *, shown: Path) -> None:
+    """Refuse to write over files that are of no run, unless that changes nothing.
+
+    Raises:
+        OutputError: `output-not-a-run`.
+    """
+    owned = owned_files(target)
+    there = [name for name in contents if name not in owned and os.path.lexists(target / name)]
+    foreign = [name for name in there if _content(target / name) != contents[name]]
+    if foreign:
+        message = f"{shown} already has {', '.join(foreign)}, written by something other than an earlier run"
+        hint = "choose another directory with -o, or move these files away"
+        raise OutputError.because("output-not-a-run", message, hint)
 
 
 def _content(path: Path) -> bytes | None:

@@ -7,32 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from inputdesign_cli.finding import Finding
+from inputdesign_cli.outcome import design, estimate
 from inputdesign_cli.outcome.campaign import Campaign
 from inputdesign_cli.outcome.codec import others
-from inputdesign_cli.outcome.design import (
-    Baseline,
-    ClosedLoopError,
-    Foreseen,
-    Information,
-    LimitUse,
-    MeanSquaredError,
-    ModelError,
-    Moments,
-    Objective,
-    Powers,
-    RequirementMet,
-    Sensitivity,
-    Signal,
-    Solver,
-    Spectrum,
-)
-from inputdesign_cli.outcome.estimate import (
-    Assessment,
-    Exploration,
-    Identification,
-    MeasuredLines,
-    Validation,
-)
 from inputdesign_cli.outcome.robust import Robust
 from inputdesign_cli.outcome.simulation import Simulation
 
@@ -48,31 +25,31 @@ class Outcome:
     format: int = 1
     title: str | None = None
     status: str | None = None
-    objective: Objective | None = None
+    objective: design.Objective | None = None
     cost: float | None = None
     samples: int | None = None
-    power: Powers | None = None
-    model_error: ModelError | None = None
-    requirements: tuple[RequirementMet, ...] | None = None
-    limits: tuple[LimitUse, ...] | None = None
-    information: Information | None = None
-    spectrum: Spectrum | None = None
-    baseline: Baseline | None = None
+    power: design.Powers | None = None
+    model_error: design.ModelError | None = None
+    requirements: tuple[design.RequirementMet, ...] | None = None
+    limits: tuple[design.LimitUse, ...] | None = None
+    information: design.Information | None = None
+    spectrum: design.Spectrum | None = None
+    baseline: design.Baseline | None = None
     robust: Robust | None = None
-    foreseen: Foreseen | None = None
-    signal: Signal | None = None
-    frequency_response: MeasuredLines | None = None
-    closed_loop_error: ClosedLoopError | None = None
-    mean_squared_error: MeanSquaredError | None = None
-    moments: Moments | None = None
-    sensitivity: Sensitivity | None = None
-    identification: Identification | None = None
-    assessment: Assessment | None = None
-    exploration: Exploration | None = None
-    validation: Validation | None = None
+    foreseen: design.Foreseen | None = None
+    signal: design.Signal | None = None
+    frequency_response: estimate.MeasuredLines | None = None
+    closed_loop_error: design.ClosedLoopError | None = None
+    mean_squared_error: design.MeanSquaredError | None = None
+    moments: design.Moments | None = None
+    sensitivity: design.Sensitivity | None = None
+    identification: estimate.Identification | None = None
+    assessment: estimate.Assessment | None = None
+    exploration: estimate.Exploration | None = None
+    validation: estimate.Validation | None = None
     simulation: Simulation | None = None
     campaign: Campaign | None = None
-    solver: Solver | None = None
+    solver: design.Solver | None = None
     findings: tuple[Finding, ...] | None = None
     notes: tuple[str, ...] | None = None
     timing_s: Mapping[str, float] | None = None

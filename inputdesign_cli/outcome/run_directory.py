@@ -7,19 +7,29 @@ that whatever happens to the writer: a full disc, an interrupt, a power cut.
 from __future__ import annotations
 
 import errno
-import filecmp
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
+import orjson
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
 from inputdesign_cli.outcome.codec import json_text
-from inputdesign_cli.outcome.curves_file import curves_json
-from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, encoded, not_a_run
+from inputdesign_cli.outcome.curves import Curves
+from inputdesign_cli.outcome.origin import (
+    Origin,
+    check_directory,
+    check_foreign,
+    check_origin,
+    digest,
+    encoded,
+)
 from inputdesign_cli.outcome.record import (
     FIGURES,
     RESULT,
@@ -28,11 +38,13 @@ from inputdesign_cli.outcome.record import (
     environment,
     load_result,
     owned_files,
+    readable,
     unreadable,
 )
 from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.text_formats import csv_text
+from inputdesign_cli.regular_file import read_regular
 
 
 def finished_result(results: Results) -> dict[str, Any]:
@@ -74,14 +86,17 @@ def write_run(
         target = check_directory(directory)
         if origin is not None:
             result |= origin.entry(target, results.resolved_spec)
+        contents = _contents(results, result, figures)
         with workplace(target) as work:
             if origin is not None and not origin.overwrite:
                 check_origin(origin, results.resolved_spec, target, shown=directory)
-            names = _write_files(results, result, work / "new", figures)
-            owned = owned_files(target)
-            _keep_foreign(names, owned, work, target, shown=directory)
-            put_in_place(names, owned, work, target)
-    return [directory / name for name in names]
+            check_foreign(target, contents, shown=directory)
+            for name, content in contents.items():
+                (work / "new" / name).write_bytes(content)
+            for name in (*contents, ""):
+                sync(work / "new" / name)
+            put_in_place(list(contents), owned_files(target), work, target)
+    return [directory / name for name in contents]
 
 
 def write_text(path: Path, text: str) -> None:
@@ -155,35 +170,49 @@ def read_outcome(directory: Path, result: Mapping[str, object] | None = None) ->
         raise unreadable(directory / RESULT, str(error)) from error
 
 
-def _write_files(
-    results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
-) -> list[str]:
-    """Write all files of the run into `folder`, on the disc on return; return names, the result last."""
+def _contents(results: Results, result: dict[str, Any], figures: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the content of all files of the run by name, the result last."""
     tables = {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
     texts = {name: encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
     contents = {**texts, **results.files, **figures}
     if results.curves:
         contents[FIGURES] = curves_json(results.curves)
-    told = {"signal_sha256": digest(tables[SIGNAL])} if SIGNAL in tables else {}
-    contents[RESULT] = encoded(json_text({**result, **told, "files": list(contents)}))
-    for name, content in contents.items():
-        (folder / name).write_bytes(content)
-    for name in contents:
-        sync(folder / name)
-    sync(folder)
-    return list(contents)
+    known = {"signal_sha256": digest(tables[SIGNAL])} if SIGNAL in tables else {}
+    contents[RESULT] = encoded(json_text({**result, **known, "files": list(contents)}))
+    return contents
 
 
-def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, *, shown: Path) -> None:
-    """Refuse to write over files that are of no run, unless that changes nothing."""
+_KIND = "kind"
 
-    def differs(name: str) -> bool:
-        there = target / name
-        return not (there.is_file() and filecmp.cmp(work / "new" / name, there, shallow=False))
 
-    there = [name for name in names if name not in owned and os.path.lexists(target / name)]
-    if foreign := [name for name in there if differs(name)]:
-        raise not_a_run(foreign, shown)
+def curves_json(curves: Mapping[str, Curves]) -> bytes:
+    """Return the content of figures.json: curves by the file stem of their figure; NaN is null."""
+    content = {stem: {_KIND: type(one).__name__, **asdict(cast(Any, one))} for stem, one in curves.items()}
+    return orjson.dumps(content, default=_plain, option=orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _plain(value: object) -> object:
+    """Return values without a type in JSON: complex numbers, and arrays that are not contiguous."""
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"a figure cannot hold a {type(value).__name__}")
+    if np.iscomplexobj(value):
+        return {"re": np.ascontiguousarray(value.real), "im": np.ascontiguousarray(value.imag)}
+    return np.ascontiguousarray(value)
+
+
+def read_curves(directory: Path) -> dict[str, Curves]:
+    """Return the curves of a run by file stem, from which a page draws the figures again in its own size.
+
+    Raises:
+        DataError: `run-unreadable`, figures.json holds something else.
+    """
+    file = directory / FIGURES
+    if not file.is_file():
+        return {}
+    with readable(file):
+        kinds = {kind.__name__: kind for kind in Curves.__subclasses__()}
+        content = orjson.loads(read_regular(file))
+        return {stem: read_plain(kinds[fields[_KIND]], fields) for stem, fields in content.items()}
 
 
 @contextmanager

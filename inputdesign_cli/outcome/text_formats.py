@@ -6,13 +6,11 @@ import csv
 import io
 import re
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 import orjson
 
 from inputdesign_cli.outcome.results import Array, Table
-from inputdesign_cli.regular_file import read_regular
 
 
 def csv_text(table: Table) -> str:
@@ -72,11 +70,6 @@ def _shortest(values: Array) -> list[str]:
     )
     text = orjson.dumps(native, option=orjson.OPT_SERIALIZE_NUMPY).decode()[1:-1]
     return f"{text},".replace(".0,", ",").split(",")[:-1]
-
-
-def read_csv(path: Path) -> dict[str, Array]:
-    """Read the columns of a file that `csv_text` made: name -> (n,)."""
-    return csv_columns(read_regular(path))
 
 
 def csv_columns(content: bytes) -> dict[str, Array]:

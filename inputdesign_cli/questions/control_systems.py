@@ -7,24 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inputdesign_cli import plant
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant import (
-    Coloured,
-    ContinuousModel,
-    Model,
-    PolynomialModel,
-    Reparametrised,
-    SampledModel,
-    StateSpaceModel,
-)
 
 if TYPE_CHECKING:
     import control
 
 
 @singledispatch
-def system_of(model: Model, sample_time: float) -> control.lti.LTI:
+def system_of(model: plant.Model, sample_time: float) -> control.lti.LTI:
     """Return G of a model as a system; that of a sampled model is in discrete time.
 
     Raises:
@@ -33,15 +25,15 @@ def system_of(model: Model, sample_time: float) -> control.lti.LTI:
     raise TypeError(f"{type(model).__name__} is no system of python-control")
 
 
-@system_of.register(PolynomialModel)
-def _(model: PolynomialModel, sample_time: float) -> control.lti.LTI:
+@system_of.register(plant.PolynomialModel)
+def _(model: plant.PolynomialModel, sample_time: float) -> control.lti.LTI:
     places = [(model.A[0 if len(model.A) == 1 else i], i) for i in range(model.outputs)]
     rows = [[(model.B[i][j], np.convolve(a, model.F[i][j])) for j in range(model.inputs)] for a, i in places]
     return _discrete(rows, sample_time)
 
 
-@system_of.register(SampledModel)
-def _(model: SampledModel, sample_time: float) -> control.lti.LTI:
+@system_of.register(plant.SampledModel)
+def _(model: plant.SampledModel, sample_time: float) -> control.lti.LTI:
     plant, nothing = model.continuous_plant, (np.zeros(1), np.ones(1))
     rows = [[nothing for _ in range(model.inputs)] for _ in range(model.outputs)]
     for i, j in plant.active:
@@ -49,8 +41,8 @@ def _(model: SampledModel, sample_time: float) -> control.lti.LTI:
     return _discrete(rows, sample_time)
 
 
-@system_of.register(ContinuousModel)
-def _(model: ContinuousModel, sample_time: float) -> control.lti.LTI:
+@system_of.register(plant.ContinuousModel)
+def _(model: plant.ContinuousModel, sample_time: float) -> control.lti.LTI:
     import control
 
     if model.memory:
@@ -67,17 +59,17 @@ def _(model: ContinuousModel, sample_time: float) -> control.lti.LTI:
     return control.TransferFunction(above, below)
 
 
-@system_of.register(StateSpaceModel)
-def _(model: StateSpaceModel, sample_time: float) -> control.lti.LTI:
+@system_of.register(plant.StateSpaceModel)
+def _(model: plant.StateSpaceModel, sample_time: float) -> control.lti.LTI:
     import control
 
     return control.StateSpace(*model.realisation, sample_time)
 
 
-@system_of.register(Coloured)
-@system_of.register(Reparametrised)
-def _(model: Coloured | Reparametrised, sample_time: float) -> control.lti.LTI:
-    return system_of(model.plant if isinstance(model, Coloured) else model.coefficients, sample_time)
+@system_of.register(plant.Coloured)
+@system_of.register(plant.Reparametrised)
+def _(model: plant.Coloured | plant.Reparametrised, sample_time: float) -> control.lti.LTI:
+    return system_of(model.plant if isinstance(model, plant.Coloured) else model.coefficients, sample_time)
 
 
 def _discrete(rows: list[list[tuple[Array, Array]]], sample_time: float) -> control.lti.LTI:

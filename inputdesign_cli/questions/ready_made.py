@@ -54,7 +54,17 @@ def make_signal(asked: ReadyMade) -> Results:
         SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.
     """
     u, period = _made(asked)
-    _check_apart(u, asked)
+    moved = u - u.mean(axis=0)
+    rank = int(np.linalg.matrix_rank(moved.T @ moved, hermitian=True))
+    if asked.inputs > 1 and rank < asked.inputs:
+        bits = (asked.inputs + 1).bit_length()
+        longer = f"--prbs {bits} or more" if asked.kind == "prbs" else "more levels"
+        raise bad_spec(
+            "bad-period",
+            f"of {asked.inputs} inputs over {len(u)} samples, {asked.inputs - rank} follow from the others, "
+            "so that their effects could not be separated",
+            hint=f"write {longer}, and --samples enough for them",
+        )
     record = scaled(u, asked.levels)
     units = Units(asked.time_unit, asked.sample_time, True, False, asked.inputs, 0)
     channels = {
@@ -108,8 +118,13 @@ def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
             "a chirp has one frequency at a time, so that it cannot separate effects of several inputs",
             hint="use a multisine for several inputs, or one chirp after the other",
         )
-    if asked.kind == "chirp":
-        _check_turns(asked, samples)
+    turn = math.ceil(4.0 * math.pi / sum(_band(asked)))
+    if asked.kind == "chirp" and samples < turn:
+        raise bad_spec(
+            "bad-period",
+            f"over {samples} samples the chirp makes less than one turn, so that it does not excite its band",
+            hint=f"write --samples {turn} or more, a wider band or a longer --sample-time",
+        )
     if asked.kind == "steps" and asked.number is not None and asked.number > samples:
         raise bad_spec(
             "too-large",
@@ -123,35 +138,6 @@ def _check_kind(asked: ReadyMade, samples: int, whole: int) -> None:
             f"{samples} samples do not make {asked.periods} equal periods{each}",
             hint=f"write --samples {max(samples // whole, 3) * whole}",
         )
-
-
-def _check_apart(u: Array, asked: ReadyMade) -> None:
-    """Raise `SpecError` (`bad-period`) where some input (N, r) is a combination of the others."""
-    if asked.inputs == 1:
-        return
-    moved = u - u.mean(axis=0)
-    rank = int(np.linalg.matrix_rank(moved.T @ moved, hermitian=True))
-    if rank == asked.inputs:
-        return
-    longer = f"--prbs {(asked.inputs + 1).bit_length()} or more" if asked.kind == "prbs" else "more levels"
-    raise bad_spec(
-        "bad-period",
-        f"of {asked.inputs} inputs over {len(u)} samples, {asked.inputs - rank} follow from the others, "
-        "so that their effects could not be separated",
-        hint=f"write {longer}, and --samples enough for them",
-    )
-
-
-def _check_turns(asked: ReadyMade, samples: int) -> None:
-    """Raise `SpecError` (`bad-period`) where a chirp would not turn once, and so not cover its range."""
-    turn = math.ceil(4.0 * math.pi / sum(_band(asked)))
-    if samples >= turn:
-        return
-    raise bad_spec(
-        "bad-period",
-        f"over {samples} samples the chirp makes less than one turn, so that it does not excite its band",
-        hint=f"write --samples {turn} or more, a wider band or a longer --sample-time",
-    )
 
 
 def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> None:

@@ -17,7 +17,7 @@ from inputdesign_cli.figures.plots import painter
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.outcome.curves import BoundCurves, Curves
-from inputdesign_cli.outcome.curves_file import read_curves
+from inputdesign_cli.outcome.run_directory import read_curves
 from inputdesign_cli.outcome.sentences import sentences, spoken
 
 if TYPE_CHECKING:

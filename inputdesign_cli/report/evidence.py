@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,8 +62,9 @@ def simulation_table(found: Simulation | None) -> Rows | None:
     """Return one row for each input that was tried; None without a simulation."""
     if found is None:
         return None
-    cells = {name: [cell(entry) for entry in found.inputs.values()] for name, cell in _COLUMNS.items()}
-    filled = {name: column for name, column in cells.items() if any(column)}
+    cells = [_cells(entry) for entry in found.inputs.values()]
+    columns = {name: [row[name] for row in cells] for name in (cells[0] if cells else ())}
+    filled = {name: column for name, column in columns.items() if any(column)}
     if not filled:
         return None
     each = zip(map(spoken, found.inputs), *filled.values(), strict=True)
@@ -87,29 +87,6 @@ def _within(one: TriedInput, *, several: bool) -> str:
     return _share(one.within_r_adm, one.within_r_adm_limits) if own else ""
 
 
-def _on_design_model(one: TriedInput) -> str:
-    found = one.on_design_model
-    return "" if found is None else _share(found.within_r_adm, found.within_r_adm_limits)
-
-
-def _mean_squared_error(one: TriedInput) -> str:
-    return "" if one.mse is None else _SPREAD.format(one.mse, one.mse_standard_error or 0.0)
-
-
-def _mean_estimate(one: TriedInput) -> str:
-    found = one.mean_estimate
-    known = one.mse is not None and isinstance(found, np.ndarray)
-    return " ".join(f"{value:.4g}" for value in found) if known and found is not None else ""
-
-
-def _deviations(one: TriedInput) -> str:
-    if one.deviation_ratio is None or one.chance is None:
-        return ""
-    low, high = one.chance
-    found = one.deviation_ratio
-    return f"{found.least:.4g} to {found.largest:.4g}{BREAK}chance {low:.3g} to {high:.3g}"
-
-
 def _mean_and_tail(found: Spread | None) -> str:
     return "" if found is None else f"{found.mean:.3g}{BREAK}95 % below {found.quantile_95:.3g}"
 
@@ -118,37 +95,42 @@ def _spread(found: LossMoments | None) -> str:
     return "" if found is None else _SPREAD.format(found.mean, found.sd)
 
 
-def _theory(one: TriedInput) -> str:
-    if one.theory is None:
-        return ""
-    return _spread(one.theory.loss) if isinstance(one.theory, TheoreticalLoss) else shown(one.theory.mse)
-
-
-def _endings(one: TriedInput) -> str:
+def _cells(one: TriedInput) -> dict[str, str]:
+    """Return what the runs with an input gave, as text by column; empty where it is not known."""
+    model, found, theory = one.on_design_model, one.mean_estimate, one.theory
+    known = one.mse is not None and isinstance(found, np.ndarray)
+    deviations = ""
+    if one.deviation_ratio is not None and one.chance is not None:
+        low, high = one.chance
+        ratio = one.deviation_ratio
+        deviations = f"{ratio.least:.4g} to {ratio.largest:.4g}{BREAK}chance {low:.3g} to {high:.3g}"
+    predicted = ""
+    if theory is not None:
+        predicted = _spread(theory.loss) if isinstance(theory, TheoreticalLoss) else shown(theory.mse)
     ways = {"stopped": one.stopped, "missed": one.missed, "undecided": one.undecided}
-    return ", ".join(f"{n} {way}" for way, n in (ways | {"unplanned": one.unplanned}).items() if n)
-
-
-_COLUMNS: dict[str, Callable[[TriedInput], str]] = {
-    "loss": lambda one: _spread(one.loss),
-    "mean squared error": _mean_squared_error,
-    "theory": _theory,
-    "mean estimate": _mean_estimate,
-    "deviations over theory": _deviations,
-    "worst over admitted": lambda one: "" if one.worst_ratio is None else shown(one.worst_ratio),
-    "within r_adm": lambda one: _within(one, several=False),
-    "errors within r_adm of the plant of the spec": lambda one: _within(one, several=True),
-    "were the design model true": _on_design_model,
-    "within r_u": lambda one: _share(one.within_r_u, one.within_r_u_limits),
-    "cost": lambda one: "" if one.cost is None else f"{one.cost:.5g}",
-    "errors within r_adm of the true plant": lambda one: _share(
-        one.within_r_adm_true, one.within_r_adm_true_limits
-    ),
-    "over the spectrum that knows the plant": lambda one: _mean_and_tail(one.cost_over_oracle),
-    "over the record of that": lambda one: _mean_and_tail(one.cost_over_oracle_record),
-    "true ratio": lambda one: _mean_and_tail(one.true_ratio),
-    "samples": lambda one: "" if one.samples is None else f"{one.samples.mean:.0f}",
-    "ended": _endings,
-    "unstable loops": lambda one: str(one.unstable or ""),
-    "not settled": lambda one: str(one.not_converged or ""),
-}
+    ended = (f"{n} {way}" for way, n in (ways | {"unplanned": one.unplanned}).items() if n)
+    return {
+        "loss": _spread(one.loss),
+        "mean squared error": ""
+        if one.mse is None
+        else _SPREAD.format(one.mse, one.mse_standard_error or 0.0),
+        "theory": predicted,
+        "mean estimate": " ".join(f"{value:.4g}" for value in found) if known and found is not None else "",
+        "deviations over theory": deviations,
+        "worst over admitted": "" if one.worst_ratio is None else shown(one.worst_ratio),
+        "within r_adm": _within(one, several=False),
+        "errors within r_adm of the plant of the spec": _within(one, several=True),
+        "were the design model true": ""
+        if model is None
+        else _share(model.within_r_adm, model.within_r_adm_limits),
+        "within r_u": _share(one.within_r_u, one.within_r_u_limits),
+        "cost": "" if one.cost is None else f"{one.cost:.5g}",
+        "errors within r_adm of the true plant": _share(one.within_r_adm_true, one.within_r_adm_true_limits),
+        "over the spectrum that knows the plant": _mean_and_tail(one.cost_over_oracle),
+        "over the record of that": _mean_and_tail(one.cost_over_oracle_record),
+        "true ratio": _mean_and_tail(one.true_ratio),
+        "samples": "" if one.samples is None else f"{one.samples.mean:.0f}",
+        "ended": ", ".join(ended),
+        "unstable loops": str(one.unstable or ""),
+        "not settled": str(one.not_converged or ""),
+    }

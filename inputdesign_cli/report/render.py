@@ -20,8 +20,6 @@ from inputdesign_cli.version import __version__
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-_GENERATOR = b'<meta name="generator" content="idesign '
-
 
 def report_text(directory: Path) -> str:
     """Return the page about a run directory or about the directory of a sweep.
@@ -57,14 +55,6 @@ def _is_sweep(directory: Path) -> bool:
     message = f"{directory} holds neither a finished run nor a sweep"
     hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
     raise DataError.because("run-missing", message, hint=hint)
-
-
-def is_page(file: Path) -> bool:
-    """Return whether a file is a page that was made here."""
-    try:
-        return _GENERATOR in read_regular(file)[:1000]
-    except OSError:
-        return False
 
 
 def _filled(

@@ -13,16 +13,7 @@ from inputdesign_cli.outcome.sentences import shown
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, run_charts
 from inputdesign_cli.report.evidence import estimate_table, requirement_table, simulation_table
-from inputdesign_cli.report.facts import (
-    Fact,
-    answer,
-    assumptions,
-    campaign_facts,
-    estimate_facts,
-    facts,
-    proofs,
-    provenance,
-)
+from inputdesign_cli.report.facts import Fact, answer, facts, provenance, said
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
 
@@ -61,23 +52,23 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
     made_from, environment = (outcome.provenance.get(name) for name in ("made_from", "environment"))
     sources = [Path(str(name)).name for name in made_from] if isinstance(made_from, list) else []
     return {
-        **_figures(charts, [f"{text[0].upper()}{text[1:]}." for text in proofs(outcome)]),
+        **_figures(charts, [f"{text[0].upper()}{text[1:]}." for text in said("proofs", outcome)]),
         "title": question.title or run.resolve().name,
         "question": question.sentences,
         "answer": answer(verb, outcome),
         "notes": outcome.notes or (),
         "estimate": estimate_table(outcome),
-        "estimate_facts": estimate_facts(outcome),
+        "estimate_facts": facts(outcome, part="estimate"),
         "verdicts": requirement_table(outcome, question.time_unit),
         "facts": [
             Fact("status", top_up or outcome.status or ""),
-            *campaign_facts(outcome),
+            *facts(outcome, part="campaign_stands"),
             *facts(outcome, question.time_unit),
             Fact("units", question.units),
         ],
         "simulation": simulation_table(outcome.simulation),
         "simulated_runs": None if outcome.simulation is None else outcome.simulation.runs,
-        "assumptions": assumptions(outcome, question),
+        "assumptions": said("assumptions", outcome, question=question),
         "command": _command(verb, outcome, sources),
         "explored": outcome.exploration is not None,
         "campaign": verb == "campaign",

@@ -20,7 +20,7 @@ from inputdesign_cli.report.charts import Chart, chart
 from inputdesign_cli.report.facts import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
-from inputdesign_cli.sweeps.layout import checked_run
+from inputdesign_cli.sweeps.points import checked_run
 
 MOST_ROWS = 200
 _SHOWN = (
@@ -45,18 +45,30 @@ def sweep_page(root: Path) -> dict[str, object]:
     names = [*table.axes, *(name for name, _ in columns)]
     rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]
     question, first = _first_run(table, root)
+
+    def listed(texts: Sequence[str]) -> str:
+        few = len(texts) <= 12
+        return ", ".join(texts) if few else f"{', '.join(texts[:3])}, ... {texts[-1]} ({len(texts)} values)"
+
     cited = citations(question, first) if question else []
     return {
         "title": summary.title or root.resolve().name,
         "question": question.sentences if question else (),
         "zipped": summary.zip,
-        "axes": [(axis.key, _values(axis.values), "") for axis in summary.axes],
+        "axes": [(axis.key, listed(axis.values), "") for axis in summary.axes],
         "answer": _answer(table),
         "charts": list(_charts(table)),
         "header": [*table.axes, *(title for _, title in columns)],
         "rows": rows,
         "left_out": table.rows - len(rows),
-        "failures": _failures(table),
+        "failures": [
+            (
+                ", ".join(f"{key} = {table.columns[key][i]}" for key in table.axes),
+                table.columns["code"][i],
+                table.columns["reason"][i],
+            )
+            for i in [i for i, code in enumerate(table.columns["code"]) if code][:MOST_ROWS]
+        ],
         "verb": summary.verb,
         "spec": read_regular(root / "sweep.yaml").decode(),
         "provenance": provenance(summary.environment or {}),
@@ -130,20 +142,6 @@ def _charts(table: SweepTable) -> list[Chart]:
         "moments": "The second moments of the regressors over the key.",
     }
     return [chart(paint, captions[name]) for name, paint in sweep_figures(table)]
-
-
-def _failures(table: SweepTable) -> list[tuple[str, str, str]]:
-    found = [i for i, code in enumerate(table.columns["code"]) if code][:MOST_ROWS]
-    points = [", ".join(f"{key} = {table.columns[key][i]}" for key in table.axes) for i in found]
-    return [
-        (p, table.columns["code"][i], table.columns["reason"][i]) for p, i in zip(points, found, strict=True)
-    ]
-
-
-def _values(texts: Sequence[str]) -> str:
-    if len(texts) <= 12:
-        return ", ".join(texts)
-    return f"{', '.join(texts[:3])}, ... {texts[-1]} ({len(texts)} values)"
 
 
 def _cell(text: str) -> str:

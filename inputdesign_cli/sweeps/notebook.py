@@ -12,8 +12,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.sweep_table import read_sweep
 from inputdesign_cli.questions import Verb
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.sweeps.grid import Settings
-from inputdesign_cli.sweeps.plan import build_plan
+from inputdesign_cli.sweeps.plan import Settings, build_plan
 from inputdesign_cli.sweeps.running import SweepRun
 
 if TYPE_CHECKING:

@@ -1,29 +1,178 @@
-"""The plan of a sweep: a draft, a grid, a verb, and the key by which each point is known for good."""
+"""The plan of a sweep: a grid of settings, a verb, and the key by which each point is known for good."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
-from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError, bad_spec
+from inputdesign_cli.errors import STANDARD_STREAM, Location, OutputError, SpecError, bad_spec
 from inputdesign_cli.outcome.origin import digest
 from inputdesign_cli.outcome.record import environment
 from inputdesign_cli.questions import Verb
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification import SpecTemplate, read_template
-from inputdesign_cli.specification.yaml.plain import to_yaml
-from inputdesign_cli.sweeps.grid import Grid, Settings, build_grid, parse_settings
-from inputdesign_cli.sweeps.layout import SUMMARY
-from inputdesign_cli.sweeps.point import PointJob
+from inputdesign_cli.specification import SpecTemplate, Sweep, read_template
+from inputdesign_cli.specification.models.sweep import range_values
+from inputdesign_cli.specification.yaml.plain import plain, to_yaml
+from inputdesign_cli.specification.yaml.reader import read
+from inputdesign_cli.specification.yaml.scalars import resolve
+from inputdesign_cli.sweeps.points import SUMMARY, PointJob
 from inputdesign_cli.version import __version__
 
+Settings = Sequence[str] | Mapping[str, object]
+"""What is varied: texts as `--set` takes them, or keys and their values."""
+MOST_POINTS = 1_000_000
 _KEY_LENGTH = 24
 _TRIED = 50
+_WORD = re.compile(r"[A-Za-z_][\w.-]*")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Holds a key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
+
+    key: str
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Generates the points as tuples of texts, one per axis, when asked for. The last axis runs fastest."""
+
+    axes: tuple[Axis, ...]
+    zipped: bool = False
+
+    def __len__(self) -> int:
+        lengths = [len(axis.texts) for axis in self.axes]
+        return (min(lengths) if self.zipped else math.prod(lengths)) if lengths else 0
+
+    def __getitem__(self, index: int) -> tuple[str, ...]:
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        if self.zipped:
+            return tuple(axis.texts[index] for axis in self.axes)
+        texts = []
+        for axis in reversed(self.axes):
+            index, place = divmod(index, len(axis.texts))
+            texts.append(axis.texts[place])
+        return tuple(reversed(texts))
+
+    def __iter__(self) -> Iterator[tuple[str, ...]]:
+        return (self[i] for i in range(len(self)))
+
+    def overrides(self, point: tuple[str, ...]) -> list[str]:
+        """Return the point as `--set` takes it."""
+        return [f"{axis.key}={text}" for axis, text in zip(self.axes, point, strict=True)]
+
+    def block(self) -> dict[str, object]:
+        """Return the grid as the `sweep` block of a spec."""
+        values = {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
+        return {"set": values, "zip": True} if self.zipped else {"set": values}
+
+
+def parse_settings(settings: Settings) -> tuple[list[str], list[Axis]]:
+    """Read `KEY=V1,V2,..` and `KEY=LOW:HIGH:STEP` as axes; `KEY=VALUE` stays an override of every point.
+
+    Commas inside brackets, braces and quotes belong to a value. A mapping of keys to values takes the place
+    of the spec's `sweep` block.
+
+    Raises:
+        SpecError: `bad-range`, `bad-override`, `sweep-twice`.
+    """
+    if isinstance(settings, Mapping):
+        return [f"sweep={json.dumps({'set': plain(settings)})}"], []
+    fixed: list[str] = []
+    axes: dict[str, Axis] = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        parts = _split(text)
+        try:
+            texts = range_values(text) or parts
+        except SpecError as error:
+            (found,) = error.diagnostics
+            place = Location(f"--set {setting}", 1, len(key) + 2, setting)
+            raise SpecError(replace(found, location=place)) from None
+        key = key.strip()
+        if not equals or len(texts) < 2:
+            fixed.append(setting)
+        elif "" in texts:
+            message = f"a value of --set {setting} is empty"
+            raise bad_spec("bad-override", message, hint="remove the extra comma")
+        elif key in axes:
+            hint = "give all its values at once: key=v1,v2,v3"
+            raise bad_spec("sweep-twice", f"{key} is swept by two settings", hint=hint, key=key)
+        else:
+            axes[key] = Axis(key, tuple(texts))
+    return fixed, list(axes.values())
+
+
+def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Grid:
+    """Return the grid of the spec's `sweep` block; axes of the command line replace or join them.
+
+    Raises:
+        SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`.
+    """
+    merged: dict[str, Axis] = {}
+    if block is not None:
+        for key, values in block.set.items():
+            merged[key] = Axis(key, tuple(_text(value) for value in values))
+    for axis in axes:
+        merged[axis.key] = axis
+    grid = Grid(tuple(merged.values()), zipped or (block is not None and block.zip))
+    if not merged:
+        message = "nothing is varied: no key has several values"
+        hint = "write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5"
+        raise bad_spec("sweep-empty", message, hint=hint)
+    lengths = {axis.key: len(axis.texts) for axis in grid.axes}
+    if grid.zipped and len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{key} has {n}" for key, n in lengths.items())
+        message = f"values that are taken side by side must be equally many ({listed})"
+        hint = "give each key as many values, or leave out --zip for every combination"
+        raise bad_spec("sweep-lengths", message, hint=hint)
+    if len(grid) > MOST_POINTS:
+        message = f"the sweep has {len(grid)} points, and at most {MOST_POINTS} are run"
+        hint = "vary fewer keys at once, or --zip them"
+        raise bad_spec("sweep-too-large", message, hint=hint)
+    return grid
+
+
+def _split(text: str) -> tuple[str, ...]:
+    """Return the parts between the commas that stand outside brackets and quotes."""
+    parts, start, depth, quote = [], 0, 0, ""
+    for i, character in enumerate(text):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'" and not text[start:i].strip():
+            quote = character
+        elif character in "[{":
+            depth += 1
+        elif character in "]}":
+            depth -= 1
+        elif character == "," and depth == 0:
+            parts.append(text[start:i].strip())
+            start = i + 1
+    return (*parts, text[start:].strip())
+
+
+def _text(value: object) -> str:
+    """Return a value of the `sweep` block as the text that `--set` takes."""
+    if isinstance(value, str) and _WORD.fullmatch(value) and resolve(value) == value:
+        return value
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _data(text: str) -> object:
+    """Return the value of a text for `--set`; a text that cannot be read stays one."""
+    try:
+        return read(text, "--set").data
+    except SpecError:
+        return text
 
 
 @dataclass(frozen=True)
@@ -67,29 +216,8 @@ class Plan:
         except SpecError:
             return None
 
-    def check(self) -> None:
-        """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
-
-        Raises:
-            SpecError: the error of the first point, if no point that is tried can be read.
-        """
-        first: SpecError | None = None
-        for index in dict.fromkeys(i * (len(self.grid) - 1) // _TRIED for i in range(_TRIED + 1)):
-            try:
-                self.draft.spec(self.grid.overrides(self.grid[index]))
-            except SpecError as error:
-                first = first or error
-            else:
-                return
-        if first is not None:
-            raise first
-
-    def data(self) -> dict[str, object]:
-        """Return the spec with the grid as its `sweep` block: it repeats the sweep without any settings."""
-        return {**self._base, "sweep": self.grid.block()}
-
     @property
-    def _base(self) -> dict[str, object]:
+    def base(self) -> dict[str, object]:
         """Return the content of the spec without its parts about a sweep."""
         return {key: value for key, value in self.draft.data.items() if key != "sweep"}
 
@@ -106,7 +234,7 @@ class Plan:
             "title": str(self.draft.data.get("title", "")),
             "verb": self.verb,
             "made_from": list(made_from),
-            "asked_sha256": digest(to_yaml(self._base)),
+            "asked_sha256": digest(to_yaml(self.base)),
             "axes": [{"key": axis.key, "values": list(axis.texts)} for axis in self.grid.axes],
             "zip": self.grid.zipped,
             "points": len(self.grid),
@@ -134,7 +262,7 @@ class Plan:
             what = f"the command {verb}, not {self.verb}"
         elif set(keys) != set(ours):
             what = f"{', '.join(map(str, keys))}, not {', '.join(ours)}"
-        elif not same_file and asked != digest(to_yaml(self._base)):
+        elif not same_file and asked != digest(to_yaml(self.base)):
             what = "another spec" + (f" ({theirs[0]} as seen from there)" if theirs else "")
         else:
             return
@@ -170,6 +298,14 @@ def build_plan(
     fixed, axes = parse_settings(settings)
     draft = read_template(spec, fixed, confine=confine, text=text)
     source = Path(STANDARD_STREAM) if text is not None else spec
-    plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb, source)
-    plan.check()
-    return plan
+    grid, first = build_grid(draft.sweep(), axes, zipped=zipped), None
+    # What is wrong as a whole (a misspelt key) is refused, rather than fail in every point.
+    for index in dict.fromkeys(i * (len(grid) - 1) // _TRIED for i in range(_TRIED + 1)):
+        try:
+            draft.spec(grid.overrides(grid[index]))
+        except SpecError as error:
+            first = first or error
+        else:
+            return Plan(draft, grid, verb, source)
+    assert first is not None  # a grid has points
+    raise first

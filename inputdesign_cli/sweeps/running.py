@@ -1,14 +1,14 @@
-"""Batch sweeps: every point once, whatever happens on the way."""
+"""Batch sweeps: every point once, whatever happens on the way, and sweep.csv with one row a point."""
 
 from __future__ import annotations
 
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, OutputError
@@ -16,20 +16,90 @@ from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.origin import Origin
 from inputdesign_cli.outcome.record import PAGE, is_page
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
+from inputdesign_cli.outcome.text_formats import csv_line, shortest
 from inputdesign_cli.specification.yaml.plain import to_yaml
-from inputdesign_cli.sweeps.layout import SPEC, SUMMARY, TABLE, Layout, opened
+from inputdesign_cli.sweeps import points
 from inputdesign_cli.sweeps.plan import Plan
-from inputdesign_cli.sweeps.point import (
-    BROKEN,
-    FAILURES,
-    KINDS,
-    LOST,
-    PointEnd,
-    PointJob,
-    failure_of,
-    run_point,
+from inputdesign_cli.sweeps.points import Layout, PointEnd, PointJob, failure_of
+
+PENDING = "pending"
+MOST_ENTRIES = 4
+"""Lists and matrices up to this size are written out, one column an entry."""
+
+# These come first and in this order; what else a result has follows in its own order.
+FIRST = (
+    "objective.kind",
+    "objective.value",
+    "objective.lower_bound",
+    "objective.upper_bound",
+    "objective.relative_gap",
+    "objective.any_spectrum_bound",
+    "cost",
+    "samples",
 )
-from inputdesign_cli.sweeps.table import PENDING, Row, table_lines
+LAST = ("time_s", "code", "reason", "run")
+# Settings, provenance, and what is long: not what one compares from point to point.
+_LEFT_OUT = frozenset(
+    {
+        "format", "title", "status", "information", "spectrum", "solver", "environment", "timing_s",
+        "spec_sha256", "files", "code", "message", "hint", "key", "active_frequencies", "certificate",
+    }
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Row:
+    """Holds the row of a point in the table: `numbers` of its result by their paths, or why it has none."""
+
+    status: str = PENDING
+    numbers: Mapping[str, object] = field(default_factory=dict)
+    seconds: object = None
+    code: str = ""
+    reason: str = ""
+    run: str = ""
+
+    @classmethod
+    def of(cls, key: str, content: Mapping[str, Any] | None) -> Row:
+        """Return the row of a point from its result, its failure (which has a `code`), or neither."""
+        if content is None:
+            return cls()
+        status, seconds = content.get("status", "done"), content.get("timing_s", {}).get("point")
+        if "code" in content:
+            return cls(status, {}, seconds, content["code"], content["message"])
+        return cls(status, scalars(content), seconds, run=f"points/{key}")
+
+
+def table_lines(axes: Sequence[str], rows: Sequence[tuple[Sequence[str], Row]]) -> Iterator[str]:
+    """Return the lines of the table.
+
+    Args:
+        axes: the keys that are varied.
+        rows: each point, as the texts of its values, with its row.
+    """
+    found = dict.fromkeys(name for _, row in rows for name in row.numbers)
+    names = [*(n for n in FIRST if n in found), *(n for n in found if n not in FIRST)]
+    yield csv_line([*axes, "status", *names, *LAST])
+    for point, row in rows:
+        values = (*(row.numbers.get(name) for name in names), row.seconds)
+        cells = (shortest(v) if isinstance(v, float) else "" if v is None else str(v) for v in values)
+        yield csv_line([*point, row.status, *cells, row.code, row.reason, row.run])
+
+
+def scalars(value: object, path: str = "") -> dict[str, object]:
+    """Return every number, text and truth value of a result by its path (`power.input[0]`)."""
+    found: dict[str, object] = {}
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            if key not in _LEFT_OUT:
+                found |= scalars(item, f"{path}.{key}" if path else key)
+    elif isinstance(value, list):
+        if len(value) <= MOST_ENTRIES:
+            for i, item in enumerate(value):
+                found |= scalars(item, f"{path}[{i}]")
+    elif value is not None:
+        found[path] = value
+    return found
+
 
 DAMAGED = "damaged"
 """Of a listed point: what is there of it does not hold, so that it is computed again."""
@@ -103,7 +173,7 @@ class SweepRun:
     @property
     def failures(self) -> int:
         """Return the number of points that were tried and have no result."""
-        return sum(n for status, n in self.statuses.items() if status in FAILURES)
+        return sum(n for status, n in self.statuses.items() if status in points.FAILURES)
 
     def run(self) -> Self:
         """Compute the points without a result, write the table, and return the sweep.
@@ -113,37 +183,37 @@ class SweepRun:
             IdesignError: the first failure, with `fail_fast`.
         """
         plan, directory = self.plan, self.directory
-        with opened(directory) as self.layout:
+        with points.opened(directory) as self.layout:
             made_from = Origin([plan.source]).seen_from(Path(os.path.realpath(directory)))
             if not self.overwrite:
                 plan.check_place(made_from, directory)
             if is_page(directory / PAGE):  # it is about what the sweep was before
                 (directory / PAGE).unlink()
-            replace_text(directory / SUMMARY, json_text(plan.summary(made_from, {})))
-            replace_text(directory / SPEC, to_yaml(plan.data()))
+            replace_text(directory / points.SUMMARY, json_text(plan.summary(made_from, {})))
+            replace_text(directory / points.SPEC, to_yaml({**plan.base, "sweep": plan.grid.block()}))
             try:
                 self._compute()
             finally:
                 self._write_table()
-                replace_text(directory / SUMMARY, json_text(plan.summary(made_from, self.statuses)))
+                replace_text(directory / points.SUMMARY, json_text(plan.summary(made_from, self.statuses)))
             if self.fail_fast and self.first_failure:
                 raise self.first_failure
             from inputdesign_cli.figures.sweep import draw_sweep
             from inputdesign_cli.figures.sweep_table import read_sweep
 
-            self.files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
+            self.files = [directory / name for name in (points.TABLE, points.SUMMARY, points.SPEC)]
             self.files += draw_sweep(read_sweep(directory), directory, self.figure_format)
             return self
 
     def _compute(self) -> None:
         """Compute the points without a result."""
-        points = self.directory / "points"
-        with output_errors(points):
-            points.mkdir(exist_ok=True)
+        folder = self.directory / "points"
+        with output_errors(folder):
+            folder.mkdir(exist_ok=True)
         due = time.monotonic() + _FIRST
         finished: Finished[PointJob, PointEnd]
         executor = self.executor or InProcess()
-        for finished in executor.run(run_point, self._jobs(executor.shares_files)):
+        for finished in executor.run(points.run_point, self._jobs(executor.shares_files)):
             self._take(finished)
             if self.fail_fast and self.failed:
                 return
@@ -156,7 +226,7 @@ class SweepRun:
         """Write sweep.csv as things stand, and count the points by status."""
         grid = self.plan.grid
         rows = [(point, self._row(self.plan.key(index))) for index, point in enumerate(grid)]
-        replace_text(self.directory / TABLE, table_lines([axis.key for axis in grid.axes], rows))
+        replace_text(self.directory / points.TABLE, table_lines([axis.key for axis in grid.axes], rows))
         self.statuses = dict(sorted(Counter(row.status for _, row in rows).items()))
 
     def _row(self, key: str) -> Row:
@@ -200,21 +270,22 @@ class SweepRun:
             raise error
         lost = isinstance(error, WorkerLostError)
         if end is None:
-            code, status = ("worker-lost", LOST) if lost else ("internal-error", BROKEN)
-            end = PointEnd(failure_of(status, Diagnostic(code, str(error))))
-        if end.files is not None:
+            code, status = ("worker-lost", points.LOST) if lost else ("internal-error", points.BROKEN)
+            end = failure_of(status, Diagnostic(code, str(error))), None
+        failure, files = end
+        if files is not None:
             try:
-                self.layout.adopt(job.key, end.files)
+                self.layout.adopt(job.key, files)
             except DataError as strange:
-                end = PointEnd(failure_of(BROKEN, strange.diagnostics[0]))
-        if end.failure is None:
+                failure = failure_of(points.BROKEN, strange.diagnostics[0])
+        if failure is None:
             self.layout.failure(job.key).unlink(missing_ok=True)
             self.rows[job.key] = Row.of(job.key, self.layout.read(job.key))
         else:
             if not lost:  # or else it is not the fault of the point: the next call tries it again
-                self.layout.write_failure(job.key, end.failure)
-            self.rows[job.key] = Row.of(job.key, end.failure)
-            self._note_failure(job.index, end.failure)
+                self.layout.write_failure(job.key, failure)
+            self.rows[job.key] = Row.of(job.key, failure)
+            self._note_failure(job.index, failure)
         self._report()
 
     def _note_failure(self, index: int, content: Mapping[str, object]) -> None:
@@ -225,7 +296,7 @@ class SweepRun:
                 str(content[name]) for name in ("code", "status", "message", "hint", "key")
             )
             diagnostic = Diagnostic(code, f"{message} (at {point})", hint, key)
-            self.first_failure = KINDS.get(status, IdesignError)(diagnostic)
+            self.first_failure = points.KINDS.get(status, IdesignError)(diagnostic)
 
     def _report(self) -> None:
         self.passed += 1

@@ -11,18 +11,11 @@ from inputdesign_cli.outcome.results import Result
 from inputdesign_cli.outcome.sentences import filled
 from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.wizard import questions as asking
 from inputdesign_cli.wizard.grammar import Phrase, short
 from inputdesign_cli.wizard.noise import noise_lines
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
-from inputdesign_cli.wizard.questions import (
-    QUESTIONS,
-    Question,
-    bad_answer,
-    chosen,
-    complete,
-    in_their_words,
-    known_from,
-)
+from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, in_their_words
 from inputdesign_cli.wizard.wishes import controller, input_range, limited, quantisation, wished
 
 _MOST, LEAST = 5000, 50  # samples
@@ -102,7 +95,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    said = complete(answers)
+    said = asking.complete(answers)
     span, there = input_range(said["range"]), Phrase(said["time"], "time").seconds()
     plant = plant or understand_plant(said["plant"], stem, folder)
     step, why = plant.sample_time, plant.why_sampling
@@ -132,7 +125,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "duration": there if nonparametric else duration,
         "there": there,
         "most": _MOST,
-        "made": chosen("signals", said["signals"], _TYPES),
+        "made": asking.chosen("signals", said["signals"], _TYPES),
         "converter": quantisation(said["converter"]),
     }
     against = (f"against the model of {plant.source}: {one}" for one in plant.against)
@@ -153,7 +146,12 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     if draft.spectrum is None:
         return draft
     tried: list[tuple[Draft, float, float, bool]] = []
-    for words, what in _spectra(draft.spec().experiment.samples):
+    most = max(draft.spec().experiment.samples // 2, 1)
+    lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
+    # Each in the words of a spec and of a comment.
+    spectra = [(f"{{type: fir, order: {n}}}", f"filtered noise of order {n}") for n in _ORDERS]
+    spectra += [(f"{{type: multisine, lines: {n}}}", f"{n} sinusoids") for n in lines]
+    for words, what in spectra:
         one = replace(draft, spectrum=words, why=what)
         with in_their_words(draft.said):
             result = solve(one.spec().with_(uncertainty=None, **{"signal.candidates": 1}))
@@ -172,16 +170,6 @@ def with_spectrum(draft: Draft, solve: Solve) -> Draft:
     return replace(best, why=comment)
 
 
-def _spectra(samples: int) -> list[tuple[str, str]]:
-    """Return the spectra to try, each in the words of a spec and of a comment."""
-    most = max(samples // 2, 1)
-    lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
-    return [
-        *((f"{{type: fir, order: {order}}}", f"filtered noise of order {order}") for order in _ORDERS),
-        *((f"{{type: multisine, lines: {number}}}", f"{number} sinusoids") for number in lines),
-    ]
-
-
 class Conversation:
     """Asks questions one by one: an answer that cannot be used is refused at once, and asked for again."""
 
@@ -194,7 +182,7 @@ class Conversation:
     @property
     def question(self) -> Question | None:
         """Return the next question; None if all are answered."""
-        there = {*self._answers, *known_from(self._answers)}
+        there = {*self._answers, *asking.known_from(self._answers)}
         return next((one for one in QUESTIONS if one.key not in there), None)
 
     def answer(self, text: str) -> IdesignError | None:
@@ -207,7 +195,13 @@ class Conversation:
         assert asked is not None
         self._answers[asked.key] = text
         try:
-            self._understand()
+            # The plant, which may be a log to be explored, is read once only.
+            if self._plant is None and self._answers["plant"].strip():
+                self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
+            draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)
+            if self.question is None:
+                draft.validate()
+                self.draft = draft
         except OutputError:
             raise  # no answer can help
         except IdesignError as error:
@@ -218,12 +212,3 @@ class Conversation:
                 self._plant = None
             return error
         return None
-
-    def _understand(self) -> None:
-        """Try the answers; read the plant, which may be a log to be explored, once only."""
-        if self._plant is None and self._answers["plant"].strip():
-            self._plant = understand_plant(self._answers["plant"].strip(), self._stem, self._folder)
-        draft = compose({**_MEANWHILE, **self._answers}, self._stem, self._folder, self._plant)
-        if self.question is None:
-            draft.validate()
-            self.draft = draft

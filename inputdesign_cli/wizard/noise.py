@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
 from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
@@ -66,7 +65,12 @@ def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: boo
     assert plant.kind != "regression"
     A = _per_output(plant.A if plant.kind == "polynomial" else (1.0,), plant.outputs)
     variance = noise.covariance(len(A))
-    powers = np.diag(variance) * (1.0 if moves else _gains(noise, A))
+    powers = np.diag(variance)
+    if not moves:  # relative to the white e of each output
+        impulse = np.eye(1, _LONG)[0]
+        rows = zip(_per_output(noise.C, len(A)), _per_output(noise.D, len(A)), A, strict=True)
+        gains = [np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows]
+        powers = powers * np.array(gains)
     if level is not None:
         shares = level.variance / powers
         scale = np.sqrt(np.maximum(shares, 1.0) if level.rounded else shares)
@@ -94,14 +98,6 @@ def _moves(noise: Noise) -> bool:
 def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
     """Return one polynomial for each output."""
     return rows if isinstance(rows[0], Sequence) else [rows] * outputs
-
-
-def _gains(noise: Noise, A: Sequence[Sequence[float]]) -> Array:
-    """Return the variance of each output's noise (p,), relative to that of its white e; none may drift."""
-    impulse = np.zeros(_LONG)
-    impulse[0] = 1.0
-    rows = zip(_per_output(noise.C, len(A)), _per_output(noise.D, len(A)), A, strict=True)
-    return np.array([np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows])
 
 
 def _drift(drift: Any) -> list[str]:

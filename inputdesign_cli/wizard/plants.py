@@ -16,7 +16,6 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec
@@ -171,7 +170,11 @@ def system_of(path: Path) -> PlantAnswer:
         hint = ': write its dead time ("delay": 5), however small, or the lag of its actuator into den'
         why = f"the system of {path.name} has no stable pole, which would show how fast it is to be sampled"
         raise bad_answer("plant", why + hint * integrates)
-    values, lines = _named(num, den, found.delay) if integrates else ({}, _as_given(num, den, found.delay))
+    delay = f", delay: {short(found.delay)}" if found.delay else ""
+    values: Mapping[str, float] = {}
+    lines = [f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}"]
+    if integrates:
+        values, lines = _named(num, den, found.delay)
     return PlantAnswer(
         (f"plant:  # from {path.name}", *lines, "  sample: zoh"),
         float(1.0 / decays.min()) if decays.size else found.delay,
@@ -185,11 +188,6 @@ def system_of(path: Path) -> PlantAnswer:
 def _refuse(faults: Mapping[str, bool]) -> None:
     if fault := next((text for text, holds in faults.items() if holds), None):
         raise bad_answer("plant", fault)
-
-
-def _as_given(num: Sequence[float], den: Sequence[float], late: float) -> list[str]:
-    delay = f", delay: {short(late)}" if late else ""
-    return [f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}"]
 
 
 def _named(num: Sequence[float], den: Sequence[float], late: float) -> tuple[dict[str, float], list[str]]:
@@ -216,7 +214,19 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
 
     found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
     t, u, y = found["time"], found["u"], found["y"]
-    begun, step, moves, answers = _step_in(path.name, t, u, y)
+    if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
+        raise bad_answer("plant", f"{path.name} needs {_LEAST_ROWS} rows at least, at times that grow")
+    moved, step = np.abs(u - u[0]), float(np.median(np.diff(t)))
+    begun, last = int(np.argmax(moved > 0.5 * np.max(moved))), slice(-max(t.size // 20, 1), None)
+    moves, answers = float(np.mean(u[last] - u[0])), float(np.mean(y[last]) - y[0])
+    strays = abs(moves) < 0.5 * np.max(moved)
+    _refuse(
+        {
+            f"the input in {path.name} does not step": not np.any(moved) or begun + 5 >= t.size,
+            f"the input in {path.name} does not stay where it has stepped to": bool(strays),
+            f"the output in {path.name} does not answer the step": not answers,
+        }
+    )
     rise = (y - y[0]) / answers
     late, slow = (max(float(t[int(np.argmax(rise > part))] - t[begun]), step) for part in (0.05, 0.632))
     start = f"gain: {answers / moves!r}, time_constant: {slow!r}, dead_time: {late!r}"
@@ -246,26 +256,10 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
     )
 
 
-def _step_in(name: str, t: Array, u: Array, y: Array) -> tuple[int, float, float, float]:
-    """Return the row of the step, seconds between rows, and how far input and output (n,) move in the end."""
-    if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
-        raise bad_answer("plant", f"{name} needs {_LEAST_ROWS} rows at least, at times that grow")
-    moved = np.abs(u - u[0])
-    begun, last = int(np.argmax(moved > 0.5 * np.max(moved))), slice(-max(t.size // 20, 1), None)
-    moves, answers = float(np.mean(u[last] - u[0])), float(np.mean(y[last]) - y[0])
-    _refuse(
-        {
-            f"the input in {name} does not step": not np.any(moved) or begun + 5 >= t.size,
-            f"the input in {name} does not stay where it has stepped to": abs(moves) < 0.5 * np.max(moved),
-            f"the output in {name} does not answer the step": not answers,
-        }
-    )
-    return begun, float(np.median(np.diff(t))), moves, answers
-
-
 def _explored(path: Path, stem: str) -> PlantAnswer:
     """Explore a log as `idesign explore` does; the model is a file next to the spec."""
     from inputdesign_cli import parse_spec, questions
+    from inputdesign_cli.questions.building.controllers import process_of
 
     found, name = questions.explore([path]), f"{stem}-model.yaml"
     if "model.yaml" not in found.results.files:
@@ -275,26 +269,20 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
     spec = parse_spec(text, name, design=False)
     assert spec.plant.kind != "regression"
     channels = max(spec.plant.inputs, spec.plant.outputs)
+    tunable = True
+    try:
+        process_of(spec)
+    except SpecError:
+        tunable = False
     return PlantAnswer(
         (f"include: [{name}]  # the plant, explored in {path.name}",),
         20.0 * spec.sample_time,
         files={name: _NOISE_BLOCK.sub("", text).encode()},  # that stands in the spec
         covariance=name if channels == 1 else None,
         sampling=spec.sample_time,
-        tunable=_is_process(spec),
+        tunable=tunable,
         channels=channels,
         explored=spec,
         source=path.name,
         against=found.against,
     )
-
-
-def _is_process(spec: Spec) -> bool:
-    """Return whether rules of tuning know the plant."""
-    from inputdesign_cli.questions.building.controllers import process_of
-
-    try:
-        process_of(spec)
-    except SpecError:
-        return False
-    return True

@@ -177,35 +177,27 @@ def in_their_words(said: Mapping[str, str], key: str = "") -> Iterator[None]:
 def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     if one.code == "bad-answer" and one.key in KEYS:
         return one
-    asked = question(_answer_to_blame(one, said) or key or "wish")
+    # In open loop the only controller is that of the wish, and none holds a plant that integrates.
+    held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
+    by_code: dict[str, str] = _FAULTS["codes"] | ({} if held else _FAULTS["open"])
+    found = (name for path, name in _FAULTS["sections"].items() if f"{one.key}.".startswith(f"{path}."))
+    blamed = by_code.get(one.code) or next(found, one.key if one.key in KEYS else "")
+    asked = question(blamed or key or "wish")
     begins = f"{asked.asks} ({asked.key}): "
     if one.message.startswith(begins):
         return one  # by a block inside
     place = one.location if one.location and not one.location.file.startswith("<") else None
-    hint = "; ".join(filter(None, (_remedy(one, asked.key), f"allowed: {asked.allowed}")))
+    remedy = _FAULTS["hints"].get(one.code, "")
+    if one.code == "admissible-not-positive":
+        remedy = _in_words(one.hint)
+    elif one.code == "too-few-lines":
+        enough = _LONG_ENOUGH.search(one.hint)
+        remedy = f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
+    elif one.code == "infinite-information" and asked.key != "loop":  # a controller holds it already
+        remedy = ""
+    hint = "; ".join(filter(None, (remedy, f"allowed: {asked.allowed}")))
     message = begins + _in_words(_FAULTS["messages"].get(one.code, one.message))
     return replace(one, message=message, hint=hint, key=asked.key, location=place)
-
-
-def _answer_to_blame(one: Diagnostic, said: Mapping[str, str]) -> str:
-    """Return the question whose answer an entry of the spec comes from; empty where that is not known."""
-    # In open loop the only controller is that of the wish, and none holds a plant that integrates.
-    held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
-    by_code: dict[str, str] = _FAULTS["codes"] | ({} if held else _FAULTS["open"])
-    if one.code in by_code:
-        return by_code[one.code]
-    found = (name for path, name in _FAULTS["sections"].items() if f"{one.key}.".startswith(f"{path}."))
-    return next(found, one.key if one.key in KEYS else "")
-
-
-def _remedy(one: Diagnostic, key: str) -> str:
-    if one.code == "admissible-not-positive":
-        return _in_words(one.hint)
-    if one.code == "too-few-lines":
-        enough = _LONG_ENOUGH.search(one.hint)
-        return f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
-    held = one.code == "infinite-information" and key != "loop"  # a controller holds it already
-    return "" if held else _FAULTS["hints"].get(one.code, "")
 
 
 def _in_words(text: str) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -39,6 +38,10 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     does = _length_that_does(spec, ratio * _scatter(result), solve)
     loop = next((item["loop"] for item in result.get("requirements", []) if "loop" in item), None)
     known = [*robust.get("floor", {}).get("worst", ()), robust.get("searched", {})]
+    # Plants that leave the controller no margin, even if they were known exactly.
+    fresh, lost = robust.get("fresh") or {}, len(robust.get("floor", {}).get("lost", ()))
+    without_margin = [f"{lost} of the {robust.get('scenarios')} other plants that were tried"] if lost else []
+    without_margin += [f"{fresh['lost']} of {fresh['draws']} more"] if fresh.get("lost") else []
     facts = {
         "taken": result["samples"] * spec.sample_time,
         "samples": result["samples"],
@@ -51,8 +54,8 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
         "moved": max(signal.get("input_peak", [allowed])),
         "binding": [words for name, words in _LIMITS.items() if shares.get(name, 0.0) >= _MOST_OF],
         "robust": robust,
-        "fresh": robust.get("fresh") or {},
-        "lost": _without_margin(robust),
+        "fresh": fresh,
+        "lost": without_margin or ["a plant within what you said"] * ("lost" in robust.get("searched", {})),
         "worst": max((one for one in known if "peak" in one), key=lambda one: one["peak"], default=None),
         "wished": None if kept is None or not loop else decibels(kept.peak),
         "sure": 100.0 * ((None if kept is None else kept.confidence) or DEFAULT_CONFIDENCE),
@@ -65,14 +68,6 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
 def _said(part: str, facts: Mapping[str, object]) -> list[str]:
     filters = {"lasting": lasting, "decibels": decibels}
     return sentences("inputdesign_cli.wizard", "verdict.txt", part, facts, filters)
-
-
-def _without_margin(robust: Mapping[str, Any]) -> list[str]:
-    """Return in words how many plants leave the controller no margin, even if they were known exactly."""
-    fresh, lost = robust.get("fresh") or {}, len(robust.get("floor", {}).get("lost", ()))
-    said = [f"{lost} of the {robust.get('scenarios')} other plants that were tried"] if lost else []
-    said += [f"{fresh['lost']} of {fresh['draws']} more"] if fresh.get("lost") else []
-    return said or ["a plant within what you said"] * ("lost" in robust.get("searched", {}))
 
 
 def _scatter(result: Result) -> float:

@@ -7,8 +7,8 @@ import pytest
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.curves import Curves
-from inputdesign_cli.outcome.curves_file import curves_json, read_curves
 from inputdesign_cli.outcome.record import FIGURES
+from inputdesign_cli.outcome.run_directory import curves_json, read_curves
 from tests.support.curves import CURVES
 
 

@@ -16,7 +16,7 @@ from inputdesign_cli.outcome.outcome import Outcome
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.questions.common.task import growth_by_start
 from inputdesign_cli.questions.least_cost.build import build_convex
-from inputdesign_cli.report.facts import verdict
+from inputdesign_cli.report.facts import said
 
 N = 500
 DOUBLE = """
@@ -110,7 +110,7 @@ def test_a_top_up_says_what_its_promise_rests_on(signal, words):
     missed = (RequirementMet(name="model_error", worst_ratio=3.0, frequency=None),)
     assessment = Assessment(verdict="missed", met=False, requirements=missed, left=0.99)
     outcome = Outcome(assessment=assessment, signal=Signal(samples=N, details=signal))
-    assert words in " ".join(verdict(outcome))
+    assert words in " ".join(said("verdict", outcome))
 
 
 @pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])

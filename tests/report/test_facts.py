@@ -4,7 +4,7 @@ import pytest
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.cli.summary import summary
-from inputdesign_cli.report.facts import facts, proofs
+from inputdesign_cli.report.facts import facts, said
 from tests.support.outcomes import typed
 
 ROBUST = {"source": "intervals", "scenarios": 31, "discarded": 0, "rejected": 0, "active": [], "r_adm": "own"}
@@ -34,7 +34,7 @@ def test_a_gap_that_only_rounding_decides_is_told_as_closed(gap, told):
         "objective": {"kind": "least_cost", "value": 2.0, "lower_bound": 2.0, "relative_gap": gap},
         "spectrum": {"type": "fir"},
     }
-    assert list(proofs(typed(result))) == [f"no FIR spectrum gets below 2, {told}"]
+    assert list(said("proofs", typed(result))) == [f"no FIR spectrum gets below 2, {told}"]
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,7 @@ import scipy.stats
 
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.figures.plots import draw_all
-from inputdesign_cli.outcome.curves_file import read_curves
-from inputdesign_cli.outcome.run_directory import write_run
+from inputdesign_cli.outcome.run_directory import read_curves, write_run
 from inputdesign_cli.report.render import report_text
 from tests.support.pages import LOOP, SPEC, XHTML, parse, rows, words
 

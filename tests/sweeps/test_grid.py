@@ -6,7 +6,7 @@ import pytest
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import Sweep, parse_spec
-from inputdesign_cli.sweeps.grid import Axis, Grid, build_grid, parse_settings
+from inputdesign_cli.sweeps.plan import Axis, Grid, build_grid, parse_settings
 
 
 def texts(*settings):

@@ -11,10 +11,9 @@ import pytest
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.figures.sweep_table import read_sweep
-from inputdesign_cli.sweeps.layout import Layout
 from inputdesign_cli.sweeps.plan import build_plan
-from inputdesign_cli.sweeps.running import list_points
-from inputdesign_cli.sweeps.table import Row, scalars, table_lines
+from inputdesign_cli.sweeps.points import Layout
+from inputdesign_cli.sweeps.running import Row, list_points, scalars, table_lines
 from tests.support.processes import running
 from tests.support.sweep_files import rows, run_sweep, timeless_files, timeless_rows
 
@@ -189,7 +188,7 @@ def test_other_peoples_directories_are_left_alone(spec, stub, tmp_path):
 HOLD = """
 import sys, time
 from pathlib import Path
-from inputdesign_cli.sweeps.layout import opened
+from inputdesign_cli.sweeps.points import opened
 with opened(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)

@@ -259,7 +259,8 @@ def response_of_data(
             listed["model_abs"] = np.abs(modelled)
             columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
             entry = None if units.single else (i, j)
-            panels.append(ResponsePanel(w, own, radius, modelled, entry, units.passage((i, j))))
+            named = units.passage((i, j))
+            panels.append(ResponsePanel(w, own, radius, modelled, entry=entry, names=named))
             apart, size = np.abs(own - modelled), np.maximum(np.abs(own), np.abs(modelled))
             outside.append(apart > radius)
             far.append(apart > radius + _FAR * size)

@@ -153,7 +153,7 @@ def deviation_curves(
         entry = None if units.single else (i, j)
         drawn, label = (None, "") if found is None else (of_entry[found[0]], found[1])
         shown = (w, size, admitted, of_entry["deviation"], drawn, label)
-        panels.append(DeviationPanel(*shown, entry, units.passage(entry)))
+        panels.append(DeviationPanel(*shown, entry=entry, names=units.passage(entry)))
     return columns, DeviationCurves(tuple(panels))
 
 

@@ -1,4 +1,4 @@
-"""The directory of a sweep, and its guarantees.
+"""The points of a sweep: each is computed once, and what it leaves stands in the directory of the sweep.
 
     sweep.yaml           the spec with its `sweep` block: `idesign sweep` on it repeats the sweep
     sweep.json           the grid of the sweep, and the status of its points
@@ -17,19 +17,33 @@ import contextlib
 import json
 import os
 import shutil
+import tempfile
+import threading
+import time
 import uuid
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.compute.interruptions import bare_interruptions
+from inputdesign_cli.errors import (
+    DataError,
+    Diagnostic,
+    IdesignError,
+    InaccurateError,
+    InfeasibleError,
+    OutputError,
+    SpecError,
+)
 from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.origin import digest
-from inputdesign_cli.outcome.record import RESULT, SPEC as RUN_SPEC, is_plain, unreadable
+from inputdesign_cli.outcome.record import RESULT, SPEC as RUN_SPEC, environment, is_plain, unreadable
 from inputdesign_cli.outcome.replacing import locked
 from inputdesign_cli.outcome.run_directory import output_errors, read_run, replace_text
+from inputdesign_cli.questions import Verb, run_verb
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.specification import SpecTemplate
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, OWNER, WORKER = ".lock", ".process", ".worker-"
@@ -124,14 +138,6 @@ class Layout:
                 (partial / name).write_bytes(content)
             partial.rename(target)
 
-    def clear(self) -> None:
-        """Remove half-written files of killed processes. Only the holder of the lock may."""
-        for path in (*self.root.glob(".*.partial*"), *self.root.glob("failures/.*.partial*")):
-            path.unlink(missing_ok=True)
-        for run in self.root.glob("points/*"):
-            if run.name.startswith(".") or not (run / RESULT).is_file():
-                shutil.rmtree(run, ignore_errors=True)
-
 
 @contextlib.contextmanager
 def opened(root: Path) -> Iterator[Layout]:
@@ -166,9 +172,13 @@ def opened(root: Path) -> Iterator[Layout]:
                 # Processes of a killed sweep hold it until they have noticed, which takes no time.
                 with locked(worker, _ENDLESS):
                     worker.unlink(missing_ok=True)
-            layout = Layout(root)
-            layout.clear()
-        yield layout
+            # What killed processes left half-written; only the holder of the lock may remove it.
+            for path in (*root.glob(".*.partial*"), *root.glob("failures/.*.partial*")):
+                path.unlink(missing_ok=True)
+            for run in root.glob("points/*"):
+                if run.name.startswith(".") or not (run / RESULT).is_file():
+                    shutil.rmtree(run, ignore_errors=True)
+        yield Layout(root)
 
 
 @contextlib.contextmanager
@@ -181,3 +191,98 @@ def at_work(root: Path) -> Iterator[None]:
         finally:
             with contextlib.suppress(OSError):
                 lock.unlink()
+
+
+KINDS: dict[str, type[IdesignError]] = {
+    "invalid": SpecError,
+    "infeasible": InfeasibleError,
+    "inaccurate": InaccurateError,
+}
+LOST, BROKEN = "lost", "error"
+FAILURES = frozenset({*KINDS, LOST, BROKEN})
+"""The statuses of points that were tried and have no result."""
+
+# So far below the temporary folder stand the data files, so that a name such as ../tables/r.csv stays in it.
+_DEPTH = ["data"] * 8
+
+_alone = threading.Lock()
+
+
+@dataclass(frozen=True)
+class PointJob:
+    """Holds all that a worker needs for a point."""
+
+    index: int
+    key: str
+    draft: SpecTemplate
+    overrides: tuple[str, ...]
+    verb: Verb
+    figures: str
+    root: Path | None  # the directory of the sweep; None on a machine that may not see it
+    files: dict[str, bytes] | None = None  # what the spec names, for such a machine
+
+
+PointEnd = tuple[Mapping[str, object] | None, Mapping[str, bytes] | None]
+"""The failure of a point, if it failed, and the files of its run where the directory is out of reach."""
+
+
+def run_point(job: PointJob) -> PointEnd:
+    """Compute a point and write its run into the directory of the sweep, or return the files of its run.
+
+    Raises:
+        OutputError: the files cannot be written, which is not the fault of the point.
+    """
+    if job.root is not None:
+        with at_work(job.root):
+            return _compute(job, Layout(job.root).run(job.key)), None
+    # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
+    with _alone, tempfile.TemporaryDirectory(prefix="idesign-") as folder:
+        run = Path(folder) / "run"
+        data = Path(folder).joinpath(*_DEPTH)
+        data.mkdir(parents=True)
+        for name, content in (job.files or {}).items():
+            path = Path(os.path.normpath(data / name))
+            if path.is_relative_to(folder):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+        failure = _compute(replace(job, draft=replace(job.draft, folder=data, confine=None)), run)
+        written = {} if failure else {path.name: path.read_bytes() for path in sorted(run.iterdir())}
+        return failure, written or None
+
+
+def _compute(job: PointJob, directory: Path) -> dict[str, object] | None:
+    """Compute a point and write its run; return its failure, if it fails."""
+    from inputdesign_cli.figures.plots import draw_all
+    from inputdesign_cli.outcome.run_directory import write_run
+
+    started = time.perf_counter()
+    try:
+        spec = job.draft.spec(job.overrides)
+        with bare_interruptions():
+            results = run_verb(job.verb, spec)
+        timing = {**(results.outcome.timing_s or {}), "point": time.perf_counter() - started}
+        results = replace(results, outcome=replace(results.outcome, timing_s=timing))
+        write_run(results, directory, draw_all(results, job.figures) if job.figures else {})
+    except OutputError:
+        raise
+    except IdesignError as error:
+        status = next((status for status, kind in KINDS.items() if kind.exit_code == error.exit_code), BROKEN)
+        return failure_of(status, error.diagnostics[0], time.perf_counter() - started)
+    except Exception as error:
+        diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
+        return failure_of(BROKEN, diagnostic, time.perf_counter() - started)
+    return None
+
+
+def failure_of(status: str, diagnostic: Diagnostic, seconds: float = 0.0) -> dict[str, object]:
+    """Return the content of the file about a point without a result."""
+    return {
+        "format": 1,
+        "status": status,
+        "code": diagnostic.code,
+        "message": diagnostic.message,
+        "hint": diagnostic.hint,
+        "key": diagnostic.key,
+        "timing_s": {"point": seconds},
+        "environment": environment(),
+    }
