@@ -115,16 +115,18 @@ SLOW = PolynomialModel(
 )
 
 
-def test_a_plant_that_remembers_longer_than_the_record_is_filtered_exactly():
-    """An almost integrating and a lightly damped entry, against the difference equations."""
-    u = np.random.default_rng(0).standard_normal((300, 2))
-    plant = FiniteRecord(Experiment(SLOW, 300), 300, 1.0)
+@pytest.mark.parametrize("model", [SLOW, arx()], ids=["slow", "arx"])
+def test_records_are_filtered_exactly(model):
+    """Signals and their adjoint against the difference equations, also where a plant remembers longer than
+    the record: an almost integrating and a lightly damped entry.
+    """
+    u, v = (np.random.default_rng(seed).standard_normal((300, 2)) for seed in (0, 1))
+    plant = FiniteRecord(Experiment(model, 300), 300, 1.0)
     wanted = np.zeros((300, 2))
     for i in range(2):
-        right = sum(scipy.signal.lfilter(SLOW.B[i][j], SLOW.F[i][j], u[:, j]) for j in range(2))
-        wanted[:, i] = scipy.signal.lfilter([1.0], SLOW.A[i], right)
+        right = sum(scipy.signal.lfilter(model.B[i][j], model.F[i][j], u[:, j]) for j in range(2))
+        wanted[:, i] = scipy.signal.lfilter([1.0], model.A[i], right)
     np.testing.assert_allclose(plant.signals("output", u), wanted, atol=1e-11 * np.abs(wanted).max())
-    v = np.random.default_rng(1).standard_normal((300, 2))
     assert np.sum(plant.adjoint("output", v) * u) == pytest.approx(np.sum(wanted * v), rel=1e-10)
 
 
@@ -141,20 +143,6 @@ def test_a_slow_loop_is_filtered_exactly_and_at_once():
     np.testing.assert_allclose(plant.signals("output", r), y, atol=1e-10)
     np.testing.assert_allclose(plant.signals("input", r), u, atol=1e-10)
     assert plant._answers._length <= 2048
-
-
-def test_the_adjoint_of_an_output():
-    plant = FiniteRecord(Experiment(arx(), 240).whitened(1.0), 240, 1.0)
-    u, weights = (
-        np.random.default_rng(0).normal(size=(240, 2)),
-        np.random.default_rng(1).normal(size=(240, 2)),
-    )
-    model = arx()
-    y = np.zeros((240, 2))
-    for i, j in np.ndindex(2, 2):
-        y[:, i] += scipy.signal.lfilter(model.B[i][j], model.A[i], u[:, j])
-    np.testing.assert_allclose(plant.signals("output", u), y, atol=1e-10)
-    assert np.sum(weights * y) == pytest.approx(np.sum(plant.adjoint("output", weights) * u))
 
 
 @pytest.mark.parametrize("seed", range(8))

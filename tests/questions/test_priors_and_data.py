@@ -10,6 +10,8 @@ import yaml
 from inputdesign_cli import assess, identify, parse_spec, solve
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.identification.earlier import Earlier
+from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.text_formats import csv_text
 from tests.support.campaigns import answered
 
 LAG = """
@@ -36,6 +38,15 @@ def lag_record(write):
         return write({"time_s": np.arange(1.0 * samples), "u": u + level[0], "y": y + level[1]}, name)
 
     return written
+
+
+@pytest.fixture(scope="module")
+def estimated(tmp_path_factory):
+    """What `identify` finds in a record of the lag, which others take for what was known before."""
+    folder = tmp_path_factory.mktemp("estimated")
+    u = np.sqrt(0.5) * np.random.default_rng(1001).standard_normal(300)
+    (folder / "a.csv").write_text(csv_text(Table({"time_s": np.arange(300.0), "u": u, "y": answered(u, 1)})))
+    return identify(parse_spec(LAG), folder / "a.csv")
 
 
 def test_a_prior_without_its_estimate_does_not_count(lag_record):
@@ -80,9 +91,9 @@ def test_a_prior_with_its_estimate_counts_as_its_record_does(lag_record, tmp_pat
     assert result["identification"]["prior"]["probability"] > 1e-3
 
 
-def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(lag_record, tmp_path):
+def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(lag_record, estimated, tmp_path):
     path = lag_record("a.csv", 300, 1, power=0.5)
-    (tmp_path / "model.yaml").write_bytes(identify(parse_spec(LAG), path).files["model.yaml"])
+    (tmp_path / "model.yaml").write_bytes(estimated.files["model.yaml"])
     spaced = tmp_path / "b.csv"
     spaced.write_text(path.read_text().replace(",", ", "))
     known = parse_spec(LAG, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
@@ -93,10 +104,10 @@ def test_a_prior_of_the_same_data_is_refused_whatever_their_file_looks_like(lag_
         assert caught.value.diagnostics[0].key == "experiment.prior"
 
 
-def test_a_prior_of_a_copy_of_the_data_decides_nothing(lag_record, tmp_path):
+def test_a_prior_of_a_copy_of_the_data_decides_nothing(lag_record, estimated, tmp_path):
     """Rounded to a tenth of the noise, and a few rows less."""
     path = lag_record("a.csv", 300, 1, power=0.5)
-    (tmp_path / "model.yaml").write_bytes(identify(parse_spec(LAG), path).files["model.yaml"])
+    (tmp_path / "model.yaml").write_bytes(estimated.files["model.yaml"])
     known = parse_spec(LAG, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
     head, *rows = path.read_text().splitlines()
     copy = tmp_path / "copy.csv"
@@ -158,10 +169,10 @@ def test_a_prior_that_cannot_be_read_is_refused_wherever_it_stands(ask, name, la
     assert {d.key for d in caught.value.diagnostics} == {"experiment.prior.information"}
 
 
-def test_the_samples_of_a_prior_do_not_count_for_an_estimate_and_are_told(lag_record, tmp_path):
+def test_the_samples_of_a_prior_do_not_count_for_an_estimate_and_are_told(lag_record, estimated, tmp_path):
     path = lag_record("a.csv", 300, 1, power=0.5)
     (tmp_path / "earlier.csv").write_bytes(path.read_bytes())
     spec = parse_spec(LAG, overrides=["experiment.prior={information: earlier.csv}"], folder=tmp_path)
-    found, plain = identify(spec, path).result, identify(parse_spec(LAG), path).result
+    found, plain = identify(spec, path).result, estimated.result
     assert found["identification"]["theta"] == plain["identification"]["theta"]
     assert "prior-left-out" in codes(found)

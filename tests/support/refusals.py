@@ -12,8 +12,3 @@ def refusals(ask: Callable[[], object], kind: type[IdesignError] = SpecError) ->
     with pytest.raises(kind) as caught:
         ask()
     return caught.value.diagnostics
-
-
-def refusal(ask: Callable[[], object], kind: type[IdesignError] = SpecError) -> Diagnostic:
-    """The first of them."""
-    return refusals(ask, kind)[0]
