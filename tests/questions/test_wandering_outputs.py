@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from inputdesign_cli.questions import explore, solve
+from inputdesign_cli.questions import explore
 from inputdesign_cli.questions.exploration.build import _inside
 from inputdesign_cli.records import Preparation
-from inputdesign_cli.specification import parse_spec
 
 GAIN, LAG, LATE = 2.0, 9.0, 2.3
 
