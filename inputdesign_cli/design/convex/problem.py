@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.design.amplitude.polytope import Face, LagPolytope, form_density, weighted
 from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.gradients import Gradients, weighty_ones
@@ -75,6 +76,7 @@ class Problem:
     floors_fixed: bool = False
     others: tuple[Scenario, ...] = field(default=(), repr=False)
     paid: Paid = "nominal"
+    polytope: LagPolytope | None = field(default=None, repr=False)
     finer: Problem | None = field(default=None, repr=False)
     seen: Demands | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
@@ -308,6 +310,26 @@ class Problem:
             w, _ = local_maxima(ratio, grid, ratio(grid), above=above)
             found += breaches_at(limit, index, self.basis.density(x, w) / factor, w, above=above)
         return found
+
+    def form(self, form: NDArray[np.float64]) -> Functional:
+        """Return a quadratic form (m, r, r) of the lags of the excitation as a functional of the spectrum."""
+
+        def density(w: Array) -> Array:
+            return self.experiment.squeezed(form_density(form, w))
+
+        vector = np.tensordot(self._lag_maps, weighted(form), axes=3)
+        return Functional(vector, density)
+
+    @cached_property
+    def _lag_maps(self) -> NDArray[np.float64]:
+        """Return the autocovariances of each basis function, (size, m, r, r)."""
+        assert self.polytope is not None
+        return self.basis.lags(self.polytope.windows.length)
+
+    def amplitude_face(self, z: Array) -> tuple[float, Face]:
+        """Return the gauge of the lags of a spectrum within the amplitude, and the face that shows it."""
+        assert self.polytope is not None
+        return self.polytope.gauge(np.tensordot(z, self._lag_maps, axes=1))
 
     @cached_property
     def _fine_grid(self) -> Array:
