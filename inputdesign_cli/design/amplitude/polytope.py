@@ -6,12 +6,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.amplitude.windows import Windows, weighted
 
-_MOST, _CLOSE = 400, 1e-5
-_BOX = 1e3
+# Cycles that are tried in one search; a face is found when no cycle exceeds it by the second number. Cycles
+# that exceed it by the third are taken at once.
+_MOST_CYCLES, _CLOSE, _DEEP = 400, 1e-5, 1e-3
+_BOX, _SAME = 1e3, 1e-12
+_FIRST = 60
 
 
 @dataclass(frozen=True)
@@ -24,56 +28,59 @@ class Face:
 
 @dataclass
 class LagPolytope:
-    """The convex hull of the lags of all cycles of windows, and of zero."""
+    """The autocovariances of all signals of some windows: the hull of the best cycles, and of zero.
+
+    It remembers the `cycles` (period, r) and the `forms` of the faces that searches have found.
+    """
 
     windows: Windows
     cycles: list[Array] = field(default_factory=list)
-    _columns: list[Array] = field(default_factory=list)
-    _values: Array | None = None
+    forms: list[NDArray[np.float64]] = field(default_factory=list)
+    _columns: list[Array] = field(default_factory=list, init=False, repr=False)
+    _values: Array | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        n = 60
-        rng = np.random.default_rng(0)
-        L = self.windows.letters
-        for c in [np.ones((1, 1)), np.array([[1.0], [-1.0]])] if L.shape[1] == 1 else []:
-            self._add(c * L.max())
-        for letter in L:
-            self._add(letter[None])
-        for _ in range(n):
-            self._add(L[rng.integers(len(L), size=2 * self.windows.length)])
+        """Begin with a few cycles, which bound the forms that are looked for."""
+        letters, rng = self.windows.letters, np.random.default_rng(0)
+        first = [letters[[i, j]] for i in range(len(letters)) for j in range(i, len(letters))]
+        tried = letters[rng.integers(len(letters), size=(_FIRST, 2 * self.windows.length))]
+        self.cycles = self.cycles or [*first, *tried]
+        self._columns = [self.windows.lags(cycle).ravel() for cycle in self.cycles]
 
-    def _add(self, cycle: Array) -> None:
-        self.cycles.append(cycle)
-        self._columns.append(self.windows.lags(cycle).ravel())
+    def longer(self, length: int) -> LagPolytope:
+        """Return the polytope of longer windows, which knows the same cycles and faces."""
+        more = length - self.windows.length
+        forms = [np.pad(form, ((0, more), (0, 0), (0, 0))) for form in self.forms]
+        return LagPolytope(Windows(self.windows.letters, length), self.cycles, forms)
 
     def gauge(self, lags: Array) -> tuple[float, Face]:
-        """Return the least factor of the polytope that contains lags (m, r, r), and a face that shows it."""
-        c = lags.ravel()
-        scale = float(np.abs(self._columns[0]).max())
-        r = self.windows.letters.shape[1]
-        lower = np.full(c.size, -_BOX)
-        for i in range(r):
-            lower[i * r + i] = 0.0
-        two = np.full((self.windows.length, r, r), 2.0)
-        two[0] = 1.0
-        w = two.ravel()
-        best = None
-        for _ in range(_MOST):
-            A = np.array(self._columns) * w / scale
-            found = scipy.optimize.linprog(
-                -c * w / scale, A_ub=A, b_ub=np.ones(len(A)), bounds=np.column_stack([lower, np.full(c.size, _BOX)])
-            )
-            q = found.x.reshape(lags.shape) / scale
-            h, cycle, self._values = self.windows.largest_mean(q, self._values, 1.0 + 1e-3)
-            if best is None or -found.fun / h > best.share:
-                best = Face(q / h, -found.fun / h)
-            if h <= 1.0 + _CLOSE:
+        """Return the least multiple of the polytope that contains lags (m, r, r), and a face that shows it.
+
+        The multiple is that of the known cycles, so that it is an upper bound; the face proves a lower one.
+        """
+        inputs, unit = self.windows.letters.shape[1], float(np.abs(self.windows.letters).max()) ** 2
+        twice = weighted(np.ones_like(lags)).ravel()
+        goal = lags.ravel() * twice / unit
+        # Forms that are convex in every value are largest at the ends of its range.
+        lower = np.full(lags.shape, -_BOX)
+        lower[0, range(inputs), range(inputs)] = 0.0
+        bounds = np.column_stack([lower.ravel(), np.full(goal.size, _BOX)])
+        best, multiple = Face(np.zeros(lags.shape), 0.0), np.inf
+        for _ in range(_MOST_CYCLES):
+            columns = np.array(self._columns) * twice / unit
+            found = scipy.optimize.linprog(-goal, A_ub=columns, b_ub=np.ones(len(columns)), bounds=bounds)
+            multiple, form = -found.fun, found.x.reshape(lags.shape) / unit
+            form[0] = 0.5 * (form[0] + form[0].T)
+            most, cycle, self._values = self.windows.largest_mean(form, self._values, 1.0 + _DEEP)
+            if multiple / most > best.share:
+                best = Face(form / most, multiple / most)
+            column = self.windows.lags(cycle).ravel()
+            known = np.abs(np.array(self._columns) - column).max(axis=1).min() < _SAME * unit
+            if most <= 1.0 + _CLOSE or known:
                 break
-            before = len(self._columns)
-            self._add(cycle)
-            if np.abs(np.array(self._columns[:before]) - self._columns[-1]).max(axis=1).min() < 1e-12:
-                break
-        return -found.fun, best
+            self.cycles.append(cycle)
+            self._columns.append(column)
+        return multiple, best
 
 
 def form_density(form: Array, w: Array) -> Array:

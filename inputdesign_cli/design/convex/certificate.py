@@ -36,6 +36,8 @@ from inputdesign_cli.spectrum import Functional, weighted_mean
 # the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
 # what only it prices would then set the scale: the largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
+# A form of the lags may fall below zero where nothing pays: so much power lifts it.
+_FORM_SHARES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 _TINY = np.finfo(float).tiny
 
 
@@ -46,7 +48,8 @@ class Certificate:
     `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled so that
     price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
     the spectra for which that is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of
-    which the largest is paid.
+    which the largest is paid. `form` (m, r, r) is the part of the price that limits on the amplitude have,
+    a form of the lags of the excitation; signals within the amplitude take at most `form_share` of it.
     """
 
     bound: float
@@ -56,6 +59,8 @@ class Certificate:
     price: Functional | None = None
     value: Functional | None = None
     costs: Array = field(default_factory=lambda: np.ones(1))
+    form: NDArray[np.float64] | None = None
+    form_share: float = 0.0
 
     @property
     def shares(self) -> Array:
@@ -78,11 +83,13 @@ def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certifi
     found = _certified(problem, proof, weights, value, rows, _LEAST_SHARES[0])
     if problem.goal == "cost":
         return found
-    for share in _LEAST_SHARES[1:]:
+    formed = problem.polytope is not None
+    for share in (*_LEAST_SHARES[1:], *(_FORM_SHARES if formed else ())):
         other = _certified(problem, proof, weights, value, rows, share)
-        if other.bound <= found.bound:
+        if other.bound > found.bound:
+            found = other
+        elif not formed:
             break
-        found = other
     return found
 
 
@@ -127,6 +134,7 @@ def _certified(
         bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
     if bound <= 0.0:
         t = 0.0
+    forms = [(row, w) for row, w in zip(rows, of_rows, strict=True) if row.form is not None]
     shares = np.zeros(len(problem.limits))
     for row, w in zip(rows, of_rows, strict=True):
         if row.limit is not None:
@@ -139,6 +147,8 @@ def _certified(
         price=price * unit,
         value=value * (t * unit),
         costs=proof.costs,
+        form=unit * sum(w * row.form for row, w in forms) if forms else None,
+        form_share=unit * sum(w * row.bound for row, w in forms),
     )
 
 

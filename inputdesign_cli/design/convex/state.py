@@ -104,8 +104,9 @@ class State:
         self._add(_most_violated(problem, found, self.keys))
         self._add_rows(breaches)
         if problem.polytope is not None:
-            gauge, face = problem.amplitude_face(z)
-            if face.share > s:
+            face = problem.amplitude_face(z)[1]
+            if face.share > problem.bound_factor(True, s):
+                problem.polytope.forms.append(face.form)
                 self.rows.append(form_row(problem, face.form))
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
@@ -234,6 +235,8 @@ def first_state(problem: Problem, start: Array, interior: Array | None, known: S
         state._add(_most_violated(problem, close, state.keys))
     if problem.densities:
         state.rows += first_density_rows(problem)
+    if problem.polytope is not None:
+        state.rows += [form_row(problem, form) for form in problem.polytope.forms]
     return state
 
 
