@@ -20,7 +20,7 @@ _BLOCKS, _STEPS, _FINE = 100, 32, 1e-6
 
 @dataclass(frozen=True)
 class Windows:
-    """The windows of `length` m letters of an alphabet (letters, r)."""
+    """The windows of `length` m letters, two or more, of an alphabet (letters, r)."""
 
     letters: Array
     length: int
@@ -107,6 +107,8 @@ class Windows:
 
     def largest_sum(self, form: Array, samples: int) -> tuple[float, Array]:
         """Return the largest form (m, r, r) of records of this length from rest, and the record, (samples, r)."""
+        if self.length > samples:  # lags beyond the record do not count
+            return Windows(self.letters, max(samples, 2)).largest_sum(form[: max(samples, 2)], samples)
         size, m = len(self.letters), self.length
         rewards = self._rewards(form)
         values = np.zeros(self.states)

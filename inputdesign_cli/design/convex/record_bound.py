@@ -50,7 +50,7 @@ def bound_over_records(problem: Problem, free: ExchangeResult, amplitude: Array,
     Args:
         free: the design over every spectrum without the amplitude, to begin with.
     """
-    windows = Windows.within(amplitude, 1)
+    windows = Windows.within(amplitude, 2)
     polytope, found = LagPolytope(windows), None
     result = free
     for length in lengths:
