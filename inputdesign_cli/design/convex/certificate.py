@@ -30,14 +30,16 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.gradients import weighty_ones
 from inputdesign_cli.design.convex.master import Proof, Row
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum import Functional, weighted_mean
 
 # Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs
 # the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
 # what only it prices would then set the scale: the largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
-# A form of the lags may fall below zero where nothing pays: so much power lifts it.
-_FORM_SHARES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+# More for power gives a price that all but vanishes somewhere a finite unit: these shares are tried.
+_FORM_SHARES = (1e-5, 1e-4, 1e-3)
+_LIFT = 1e-12
 _TINY = np.finfo(float).tiny
 
 
@@ -123,6 +125,12 @@ def _certified(
     # Of several costs each is that of a plant; their densities are looked at where they may change fast.
     paid = np.flatnonzero(proof.costs) if proof.costs.size > 1 else np.zeros(0, dtype=int)
     grid = problem.gradients.grid_of(sorted({*weighty_ones(weights), *paid.tolist()}))
+    lift = lifted = 0.0
+    if any(row.form is not None for row in rows):
+        grid = problem.with_form_grid(grid)
+        price, lift = _lifted(problem, price, grid)
+        lifted = lift * problem.amplitude_power
+        upper += lifted
     pricing = problem.basis.price(price, value, grid)
     gain = required - float(np.sum(weights * problem.fixed_information)) + fixed_lower
     t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
@@ -147,9 +155,32 @@ def _certified(
         price=price * unit,
         value=value * (t * unit),
         costs=proof.costs,
-        form=unit * sum(w * row.form for row, w in forms) if forms else None,
-        form_share=unit * sum(w * row.bound for row, w in forms),
+        form=unit * _raised(sum(w * row.form for row, w in forms), lift) if forms else None,
+        form_share=unit * (lifted + sum(w * row.bound for row, w in forms)),
     )
+
+
+def _lifted(problem: Problem, price: Functional, grid: Array) -> tuple[Functional, float]:
+    """Return the price with so much for power that it is nowhere negative, and how much that is.
+
+    A form of the lags may fall below zero, where nothing would pay.
+    """
+
+    def below(w: Array) -> Array:
+        density = price.density(w)
+        return -density if density.ndim == 1 else -np.linalg.eigvalsh(density)[:, 0]
+
+    on_grid = below(grid)
+    size = float(np.abs(on_grid).max())
+    _, depths = local_maxima(below, grid, on_grid)
+    lift = max(float(np.max(depths, initial=0.0)), float(on_grid.max()), 0.0) + _LIFT * size
+    return price + problem.power("excitation") * lift, lift
+
+
+def _raised(form: NDArray[np.float64], lift: float) -> NDArray[np.float64]:
+    raised = form.copy()
+    raised[0] += lift * np.eye(form.shape[1])
+    return raised
 
 
 def _kept(rows: Sequence[Row], weights: Array, share: float) -> Array:

@@ -35,6 +35,7 @@ from inputdesign_cli.information import Experiment, PowerKind, joint_information
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
 
+_RIPPLE = 16  # points of the grid a lag
 Goal = Literal["cost", "factor", "samples"]
 
 
@@ -325,6 +326,24 @@ class Problem:
         """Return the autocovariances of each basis function, (size, m, r, r)."""
         assert self.polytope is not None
         return self.basis.lags(self.polytope.windows.length)
+
+    def with_form_grid(self, grid: Array) -> Array:
+        """Return the grid with frequencies that see every ripple of forms of the lags."""
+        assert self.polytope is not None
+        if self._form_grids.get(grid.size) is None:
+            ripples = np.linspace(grid[0], grid[-1], _RIPPLE * self.polytope.windows.length)
+            self._form_grids[grid.size] = np.union1d(grid, ripples)
+        return self._form_grids[grid.size]
+
+    @cached_property
+    def _form_grids(self) -> dict[int, Array]:
+        return {}
+
+    @property
+    def amplitude_power(self) -> float:
+        """Return the largest power of signals within the amplitude, of all channels together."""
+        assert self.polytope is not None
+        return float(np.max(np.sum(self.polytope.windows.letters**2, axis=1)))
 
     def amplitude_face(self, z: Array) -> tuple[float, Face]:
         """Return the gauge of the lags of a spectrum within the amplitude, and the face that shows it."""
