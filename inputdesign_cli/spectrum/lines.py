@@ -54,6 +54,7 @@ class LinesBasis:
     units: Array
     free: bool = False
 
+    hold = 1
     has_density = False
     degree = 0
     knots = np.zeros(0)

@@ -316,7 +316,7 @@ class Problem:
         """Return a quadratic form (m, r, r) of the lags of the excitation as a functional of the spectrum."""
 
         def density(w: Array) -> Array:
-            return self.experiment.squeezed(form_density(form, w))
+            return self.experiment.squeezed(form_density(form, self.basis.hold * np.asarray(w)))
 
         vector = np.tensordot(self._lag_maps, weighted(form), axes=3)
         return Functional(vector, density)

@@ -21,6 +21,7 @@ from inputdesign_cli.design.amplitude.windows import Windows
 from inputdesign_cli.design.convex.exchange import ExchangeResult
 from inputdesign_cli.design.convex.feasible import solve_limited
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.spectrum.held import HeldLines
 
 # Windows of these lengths follow each other until the bound gains less than the share.
 _LENGTHS, _GAIN = (4, 8, 10, 12, 14), 1e-3
@@ -44,7 +45,7 @@ class RecordBound:
     best: Array
 
 
-def bound_over_records(problem: Problem, free: ExchangeResult, amplitude: Array, samples: int, lengths=_LENGTHS) -> RecordBound:
+def bound_over_records(problem: Problem, free: ExchangeResult, amplitude: Array, samples: int, lengths=_LENGTHS, hold: int = 1) -> RecordBound:
     """Bound the objective over all records of this many samples with |u_i| <= amplitude_i (r,).
 
     Args:
@@ -52,14 +53,18 @@ def bound_over_records(problem: Problem, free: ExchangeResult, amplitude: Array,
     """
     windows = Windows.within(amplitude, 2)
     polytope, found = LagPolytope(windows), None
-    result = free
+    basis, x, known = free.basis, free.x, free.active
+    if hold > 1:
+        basis = HeldLines.of(hold, amplitude.size).in_units(amplitude)
+        x = basis.spread(amplitude**2)
     for length in lengths:
         if len(windows.letters) ** (length - 1) > _MOST_STATES or (found and time_is_over()):
             break
-        polytope = polytope.longer(min(length, samples))
-        limited = replace(problem.on(result.basis), polytope=polytope, finer=None)
-        result = solve_limited(limited, result.x, _TOLERANCE, known=result.active)
-        before, found = found, _proved(limited, result, samples)
+        polytope = polytope.longer(min(length, samples // hold))
+        limited = replace(problem.on(basis), polytope=polytope, finer=None)
+        result = solve_limited(limited, x, _TOLERANCE, known=known)
+        basis, x, known = result.basis, result.x, result.active
+        before, found = found, _proved(limited, result, samples // hold)
         if before and found.bound <= (1.0 + _GAIN) * before.bound:
             break
     assert found is not None
