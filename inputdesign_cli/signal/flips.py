@@ -22,8 +22,9 @@ from inputdesign_cli.information import FiniteRecord
 
 _RUNS = (1, 2, 3, 5, 8)
 _CLIMBS, _SHARE = 150, 0.1
-# How sharp the soft maximum is: at first, at the end of the climb, and for single changes.
-_SOFT, _SHARP, _SHARPEST = 20.0, 120.0, 300.0
+# How sharp the soft maximum is: at first and at the end of the climb, and for single changes.
+_SOFT, _SHARP = 20.0, 120.0
+_SHARPNESSES = (60.0, 200.0, 1000.0)
 _TRIED, _PAIRED = 40, 12
 _BETTER = 1.0 - 1e-7
 _STEP = 1e-5
@@ -156,6 +157,24 @@ class _Point:
     ratio: float
 
 
+@dataclass(frozen=True)
+class _Soft:
+    """The soft maximum of the squared ratios at some places of every plant."""
+
+    places: Sequence[list[tuple[Requirement, Array]]]
+    sharpness: float
+
+    def __call__(self, informations: Sequence[Array]) -> float:
+        """Return it at these information matrices; infinite where one is singular."""
+        try:
+            found = [_squares(there, M) for there, M in zip(self.places, informations, strict=True)]
+        except np.linalg.LinAlgError:
+            return np.inf
+        squares = np.concatenate(found)
+        top = float(squares.max())
+        return top * (1.0 + float(np.log(np.sum(np.exp(self.sharpness * (squares / top - 1.0))))) / self.sharpness)
+
+
 Change = tuple[int, int, Array]
 
 
@@ -278,21 +297,23 @@ class FlipSearch:
         return best
 
     def _descended(self, point: _Point, over: Callable[[], bool], enough: float) -> _Point:
-        """Change runs one by one, and two by two, while that lowers the ratio."""
-        if not np.isfinite(point.ratio):
-            return point
-        while not over() and point.ratio > enough:
-            places = [h.goal.places(M) for h, M in zip(self._held, point.informations, strict=True)]
-            weights = self._weights(point, places, _SHARPEST)
-            changes = self._changes(point, weights)
-            better = self._first_better(point, [[c] for c in changes[:_TRIED]], places)
-            if better is None:
-                pairs = [list(pair) for pair in combinations(changes[:_PAIRED], 2) if _apart(*pair)]
-                better = self._first_better(point, pairs, places)
-            if better is None:
-                return point
-            point = better
-        return point
+        """Change runs one by one, and two by two, while that lowers ever sharper soft maxima of the ratios."""
+        best = point
+        for sharpness in _SHARPNESSES if np.isfinite(point.ratio) else ():
+            while not over() and best.ratio > enough:
+                places = [h.goal.places(M) for h, M in zip(self._held, point.informations, strict=True)]
+                soft = _Soft(places, sharpness)
+                changes = self._changes(point, self._weights(point, places, sharpness))
+                better = self._first_better(point, [[c] for c in changes[:_TRIED]], soft)
+                if better is None:
+                    pairs = [list(pair) for pair in combinations(changes[:_PAIRED], 2) if _apart(*pair)]
+                    better = self._first_better(point, pairs, soft)
+                if better is None:
+                    break
+                point = better
+                if point.ratio < best.ratio:
+                    best = point
+        return best
 
     def _changes(self, point: _Point, weights: Sequence[Array]) -> list[tuple[int, int, Array]]:
         """Return changes of runs, (channel, first value, steps), the most promising first."""
@@ -317,27 +338,23 @@ class FlipSearch:
         found.sort(key=lambda one: -one[0])
         return [one[1:] for one in found]
 
-    def _first_better(self, point: _Point, tried: list[list[tuple[int, int, Array]]], places: Sequence) -> _Point | None:
+    def _first_better(self, point: _Point, tried: list[list[Change]], soft: _Soft) -> _Point | None:
+        """Return the first of some changes, each of several runs, that lowers the soft maximum."""
+        least = soft(point.informations)
         for changes in tried:
-            psis, informations, largest = [], [], 0.0
-            for held, psi, M, there in zip(self._held, point.psis, point.informations, places, strict=True):
+            psis, informations = [], []
+            for held, psi, M in zip(self._held, point.psis, point.informations, strict=True):
                 step = sum(held.changed(*change) for change in changes)
                 cross = held.products(step, psi)
-                information = M + cross + cross.T + held.products(step, step)
-                try:
-                    largest = max(largest, float(_squares(there, information).max()))
-                except np.linalg.LinAlgError:
-                    largest = np.inf
-                if largest >= (_BETTER * point.ratio) ** 2:
-                    break
                 psis.append(psi + step)
-                informations.append(information)
-            else:
-                values = point.values.copy()
-                for channel, first, steps in changes:
-                    values[first : first + len(steps), channel] += steps
-                if (ratio := self._worst(informations)) < _BETTER * point.ratio and self._keeps(values):
-                    return _Point(values, psis, informations, ratio)
+                informations.append(M + cross + cross.T + held.products(step, step))
+            if soft(informations) >= _BETTER * least:
+                continue
+            values = point.values.copy()
+            for channel, first, steps in changes:
+                values[first : first + len(steps), channel] += steps
+            if self._keeps(values):
+                return _Point(values, psis, informations, self._worst(informations))
         return None
 
     def _kicked(self, values: Array, rng: np.random.Generator) -> Array:
