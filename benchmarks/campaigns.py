@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from inputdesign_cli import load_spec, parse_spec
-from inputdesign_cli.outcome import write_plain
+from inputdesign_cli.outcome import plain
 from inputdesign_cli.questions.campaign.build import build_campaign, build_planner
 from inputdesign_cli.questions.campaign.outcome import way_entry
 from inputdesign_cli.questions.campaign.study import oracle_of, tried, ways_of
@@ -95,7 +95,7 @@ def measured(name: str, spec: Spec, runs: int) -> dict[str, object]:
     found: dict[str, object] = {"case": name, "runs": runs, "oracle": asdict(oracle)}
     for way in ("campaign", "one_shot"):
         started = time.process_time()
-        entry = write_plain(way_entry(tried(study, ways[way]), oracle))
+        entry = plain(way_entry(tried(study, ways[way]), oracle))
         found[way] = entry | {"seconds_a_run": (time.process_time() - started) / runs}
         low, high = entry.get("within_r_adm_true_limits", (0, 1))
         print(

@@ -36,7 +36,7 @@ from inputdesign_cli.compute.executor import InProcess
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.figures.sweep_table import read_sweep
 from inputdesign_cli.questions.task import build_task
-from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.sweeps.notebook import sweep
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "first_order.yaml"
@@ -59,9 +59,7 @@ def against_textbook(folder: Path, *, timed: int) -> dict[str, float]:
     for i, part in enumerate(parts):
         started = time.perf_counter()
         out = folder / f"part{i}"
-        run_sweep(
-            SPEC, [f"experiment.samples={','.join(map(str, part))}"], directory=out, executor=InProcess()
-        )
+        sweep(SPEC, [f"experiment.samples={','.join(map(str, part))}"], directory=out, executor=InProcess())
         ours += time.perf_counter() - started
         started = time.perf_counter()
         on_grid = plain_program(int(part[0]))
@@ -85,7 +83,7 @@ def two_against_one(folder: Path, *, points: int, parts: int) -> dict[str, float
             started = time.perf_counter()
             out = folder / f"jobs{jobs}-{part}"
             settings = [f"experiment.samples={first}:{first + each - 1}:1"]
-            run_sweep(SPEC, settings, directory=out, executor=Processes(jobs))
+            sweep(SPEC, settings, directory=out, executor=Processes(jobs))
             times[jobs] += time.perf_counter() - started
     return {
         "points": parts * each,
@@ -104,7 +102,7 @@ def main() -> int:
     arguments = parser.parse_args()
     plain_program(500)  # imports and first calls
     with tempfile.TemporaryDirectory() as folder:
-        run_sweep(SPEC, ["experiment.samples=100,101"], directory=Path(folder) / "first")
+        sweep(SPEC, ["experiment.samples=100,101"], directory=Path(folder) / "first")
         plain = against_textbook(Path(folder), timed=2 if arguments.quick else 10)
         print(
             f"100 points in one process: {plain['ratio']:.1f} times faster than 100 textbook programs "

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from inputdesign_cli.outcome.golden import Golden, Row, compare, load_golden
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.questions.verbs import run_verb
+from inputdesign_cli.questions import run_verb
 from inputdesign_cli.specification import load_spec
-from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.sweeps.notebook import sweep
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "papers.md"
@@ -145,7 +145,7 @@ def draw_sweep(golden: Golden, name: str, setting: str, file: Path) -> None:
     run = next(run for run in golden.runs if run.name == name)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "sweep"
-        run_sweep(golden.spec_of(run), [*run.overrides, setting], directory=out)
+        sweep(golden.spec_of(run), [*run.overrides, setting], directory=out)
         file.write_bytes((out / "curves.png").read_bytes())
 
 

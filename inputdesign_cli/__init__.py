@@ -37,27 +37,19 @@ __all__ = [
     "validate",
 ]
 
-_HOME = {
-    "Spec": "inputdesign_cli.specification",
-    "figure": "inputdesign_cli.figures.plots",
-    "from_control": "inputdesign_cli.specification",
-    "to_control": "inputdesign_cli.questions",
-    "load_spec": "inputdesign_cli.specification",
-    "parse_spec": "inputdesign_cli.specification",
-    "solve": "inputdesign_cli.questions",
-    "simulate": "inputdesign_cli.questions",
-    "analyse": "inputdesign_cli.questions",
-    "assess": "inputdesign_cli.questions",
-    "identify": "inputdesign_cli.questions",
-    "validate": "inputdesign_cli.questions",
-    "sweep": "inputdesign_cli.sweeps.notebook",
+_HOMES = {
+    "specification": {"Spec", "from_control", "load_spec", "parse_spec"},
+    "questions": {"analyse", "assess", "identify", "simulate", "solve", "to_control", "validate"},
+    "figures.plots": {"figure"},
+    "sweeps.notebook": {"sweep"},
 }
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return vars(import_module(_HOME[name]))[name]
+    for home, names in _HOMES.items():
+        if name in names:
+            return vars(import_module(f"{__name__}.{home}"))[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import unicodedata
 from dataclasses import asdict
+
+from rich.cells import cell_len
 
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location
 
@@ -14,23 +15,16 @@ _BOLD, _RED, _BLUE, _CYAN, _RESET = "\x1b[1m", "\x1b[1;31m", "\x1b[1;34m", "\x1b
 
 
 def render(error: IdesignError, color: bool = False) -> str:
-    """All diagnostics of an error, each with its place, the line with a caret, and the help.
+    """Return all diagnostics of an error, each with its place, the line with a caret, and the help.
 
-    Args:
-        error: Any error of this package.
-        color: Whether to use ANSI colours (the caller knows the terminal and `NO_COLOR`).
-
-    Returns:
-        One block of lines a diagnostic, and a line that says how to learn more.
+    The last line says how to learn more. With `color` there are ANSI colours.
     """
     blocks = [_block(diagnostic, color) for diagnostic in error.diagnostics]
     codes = {diagnostic.code for diagnostic in error.diagnostics if diagnostic.code}
-    footer = []
-    if len(blocks) > 1:
-        footer.append(f"{len(blocks)} errors.")
+    footer = f"{len(blocks)} errors. " if len(blocks) > 1 else ""
     if codes:
-        footer.append(f"`idesign explain {codes.pop() if len(codes) == 1 else 'CODE'}` says more.")
-    return "\n\n".join([*blocks, " ".join(footer)] if footer else blocks)
+        footer += f"`idesign explain {codes.pop() if len(codes) == 1 else 'CODE'}` says more."
+    return "\n\n".join(filter(None, [*blocks, footer.strip()]))
 
 
 def as_json(error: IdesignError) -> list[dict[str, object]]:
@@ -43,7 +37,10 @@ def as_json(error: IdesignError) -> list[dict[str, object]]:
 
 def _block(diagnostic: Diagnostic, color: bool) -> str:
     place = diagnostic.location
-    paint = _paint if color else _plain
+
+    def paint(text: str, style: str) -> str:
+        return f"{style}{text}{_RESET}" if text and color else text
+
     head = f"{paint(_where(place), _BOLD)}: " if place else ""
     code = f"[{diagnostic.code}]" if diagnostic.code else ""
     lines = [f"{head}{paint('error' + code, _RED)} {_clean(diagnostic.message)}"]
@@ -80,23 +77,9 @@ def _excerpt(text: str, column: int) -> tuple[str, int]:
         line = before + line[start : start + _WIDTH] + after
         at += len(before) - start
     line = _clean(line)
-    return line, sum(_cells(character) for character in line[:at])
-
-
-def _cells(character: str) -> int:
-    if unicodedata.combining(character):
-        return 0
-    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+    return line, cell_len(line[:at])
 
 
 def _clean(text: str) -> str:
     """Without what could move the cursor or change the colours of a terminal."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
-
-
-def _paint(text: str, style: str) -> str:
-    return f"{style}{text}{_RESET}" if text else ""
-
-
-def _plain(text: str, _style: str) -> str:
-    return text

@@ -6,15 +6,17 @@ and exit code follow from the severities, here and nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import partial
+from functools import partial, wraps
 from types import MappingProxyType
-from typing import Literal
+from typing import Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 
+P = ParamSpec("P")
+R = TypeVar("R")
 CAUSES = ("unsettled", "contradicted", "unasked", "undetermined", "spikes", "drift", "nonlinearity", "chance")
 """Why nothing is decided: the search, the data, the question at the estimate, other explanations; of a
 response without a model: a few samples, a drift, a nonlinearity, or the scatter of its periods."""
@@ -80,17 +82,40 @@ class FindingKind:
         KINDS[self.code] = self
 
     def found(
-        self, message: str, *, where: str = "", severity: Severity | None = None, **figures: object
+        self,
+        fact: str = "",
+        *,
+        where: str = "",
+        remedy: str = "",
+        severity: Severity | None = None,
+        **figures: object,
     ) -> Finding:
-        """Return a finding of this kind.
+        """Return a finding of this kind: its message is the title, the fact and the remedy.
 
         Args:
-            message: its sentence.
+            fact: what holds in the case at hand.
             where: what it is about.
+            remedy: what to do in the case at hand, if not that of the kind.
             severity: where the case at hand weighs more or less than usual.
             figures: its numbers and names.
         """
-        return Finding(self.code, severity or self.severity, message, where, figures)
+        advice = (remedy or self.remedy).replace("`", "")
+        message = f"{self.title}{': ' * bool(fact)}{fact}. {'' if advice.startswith('Nothing') else advice}"
+        return Finding(self.code, severity or self.severity, message.rstrip(), where, figures)
+
+    def when(
+        self,
+        holds: object,
+        fact: str = "",
+        *,
+        where: str = "",
+        remedy: str = "",
+        severity: Severity | None = None,
+        **figures: object,
+    ) -> list[Finding]:
+        """Return a finding of this kind where something holds."""
+        found = self.found(fact, where=where, remedy=remedy, severity=severity, **figures)
+        return [found] if holds else []
 
 
 def _kind(severity: Severity, code: str, text: str, remedy: str, cause: str = "undetermined") -> FindingKind:
@@ -101,6 +126,25 @@ def _kind(severity: Severity, code: str, text: str, remedy: str, cause: str = "u
 
 note, doubt, unsure, refuted = (partial(_kind, severity) for severity in Severity)
 """Declare a kind by its code, text, remedy and, of `unsure`, the cause why nothing is decided."""
+NOTE, DOUBT, UNDECIDED, REFUTED = Severity.NOTE, Severity.DOUBT, Severity.UNDECIDED, Severity.REFUTED
+
+
+def finding(
+    severity: Severity, code: str, remedy: str, cause: str = "undetermined"
+) -> Callable[[Callable[Concatenate[FindingKind, P], R]], Callable[P, R]]:
+    """Declare the kind of findings that a function makes; its docstring explains them, up to `Args`."""
+
+    def declared(function: Callable[Concatenate[FindingKind, P], R]) -> Callable[P, R]:
+        text = (function.__doc__ or "").partition("\n\n    Args:")[0]
+        kind = _kind(severity, code, " ".join(text.split()), remedy, cause)
+
+        @wraps(function)
+        def made(*args: P.args, **kwargs: P.kwargs) -> R:
+            return function(kind, *args, **kwargs)
+
+        return made
+
+    return declared
 
 
 def cause_of(finding: Finding) -> str:

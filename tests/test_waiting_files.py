@@ -13,10 +13,10 @@ from inputdesign_cli.errors import DataError, IdesignError, OutputError
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import read_run, write_run
 from inputdesign_cli.sweeps.layout import at_work
-from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.campaigns import SPEC
 from tests.support.commands import caller
 from tests.support.outcomes import typed
+from tests.support.sweep_files import run_sweep
 from tests.test_architecture import FILES, ROOT, tree_of
 
 OPENING = {"open", "read_text", "read_bytes", "fdopen", "mmap", "fromfile", "loadtxt", "genfromtxt", "cmp"}
@@ -37,7 +37,7 @@ OPENED = {
     "wizard/questions.py": (1, "a file of the package"),
 }
 # Functions of ours with one of these names read by `read_regular`.
-OURS = {"inputdesign_cli.specification.yaml.files", "inputdesign_cli.records.text"}
+OURS = {"inputdesign_cli.specification.yaml.files"}
 
 
 def opened(path: Path) -> int:
@@ -116,10 +116,9 @@ def test_a_pipe_in_a_run_is_not_waited_for(tmp_path, name):
                 use()
 
 
-def test_a_pipe_in_a_folder_of_work_is_not_waited_for(tmp_path):
+def test_a_pipe_for_the_lock_of_a_run_is_not_waited_for(tmp_path):
     write_run(a_run(), tmp_path / "a")
-    (tmp_path / "a" / ".run.partial").mkdir()
-    piped(tmp_path / "a" / ".run.partial" / "lock")
+    piped(tmp_path / "a" / ".run.lock")
     with in_time():
         write_run(a_run(), tmp_path / "a")
     assert read_run(tmp_path / "a")["title"] == "one"

@@ -134,13 +134,12 @@ def proceed(
 
 def status(directory: CampaignDirectory, json_output: Json = False) -> None:
     """Show how a campaign stands: what has been reached, and what comes next."""
-    from inputdesign_cli.outcome import write_plain
-    from inputdesign_cli.outcome.text_formats import json_text
+    from inputdesign_cli.outcome.codec import json_text
     from inputdesign_cli.questions.campaign.memory import read_memory
 
     memory = read_memory(directory)
     if json_output:
-        typer.echo(json_text(write_plain(memory.campaign)), nl=False)
+        typer.echo(json_text(memory.campaign), nl=False)
         return
     from inputdesign_cli.cli.summary import summary
     from inputdesign_cli.outcome.record import RESULT, readable

@@ -76,7 +76,7 @@ def _compare(
         IdesignError: a file, or a spec that it names, is not good.
     """
     from inputdesign_cli.outcome.golden import compare, load_golden
-    from inputdesign_cli.questions.verbs import execute
+    from inputdesign_cli.questions import execute
 
     for golden in [load_golden(path) for path in files]:
         results = {}

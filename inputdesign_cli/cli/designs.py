@@ -32,7 +32,7 @@ from inputdesign_cli.errors import STANDARD_STREAM, IdesignError
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.outcome.results import Results
-    from inputdesign_cli.questions.verbs import Verb
+    from inputdesign_cli.questions import Verb
 
 
 def solve(
@@ -139,7 +139,7 @@ def _results(
     """
     file = place.sources[0]
     with computing(file, quiet=quiet):
-        from inputdesign_cli.questions.verbs import run_verb
+        from inputdesign_cli.questions import run_verb
 
         spec = read_spec(file, changes)
         place = place.checked(spec)

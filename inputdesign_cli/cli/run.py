@@ -143,8 +143,8 @@ def _show(results: Results, files: Sequence[Path], shown: Shown, *, replaced: bo
     if shown.json_output and files:
         typer.echo(read_regular(files[-1]).decode(), nl=False)
     elif shown.json_output:
+        from inputdesign_cli.outcome.codec import json_text
         from inputdesign_cli.outcome.run_directory import finished_result
-        from inputdesign_cli.outcome.text_formats import json_text
 
         typer.echo(json_text(finished_result(results)), nl=False)
     elif not shown.quiet:

@@ -157,7 +157,7 @@ def signal(
     for file in files:
         _write(file, results)
     if json_output:
-        from inputdesign_cli.outcome.text_formats import json_text
+        from inputdesign_cli.outcome.codec import json_text
 
         typer.echo(json_text(results.result), nl=False)
     elif not quiet:

@@ -7,17 +7,8 @@ from pathlib import Path
 
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.objectives import objective
-from inputdesign_cli.report.evidence import (
-    campaign_facts,
-    estimate_facts,
-    estimate_table,
-    requirement_table,
-    simulation_table,
-    verdict,
-)
-from inputdesign_cli.report.facts import GIVEN, facts, proofs
-from inputdesign_cli.report.numbers import BREAK, Rows
+from inputdesign_cli.report.evidence import BREAK, Rows, estimate_table, requirement_table, simulation_table
+from inputdesign_cli.report.facts import Fact, asked, campaign_facts, estimate_facts, facts, proofs, verdict
 
 _NONE = Rows((), ())
 Line = tuple[str, str]
@@ -32,10 +23,10 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
         replaced: whether a run with other values stood there before.
     """
     lines = [
-        *campaign_facts(outcome),
+        *_lines(campaign_facts(outcome)),
         *_data(outcome, time_unit),
-        *_asked(outcome),
-        *((name, f"{text}   ({note})" if note else text) for name, text, note in facts(outcome, time_unit)),
+        *_lines(asked(outcome)),
+        *_lines(facts(outcome, time_unit)),
         *_named("proved", proofs(outcome)),
         *_simulated(outcome),
         *(("note", text) for text in outcome.notes or ()),
@@ -46,29 +37,22 @@ def summary(outcome: Outcome, time_unit: str, files: Sequence[Path], *, replaced
     return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])
 
 
+def _lines(found: Iterable[Fact]) -> Iterator[Line]:
+    return ((name, f"{text}   ({note})" if note else text) for name, text, note in found)
+
+
 def _data(outcome: Outcome, time_unit: str) -> Iterator[Line]:
     """An estimate with its standard deviations; each requirement with what the data reach."""
     estimate = estimate_table(outcome)
     if estimate:
         yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
-    yield from ((name, text) for name, text, _ in estimate_facts(outcome))
+    yield from _lines(estimate_facts(outcome))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(outcome, time_unit) or _NONE).rows:
         where = f" at {frequency} rad/{time_unit}" if frequency else ""
         verdicts.append(f"{name} {found}: the error that these data give is {ratio} of the admissible{where}")
     yield from _named("assessed", verdicts)
     yield from _named("verdict", verdict(outcome))
-
-
-def _asked(outcome: Outcome) -> Iterator[Line]:
-    status, found = outcome.status, outcome.objective
-    asked = objective(None if found is None else found.kind).asked
-    if status in GIVEN and outcome.identification is None:
-        asked = f"what the given excitation buys{GIVEN[status]}"
-    if asked and outcome.solver is not None and outcome.solver.method == "lmi":
-        asked += f" on a grid of {outcome.solver.details['grid']} frequencies"
-    if asked:
-        yield "asked", asked
 
 
 def _simulated(outcome: Outcome) -> Iterator[Line]:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -86,34 +86,34 @@ def sweep(
     the same command goes on where it was and computes nothing twice. A point that is infeasible or fails is
     a row with its reason.
     """
-    from inputdesign_cli.sweeps import running as batch
     from inputdesign_cli.sweeps.plan import build_plan
+    from inputdesign_cli.sweeps.running import SweepRun, list_points
 
     directory = asked.output or Path("runs") / f"{name_of(spec)}-sweep"
     stdin = str(spec) == STANDARD_STREAM
-    common: dict[str, Any] = {
-        "spec": Path("<stdin>") if stdin else spec,
-        "settings": asked.settings or [],
-        "zipped": asked.zipped,
-        "verb": asked.verb,
-        "confine": asked.confine,
-        "text": standard_input() if stdin else None,
-    }
+    plan = build_plan(
+        Path("<stdin>") if stdin else spec,
+        asked.settings or [],
+        zipped=asked.zipped,
+        verb=asked.verb,
+        confine=asked.confine,
+        text=standard_input() if stdin else None,
+    )
     if dry_run:
-        _list(batch.list_points(build_plan(**common), directory), json_output=json_output)
+        _list(list_points(plan, directory), json_output=json_output)
         return
     with _watched(directory, quiet=quiet) as line:
-        done = batch.run_sweep(
-            **common,
-            directory=directory,
-            executor=workers.executor(quiet=quiet),
-            fail_fast=fail_fast,
-            rerun_failed=rerun_failed,
+        done = SweepRun(
+            plan,
+            directory,
+            workers.executor(quiet=quiet),
+            fail_fast,
+            rerun_failed,
             figures=plots,
             figure_format=figure_format,
             overwrite=asked.overwrite,
             watch=line,
-        )
+        ).run()
     _show(done, json_output=json_output, quiet=quiet)
 
 

@@ -47,18 +47,18 @@ def show_trade(
         from inputdesign_cli.figures.sweep_figures import draw_into
         from inputdesign_cli.figures.sweep_table import read_sweep
         from inputdesign_cli.figures.trade import draw_trade
-        from inputdesign_cli.sweeps.running import run_sweep
+        from inputdesign_cli.sweeps.plan import build_plan
+        from inputdesign_cli.sweeps.running import SweepRun
         from inputdesign_cli.sweeps.trade import trade_of, trade_settings
 
-        run_sweep(
-            file,
-            [*(changes.overrides or []), *trade_settings(spec, words)],
-            directory=directory,
-            confine=changes.confine,
-            executor=Workers(jobs=0).executor(quiet=quiet),
+        settings = [*(changes.overrides or []), *trade_settings(spec, words)]
+        SweepRun(
+            build_plan(file, settings, confine=changes.confine),
+            directory,
+            Workers(jobs=0).executor(quiet=quiet),
             figure_format=shown.figure_format,
             overwrite=True,  # the directory belongs to the run, whatever was traded there before
-        )
+        ).run()
         found = trade_of(read_sweep(directory), spec)
         drawn = draw_into(directory, "trade", lambda page: draw_trade(found, page), shown.figure_format)
     if not quiet:

@@ -126,7 +126,7 @@ def watch(
 def _follow_spec(spec: Path, changes: Changes, place: Place, board: Board, figures: bool) -> None:
     """Solve and show, again and again."""
     from inputdesign_cli.live.pages import Followed, stamp, wait_for_change
-    from inputdesign_cli.questions.verbs import run_verb
+    from inputdesign_cli.questions import run_verb
 
     followed, files = Followed(spec.name), [spec]
     while True:

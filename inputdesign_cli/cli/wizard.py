@@ -67,8 +67,7 @@ def wizard(
         _refuse(unanswered)
     with said.located(), computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.outcome.run_directory import write_text
-        from inputdesign_cli.wizard.composing import compose
-        from inputdesign_cli.wizard.spectra import with_spectrum
+        from inputdesign_cli.wizard.composing import compose, with_spectrum
 
         if draft is None:
             draft = compose(known, output.stem, output.parent)
@@ -105,7 +104,7 @@ def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: boo
     keep(results, place, Shown(quiet=True))
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
         with computing(file, quiet=quiet, doing="what else would do"):
-            found = list(verdict(spec, results.result, _result, there))
+            found = verdict(spec, results.result, _result, there)
         if not quiet:
             lines = ["", *found, *to_log(spec, results, str(file)), f"files: {place.directory}"]
             typer.echo("\n".join(lines))

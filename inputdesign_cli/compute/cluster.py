@@ -46,7 +46,7 @@ class Cluster:
             known: dict[Any, Job] = {}
             while True:
                 with _reaching(self.address):
-                    free = _AHEAD * _threads(client) - len(known)
+                    free = _AHEAD * max(1, sum(client.nthreads().values())) - len(known)
                 for job in islice(source, max(free, 0)):
                     with _reaching(self.address):
                         known[client.submit(function, job, pure=False)] = job
@@ -72,17 +72,17 @@ class Cluster:
                 return wait(futures, timeout=_TICK, return_when="FIRST_COMPLETED").done
             with _reaching(self.address):
                 workers = client.nthreads()
-            now = time.monotonic()
             if workers:
                 alone_since = None
                 continue
             if alone_since is None:
-                alone_since = now
+                alone_since = time.monotonic()
                 self.tell(f"no workers at {self.address}; waiting")
-            if self.worker_timeout is not None and now - alone_since > self.worker_timeout:
+            alone = time.monotonic() - alone_since
+            if self.worker_timeout is not None and alone > self.worker_timeout:
                 raise DataError.because(
                     "cluster-no-workers",
-                    f"the cluster at {self.address} has had no workers for {now - alone_since:.0f} seconds",
+                    f"the cluster at {self.address} has had no workers for {alone:.0f} seconds",
                     "start workers (`dask worker ADDRESS --nthreads 1`), then give the same command again",
                 )
 
@@ -123,10 +123,6 @@ class Cluster:
 
 def _version() -> str:
     return __version__
-
-
-def _threads(client: Any) -> int:
-    return max(1, sum(client.nthreads().values()))
 
 
 @contextmanager

@@ -36,7 +36,7 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     if _HAS_ALARM:
         signal.signal(signal.SIGALRM, later)
         signal.setitimer(signal.ITIMER_REAL, _MOMENT)
-    if not (_HAS_ALARM and _imports(frame) and _has_patience()):
+    if not (_HAS_ALARM and _lets_imports_end(frame)):
         _came.append(number)
         raise _end(number)
 
@@ -50,19 +50,13 @@ def _is_under_way(handled: BaseException | None) -> bool:
     return False
 
 
-def _imports(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
-            return True
+def _lets_imports_end(frame: FrameType | None) -> bool:
+    """Whether modules are being imported, and not for too long since the interruption."""
+    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
         frame = frame.f_back
-    return False
-
-
-def _has_patience() -> bool:
-    now = time.monotonic()
-    if not _waiting_since:
-        _waiting_since.append(now)
-    return now - _waiting_since[0] < _PATIENCE
+    if frame is not None and not _waiting_since:
+        _waiting_since.append(time.monotonic())
+    return frame is not None and time.monotonic() - _waiting_since[0] < _PATIENCE
 
 
 @contextmanager

@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from multiprocessing.connection import Connection
@@ -33,93 +33,67 @@ class Processes:
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer, in the order in which they are finished."""
-        with closing(_Pool(self.count)) as pool:
-            yield from pool.run(function, jobs)
-
-
-class _Pool:
-    """An executor of the standard library that is replaced where one of its processes was killed."""
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._begin()
-
-    def _begin(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        there, self._held = context.Pipe(duplex=False)
-        self._executor = ProcessPoolExecutor(self._count, context, _end_with_the_caller, (there,))
-
-    def submit(self, function: Callable[..., Answer], *args: object) -> Future[Answer]:
-        with _inherited():
-            return self._executor.submit(function, *args)
-
-    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
-        source = iter(jobs)
-        pending: dict[Future[Answer], Job] = {}
-        while True:
-            for job in islice(source, self._count - len(pending)):
-                pending[self.submit(function, job)] = job
-            if not pending:
-                return
-            done, _ = wait(pending, return_when=FIRST_COMPLETED)
-            if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
-                done, _ = wait(pending)  # the others have ended as well
-                self.close()
-                self._begin()
-            for future, job in [(future, pending.pop(future)) for future in done]:
-                broken = isinstance(future.exception(), BrokenProcessPool)
-                yield _alone(function, job) if broken else _finished(job, future)
-
-    def close(self) -> None:
-        """End the processes, whatever they compute."""
-        self._held.close()
-        self._executor.shutdown(cancel_futures=True)
-
-
-def _alone(function: Callable[[Job], Answer], job: Job) -> Finished[Job, Answer]:
-    """Compute a job in a process of its own: its process was killed, or that of another job."""
-    for _ in range(_ATTEMPTS):
-        with closing(_Pool(1)) as pool, suppress(BrokenProcessPool):
-            return _finished(job, pool.submit(function, job))
-    return Finished(job, None, WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"))
-
-
-def _finished(job: Job, future: Future[Answer]) -> Finished[Job, Answer]:
-    """Return what a job has answered.
-
-    Raises:
-        BrokenProcessPool: its process was killed.
-    """
-    try:
-        return Finished(job, future.result())
-    except BrokenProcessPool:
-        raise
-    except Exception as error:
-        return Finished(job, None, error)
+        source, pending = iter(jobs), dict[Future[Answer], Job]()
+        more = True
+        while more:
+            with _pool(self.count) as pool:
+                while more and not any(map(_was_killed, pending)):
+                    for future in [future for future in pending if future.done()]:
+                        yield _finished(pending.pop(future), future)
+                    for job in islice(source, self.count - len(pending)):
+                        pending[pool.submit(function, job)] = job
+                    more = bool(pending)
+                    wait(pending, return_when=FIRST_COMPLETED)
+                wait(pending)  # the others have ended as well
+            for future in list(pending):
+                job = pending.pop(future)
+                yield _alone(function, job) if _was_killed(future) else _finished(job, future)
 
 
 @contextmanager
-def _inherited() -> Iterator[None]:
-    """Let processes that start inside compute on one thread, and ignore interrupts from the beginning."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    main = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if main else None
+def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Start processes that end with the block, whatever they compute, and with the caller."""
+    context = multiprocessing.get_context("spawn")
+    there, held = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, context, _begin, (there,))
     try:
-        yield
+        yield pool
     finally:
-        if main:
-            signal.signal(signal.SIGINT, handler)
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        held.close()
+        pool.shutdown(cancel_futures=True)
 
 
-def _end_with_the_caller(there: Connection) -> None:
+def _begin(there: Connection) -> None:
+    """Let a process compute on one thread, leave interrupts to the caller, and end with it."""
+    os.environ.update(ONE_THREAD)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
     def watch() -> None:
         there.poll(None)  # until the other end is closed
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def _was_killed(future: Future[Answer]) -> bool:
+    return future.done() and isinstance(future.exception(), BrokenProcessPool)
+
+
+def _finished(job: Job, future: Future[Answer]) -> Finished[Job, Answer]:
+    error = future.exception()
+    if error is None:
+        return Finished(job, future.result())
+    if not isinstance(error, Exception):
+        raise error
+    return Finished(job, None, error)
+
+
+def _alone(function: Callable[[Job], Answer], job: Job) -> Finished[Job, Answer]:
+    """Compute a job in a process of its own: its process was killed, or that of another job."""
+    for _ in range(_ATTEMPTS):
+        with _pool(1) as pool:
+            future = pool.submit(function, job)
+            wait([future])
+        if not _was_killed(future):
+            return _finished(job, future)
+    return Finished(job, None, WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"))

@@ -1,4 +1,4 @@
-"""Which part of a record estimates structures, and which judges them."""
+"""Choose which part of a record estimates structures, and which judges them."""
 
 from __future__ import annotations
 
@@ -39,31 +39,25 @@ def divided(parts: Parts) -> Division:
 
 
 def _divisions(parts: Parts) -> Iterator[Division]:
-    total = sum(len(y) for _, y in parts)
+    ends = np.cumsum([len(y) for _, y in parts])
+    total = int(ends[-1])
     for share in _CUTS:
-        yield _parted(parts, share * total // 100, f"the first {share} % and the rest")
+        # Of a record that ends before the cut, all.
+        at = [
+            max(share * total // 100 - int(end) + len(y), 0) for end, (_, y) in zip(ends, parts, strict=True)
+        ]
+        first, second = cut(parts, [slice(k) for k in at]), cut(parts, [slice(k, None) for k in at])
+        there = [[part for part in some if len(part[1])] for some in (first, second)]
+        yield Division(*there, f"the first {share} % and the rest")
     for count in _BLOCKS:
         length = max(total // count, 1)
         blocks = [
-            (k, begin)
-            for k, (_, y) in enumerate(parts)
+            (u[begin : begin + length], y[begin : begin + length])
+            for u, y in parts
             for begin in range(0, len(y), length)
             if len(y) - begin >= length // 2
         ]
-        first, second = (
-            [(parts[k][0][begin : begin + length], parts[k][1][begin : begin + length]) for k, begin in some]
-            for some in (blocks[::2], blocks[1::2])
-        )
-        yield Division(first, second, "blocks in turn")
-
-
-def _parted(parts: Parts, left: int, split: str) -> Division:
-    """Return the first samples of the records, `left` in all, and the others."""
-    begins = np.cumsum([0, *(len(y) for _, y in parts)])
-    at = [min(max(left - int(begin), 0), len(y)) for begin, (_, y) in zip(begins, parts, strict=False)]
-    first = [(u[:k], y[:k]) for k, (u, y) in zip(at, parts, strict=True) if k]
-    second = [(u[k:], y[k:]) for k, (u, y) in zip(at, parts, strict=True) if k < len(y)]
-    return Division(first, second, split)
+        yield Division(blocks[::2], blocks[1::2], "blocks in turn")
 
 
 def _moves(some: Parts, whole: Parts) -> bool:
@@ -76,17 +70,12 @@ def _moves(some: Parts, whole: Parts) -> bool:
     return bool(np.all(spread > _STILL * of_all))
 
 
-def busiest(parts: Parts, most: int) -> list[tuple[Array, Array]]:
-    """Return at most `most` samples: of a long record the stretch in which the inputs move most."""
-    return cut(parts, windows(parts, most))
-
-
 def cut(parts: Parts, at: Sequence[slice]) -> list[tuple[Array, Array]]:
     """Return a stretch of each record."""
     return [(u[own], y[own]) for (u, y), own in zip(parts, at, strict=True)]
 
 
-def windows(parts: Parts, most: int) -> list[slice]:
+def busiest(parts: Parts, most: int) -> list[slice]:
     """Return the stretches of the records in which the inputs move most, `most` samples in all."""
     length, found = max(most // len(parts), 2), list[slice]()
     for u, _ in parts:

@@ -45,7 +45,7 @@ def _line(parts: Parts, known: bool) -> float:
     the slope follows from the whitened line.
     """
     samples, longest = sum(len(y) for _, y in parts), max(len(y) for _, y in parts)
-    best = sweep(parts, max(min(_HIGHEST, samples // 12), 1), line=True).best(samples)
+    best = sweep(parts, max(min(_HIGHEST, samples // 12), 1), line=True).best
     # A line that goes beyond what the output does is that of a plant which integrates.
     reach = max(float(np.ptp(y)) for _, y in parts)
     if not np.isfinite(best.slope) or abs(best.slope) * longest >= reach:

@@ -57,38 +57,29 @@ def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
     Raises:
         TypeError: see `output_error_form`.
     """
-    simulated, errors, kept, missing, spread = [], [], [], [], []
-    kind = estimator(model, 1.0)
+    simulated, errors, kept, spread, missing = ([] for _ in range(5))
+    kind, form = estimator(model, 1.0), output_error_form(model)
+    plant = estimator(form, 1.0)
+    delay = plant.lateness(form.theta)
     for u, y in parts:
-        own, delay = simulate_free(model, u - u.mean(axis=0), y)
-        samples = np.arange(len(y))
+        samples, moves = np.arange(len(y)), u - u.mean(axis=0)
         counted = samples >= (delay if late is None else late)
-        unexplained = counted & (samples < delay)
-        own[unexplained] = y[counted].mean(axis=0) if np.any(counted) else 0.0
-        varying = y - (y[counted].mean(axis=0) if np.any(counted) else 0.0)
+        unexplained, level = counted & (samples < delay), y[counted].mean(axis=0) if np.any(counted) else 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-            record = Records(kind, ((u - u.mean(axis=0), y - y.mean(axis=0)),))
+            caused, _ = form.simulate(moves, np.zeros(y.shape), 1.0)
+            for i, start in enumerate(plant.starts(form.theta, len(y), delay, free=True)):
+                caused[:, i] += _nearest(start.free, y[:, i] - caused[:, i])
+            record = Records(kind, ((moves, y - y.mean(axis=0)),))
             predicted = record.begun_freely(kind.lateness(model.theta)).at(model.theta).errors
-        simulated.append(own)
-        errors.append(np.where(unexplained[:, None], varying, predicted))
+        missing.append(y - np.where(unexplained[:, None], level, caused))
+        simulated.append(y - missing[-1])
+        errors.append(np.where(unexplained[:, None], y - level, predicted))
         kept.append(counted)
-        spread.append(varying)
-        missing.append(y - own)
+        spread.append(y - level)
     at, every = np.concatenate(kept), np.concatenate(errors)
     varies = np.concatenate(spread)[at]
     simulation = percent(np.concatenate(missing)[at], varies)
     return Fits(simulation, percent(every[at], varies), np.concatenate(simulated), every, at)
-
-
-def beside(found: Sequence[Fits]) -> Fits:
-    """Return the fits of models of one output each to the same records as the fits of all outputs."""
-    return Fits(
-        tuple(fit for one in found for fit in one.simulation),
-        tuple(fit for one in found for fit in one.prediction),
-        np.concatenate([one.simulated for one in found], axis=1),
-        np.concatenate([one.errors for one in found], axis=1),
-        np.all([one.counted for one in found], axis=0),
-    )
 
 
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
@@ -112,22 +103,7 @@ def percent(errors: Array, varying: Array) -> tuple[float, ...]:
     return tuple(float(100.0 * (1.0 - x)) if np.isfinite(x) else -np.inf for x in left)
 
 
-def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
-    """Return the simulation (n, p) from u (n, r), with the level and start that bring it nearest to y (n, p).
-
-    With it the number of samples on which inputs from before act through a delay: these are made up.
-    """
-    error_form = output_error_form(model)
-    kind, theta = estimator(error_form, 1.0), error_form.theta
-    late = kind.lateness(theta)
-    with np.errstate(over="ignore", invalid="ignore"):
-        caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
-        for i, start in enumerate(kind.starts(theta, len(y), late, free=True)):
-            caused[:, i] += begun(start.free, y[:, i] - caused[:, i])
-    return caused, late
-
-
-def begun(responses: NDArray[np.float64], left: Array) -> Array:
+def _nearest(responses: NDArray[np.float64], left: Array) -> Array:
     """Return the combination of responses (m, n) nearest to what is left (n,); infinite where they are."""
     if not (np.all(np.isfinite(responses)) and np.all(np.isfinite(left))):
         return np.full(left.shape, np.inf)
@@ -135,9 +111,9 @@ def begun(responses: NDArray[np.float64], left: Array) -> Array:
     return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
 
 
-def is_steady(model: Model, samples: int) -> bool:
-    """Return whether a plant is stable and its slowest mode fades within `samples` samples."""
-    return output_error_form(model).radius < 1.0 - _LEAST_DECAY / samples
+def is_steady(model: Model, samples: int, decay: float = _LEAST_DECAY) -> bool:
+    """Return whether a plant is stable, and its slowest mode loses `decay` or more within the samples."""
+    return output_error_form(model).radius < 1.0 - decay / samples
 
 
 @singledispatch
@@ -159,16 +135,6 @@ def _(model: PolynomialModel) -> Model:
     return PolynomialModel(model.B, one, tuple(rows), one, one, model.covariance)
 
 
-@output_error_form.register
-def _(model: SampledModel) -> Model:
-    return model
-
-
-@output_error_form.register
-def _(model: Coloured) -> Model:
-    return output_error_form(model.plant)
-
-
-@output_error_form.register
-def _(model: Reparametrised) -> Model:
-    return output_error_form(model.coefficients)
+output_error_form.register(SampledModel, lambda model: model)
+output_error_form.register(Coloured, lambda model: output_error_form(model.plant))
+output_error_form.register(Reparametrised, lambda model: output_error_form(model.coefficients))

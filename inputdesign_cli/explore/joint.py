@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.explore.division import Division, cut, divided, windows
+from inputdesign_cli.explore.division import busiest, cut, divided
 from inputdesign_cli.explore.drift import levelled, slopes_of
 from inputdesign_cli.explore.fits import (
     NOT_COMPUTED,
     Fits,
     Parts,
-    beside,
     fits,
     is_steady,
     output_error_form,
@@ -76,8 +75,8 @@ class Found:
 
     @property
     def steady(self) -> bool:
-        """Return whether the plant is stable, as far as the record shows."""
-        return _steady(self.taken, self.model, sum(len(y) for _, y in self.used))
+        """Return whether the plant is stable, as far as the record shows, or integrates by its structure."""
+        return _steady(self.taken, self.model, self.used)
 
     @property
     def integrates(self) -> tuple[int, ...]:
@@ -94,9 +93,8 @@ class Found:
         return tuple(lingering(np.array(D), longest) > 0 for D in poles)
 
 
-def _steady(taken: Sequence[Candidate], model: Model, samples: int) -> bool:
-    """Return whether a plant is stable, as far as `samples` samples show, or integrates by its structure."""
-    return is_steady(model, samples) or any(c.orders.integrates for c in taken)
+def _steady(taken: Sequence[Candidate], model: Model, used: Parts) -> bool:
+    return is_steady(model, sum(len(y) for _, y in used)) or any(c.orders.integrates for c in taken)
 
 
 def explore_records(
@@ -117,47 +115,13 @@ def explore_records(
     slopes = slopes_of(moved, known=ramp)
     parts, moved = levelled(parts, slopes), levelled(moved, slopes)
     lines = (ramp or bool(np.any(slopes))) and len(parts) <= _MOST_LINES
-    division = divided(moved)
-    found = _structures(division, feedback, step, only, physical=not still)
-    at = windows(moved, _MOST_SAMPLES)
-    begins = np.cumsum([0, *(len(y) for _, y in parts)])[:-1].tolist()
-    together = _estimated(found, cut(moved, at), feedback, lines)
-    taken = together.taken
-    own = [_output(division.second, i) for i in range(len(taken))]
-    judged = [fits(c.model, second) for c, second in zip(taken, own, strict=True)]
-    idle = [fits(c.model, [(0.0 * u, y) for u, y in second]) for c, second in zip(taken, own, strict=True)]
-    whole = joined(taken, parts[0][0].shape[1], moving)
-    whole = whole.at(together.model.theta, together.model.covariance)
-    return Found(
-        tuple(found),
-        taken,
-        tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
-        whole,
-        replace(together.estimate, names=whole.names),
-        cut(parts, at),
-        np.concatenate([np.arange(b + k.start, b + k.stop) for b, k in zip(begins, at, strict=True)]),
-        beside(judged),
-        tuple(percent(own.errors, none.errors)[0] for own, none in zip(judged, idle, strict=True)),
-        division.split,
-        still,
-        slopes,
-    )
-
-
-def _structures(
-    division: Division, feedback: bool, step: float, only: Family | None, *, physical: bool
-) -> list[Chosen]:
-    """Return what is found for each output.
-
-    Raises:
-        SpecError: `no-structure`.
-    """
-    found, outputs = [], division.first[0][1].shape[1]
-    for i in range(outputs):
-        first, second = _output(division.first, i), _output(division.second, i)
-        chosen = explore_structure(first, second, feedback=feedback, step=step, physical=physical, only=only)
+    first, second, split = divided(moved)
+    found = list[Chosen]()
+    for i in range(slopes.size):
+        sides = _output(first, i), _output(second, i)
+        chosen = explore_structure(*sides, feedback=feedback, step=step, physical=not still, only=only)
         if chosen is None:
-            name = signal_name("y", i, outputs)
+            name = signal_name("y", i, slopes.size)
             raise bad_spec(
                 "no-structure",
                 f"no model of {name} could be estimated: the record does not determine its parameters",
@@ -165,61 +129,64 @@ def _structures(
                 key=name,
             )
         found.append(chosen)
-    return found
+    at = busiest(moved, _MOST_SAMPLES)
+    begins = np.cumsum([0, *(len(y) for _, y in parts)])[:-1].tolist()
+    taken, estimate, model = _estimated(found, cut(moved, at), feedback, lines)
+    of_first = joined(taken, len(moving), range(len(moving)))
+    judged, idle = fits(of_first, second), fits(of_first, [(0.0 * u, y) for u, y in second])
+    whole = joined(taken, len(moving) + len(still), moving).at(model.theta, model.covariance)
+    return Found(
+        tuple(found),
+        taken,
+        tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
+        whole,
+        replace(estimate, names=whole.names),
+        cut(parts, at),
+        np.concatenate([np.arange(b + k.start, b + k.stop) for b, k in zip(begins, at, strict=True)]),
+        judged,
+        percent(judged.errors, idle.errors),
+        split,
+        still,
+        slopes,
+    )
 
 
 def _output(parts: Parts, output: int) -> list[tuple[Array, Array]]:
     return [(u, y[:, output : output + 1]) for u, y in parts]
 
 
-@dataclass(frozen=True)
-class _Together:
-    """Structures of all outputs, and their estimate from `samples` samples, the whole record."""
-
-    taken: tuple[Candidate, ...]
-    estimate: Estimate
-    model: Model
-    samples: int
-
-    @property
-    def steady(self) -> bool:
-        """Return whether the plant is stable, or integrates by its structure."""
-        return _steady(self.taken, self.model, self.samples)
-
-    @property
-    def certain(self) -> bool:
-        """Return whether no parameter of the plant deviates by more than half its value."""
-        step = max(c.orders.step if c.orders.physical else 0.0 for c in self.taken)
-        plant, deviations = self.model.in_plant, np.sqrt(np.diag(self.estimate.covariance))
-        return certain(self.model.theta[plant], deviations[plant], self.model.dead_times[plant], step)
-
-
-def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool) -> _Together:
-    """Return the best structures on the whole record; the next ones where these are not certain there.
+def _estimated(
+    found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool
+) -> tuple[tuple[Candidate, ...], Estimate, Model]:
+    """Return the best structures and their estimate from the whole record; the next where it is not certain.
 
     Where all of them stand on the limit of stability, the first that is stable: it is like an integrator.
     """
-    reason, made = None, list[_Together]()
+    reason, made = None, list[tuple[tuple[bool, bool], tuple[Candidate, ...], Estimate, Model]]()
     for taken, good in _combinations(found):
         if made and not good:
             break
         names = " and ".join(dict.fromkeys(c.orders.family for c in taken))
         tell(Counted(f"models of the whole record, now {names}", len(made), len(made) + 1))
         try:
-            made.append(_together(taken, used, feedback, ramp))
+            estimate, model = _together(taken, used, feedback, ramp)
         except SpecError as error:
             reason = error
+            continue
         except NOT_COMPUTED:
             continue
         except KeyboardInterrupt:
             if not made:
                 raise
             break
-        else:
-            if made[-1].steady and made[-1].certain:
-                return made[-1]
+        steady = _steady(taken, model, used)
+        made.append(((not steady, output_error_form(model).radius > 1.0), taken, estimate, model))
+        step = max(c.orders.step if c.orders.physical else 0.0 for c in taken)
+        plant, deviations = model.in_plant, np.sqrt(np.diag(estimate.covariance))
+        if steady and certain(model.theta[plant], deviations[plant], model.dead_times[plant], step):
+            return made[-1][1:]
     if made:
-        return min(made, key=lambda one: (not one.steady, output_error_form(one.model).radius > 1.0))
+        return min(made, key=lambda one: one[0])[1:]
     raise reason or bad_spec(
         "no-structure",
         "no stable model explains the record",
@@ -228,33 +195,25 @@ def _estimated(found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool)
     )
 
 
-def _together(taken: tuple[Candidate, ...], used: Parts, feedback: bool, ramp: bool) -> _Together:
-    inputs, begun = used[0][0].shape[1], taken
+def _together(
+    taken: tuple[Candidate, ...], used: Parts, feedback: bool, ramp: bool
+) -> tuple[Estimate, Model]:
+    """Return the estimate of structures of all outputs, which begins at the parameters that they have."""
+
+    def identified(structure: Model, parts: Parts) -> tuple[Estimate, Model]:
+        u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
+        lengths, start = [len(part) for _, part in parts], structure.theta
+        estimate = identify(
+            structure, u, y, start=start, feedback=feedback, lengths=lengths, rest=False, near=True, ramp=ramp
+        )
+        return estimate, structure.at(estimate.theta, estimate.noise)
+
     if len(taken) > 1:
         # Where one output has several minima, a search for all of them seldom leaves a wrong one.
-        begun = tuple(
-            replace(c, model=_identified(c.model, _output(used, i), feedback, ramp)[1])
-            for i, c in enumerate(taken)
-        )
-    estimate, model = _identified(joined(begun, inputs, range(inputs)), used, feedback, ramp)
-    return _Together(taken, estimate, model, sum(len(y) for _, y in used))
-
-
-def _identified(structure: Model, used: Parts, feedback: bool, ramp: bool) -> tuple[Estimate, Model]:
-    """Return the estimate near the parameters that a structure has."""
-    u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
-    estimate = identify(
-        structure,
-        u,
-        y,
-        start=structure.theta,
-        feedback=feedback,
-        lengths=[len(part) for _, part in used],
-        rest=False,
-        near=True,
-        ramp=ramp,
-    )
-    return estimate, structure.at(estimate.theta, estimate.noise)
+        each = [identified(c.model, _output(used, i))[1] for i, c in enumerate(taken)]
+        taken = tuple(replace(c, model=model) for c, model in zip(taken, each, strict=True))
+    inputs = used[0][0].shape[1]
+    return identified(joined(taken, inputs, range(inputs)), used)
 
 
 def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[tuple[Candidate, ...], bool]]:
@@ -279,22 +238,15 @@ def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[tuple[Candidate, ..
 
 
 def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
-    """Return one model that joins models of single outputs with structures of one kind.
+    """Return one model of `inputs` inputs that joins models of single outputs with structures of one kind.
 
-    Args:
-        inputs: number of inputs of the joint model. Sampled single models have the `moving` ones only,
-            process models have all.
+    Sampled single models have the `moving` inputs only, and the others no effect; process models have all.
     """
     processes = [(c.orders, c.model.theta) for c in taken if c.orders.physical is True]
     if processes:
         shapes, thetas = zip(*processes, strict=True)
         return process_models(shapes, thetas, np.eye(len(shapes)))
-    single = [c.orders.model().at(c.model.theta) for c in taken if c.orders.physical is False]
-    return _embedded(single, inputs, moving)
-
-
-def _embedded(models: Sequence[PolynomialModel], inputs: int, moving: Sequence[int]) -> PolynomialModel:
-    """Return models of one output each as one among `inputs` inputs; those not `moving` have no effect."""
+    models = [c.orders.model().at(c.model.theta) for c in taken if c.orders.physical is False]
     outputs = range(len(models))
     B = [[np.zeros(1)] * inputs for _ in outputs]
     F = [[np.ones(1)] * inputs for _ in outputs]
@@ -308,6 +260,6 @@ def _embedded(models: Sequence[PolynomialModel], inputs: int, moving: Sequence[i
         tuple(map(tuple, F)),
         tuple(model.C[0] for model in models),
         tuple(model.D[0] for model in models),
-        np.diag([float(model.covariance[0, 0]) for model in models]),
+        np.eye(len(models)),
         delays=tuple(map(tuple, delays)),
     )

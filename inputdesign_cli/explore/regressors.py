@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Sequence
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.explore.fits import Parts
 from inputdesign_cli.identification.checks import check_varying
 
 _FEWEST = 30
@@ -29,7 +31,7 @@ def residuals(rows: Sequence[Array], targets: Sequence[Array]) -> list[Array]:
     return [target - own @ solution for own, target in zip(rows, targets, strict=True)]
 
 
-def moving_in(parts: Sequence[tuple[Array, Array]]) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]:
+def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]:
     """Return the inputs that never move, and the records without them.
 
     Raises:
@@ -38,10 +40,8 @@ def moving_in(parts: Sequence[tuple[Array, Array]]) -> tuple[tuple[int, ...], li
     u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
     _check_length(len(y), _FEWEST)
     still = tuple(int(j) for j in np.flatnonzero(np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0)))
-    if len(still) == u.shape[1]:
-        check_varying(_UNKNOWN, u, y)
     moving = [j for j in range(u.shape[1]) if j not in still]
-    check_varying(_UNKNOWN, u[:, moving], y)
+    check_varying(_UNKNOWN, u[:, moving] if moving else u, y)
     _check_length(len(y), _FEWEST * (len(moving) + 1) // 2)
     return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
 
@@ -58,7 +58,7 @@ def _check_length(samples: int, needed: int) -> None:
         )
 
 
-def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) -> int:
+def order_of_excitation(parts: Parts, most: int = 50) -> int:
     """Return the order to which all inputs together are persistently exciting, `most` at most.
 
     The largest n for which n delays of every input, and a level, are linearly independent ([ljung-1999],
@@ -66,25 +66,22 @@ def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) ->
     """
     longest = max((u for u, _ in parts), key=len)
     x = longest - longest.mean(axis=0)
-    least, beyond = 0, max(min(most, len(x) // (3 * x.shape[1])), 1) + 1
-    if _independent(x, beyond - 1):  # rows of few delays include all rows of more: a step may stand there
-        return beyond - 1
-    while beyond - least > 1:
-        middle = (least + beyond) // 2
-        least, beyond = (middle, beyond) if _independent(x, middle) else (least, middle)
-    return least
+    most = max(min(most, len(x) // (3 * x.shape[1])), 1)
+
+    def dependent(delays: int) -> bool:
+        columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
+        columns = columns - columns.mean(axis=0)
+        gram = columns.T @ columns
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] <= _FAINT * delays)
+
+    # Rows of few delays include all rows of more: a step may stand there.
+    if not dependent(most):
+        return most
+    return bisect.bisect_left(range(1, most), True, key=dependent)
 
 
-def _independent(x: Array, delays: int) -> bool:
-    """Return whether signals x (n, r) at lags 0 to `delays` - 1, and a level, are linearly independent."""
-    columns = np.hstack([x[delays - lag : len(x) - lag] for lag in range(delays)])
-    columns = columns - columns.mean(axis=0)
-    gram = columns.T @ columns
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    return bool(np.linalg.eigvalsh(gram / np.outer(scale, scale))[0] > _FAINT * delays)
-
-
-def left_of_inputs(parts: Sequence[tuple[Array, Array]]) -> list[float]:
+def left_of_inputs(parts: Parts) -> list[float]:
     """Return the share of each input's power that the other inputs and their pasts do not explain."""
     inputs, samples = parts[0][0].shape[1], sum(len(u) for u, _ in parts)
     lags = min(_PAST, samples // (_PER_LAG * inputs))
@@ -93,8 +90,7 @@ def left_of_inputs(parts: Sequence[tuple[Array, Array]]) -> list[float]:
         return [1.0] * inputs
     found = []
     for j in range(inputs):
-        others = [np.delete(u, j, axis=1) for u in long]
-        own = [u[lags:, j] for u in long]
+        others, own = [np.delete(u, j, axis=1) for u in long], [u[lags:, j] for u in long]
         left = residuals([np.column_stack([other[lags:], past(other, lags)]) for other in others], own)
         found.append(sum(float(e @ e) for e in left) / max(sum(float(x @ x) for x in own), 1e-300))
     return found

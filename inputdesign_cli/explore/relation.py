@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.explore.division import busiest
+from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import Parts, output_error_form
 from inputdesign_cli.explore.regressors import past, residuals
 from inputdesign_cli.identification import ScoreTest
@@ -116,7 +116,7 @@ def early_answers(parts: Parts) -> list[ScoreTest]:
     Args:
         parts: records u (n, r), y (n, p) of an open loop.
     """
-    lags, parts = _lags(parts), busiest(parts, _MOST_SAMPLES)
+    lags, parts = _lags(parts), cut(parts, busiest(parts, _MOST_SAMPLES))
     long = _centred(parts, 4 * (lags + _AHEAD))
     if not long:
         return []

@@ -1,7 +1,7 @@
 """Find the structure that explains an output: estimated on one part of the record, validated on another.
 
 A sweep of regressions gives delays and orders. An autoregression of its residuals whitens the noise, and a
-second sweep of the whitened records gives starts. About a dozen structures are then estimated by output
+second sweep of the whitened records gives starts. Up to a dozen structures are then estimated by output
 errors of the whitened records, which are prediction errors for that noise.
 
 Structures that simulate unseen data about as well count alike. Of these the criterion takes one, in which
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.explore.division import busiest
+from inputdesign_cli.explore.division import busiest, cut
 from inputdesign_cli.explore.fits import NOT_COMPUTED, Parts, fits, is_steady
 from inputdesign_cli.explore.structures import Orders, Process
 from inputdesign_cli.explore.sweep import (
@@ -49,16 +49,24 @@ from inputdesign_cli.plant import Model
 _AS_GOOD, _POINTS, _EXPLAINED = 1.2, 2.0, 0.99
 # The largest deviation of a parameter of the plant, in shares of its value.
 _UNCERTAIN = 0.5
-# What a parameter must take off the variance of prediction errors, however long the record is.
-_WORTH = 0.01
-# What gains, time constants and dead times are worth by the same measure, beside polynomials.
-_NAMED = 0.02
+# What a parameter must take off the variance of prediction errors, however long the record is; and what
+# gains, time constants and dead times are worth by the same measure, beside polynomials.
+_WORTH, _NAMED = 0.01, 0.02
+_MOST_SAMPLES = 4000
+_HIGHEST, _HIGHEST_ARX, _ARX_KEPT = 5, 8, 2
+# Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
+_PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
+# A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
+_SETTLES, _RUN_OFF = 5, 2
 
 Ranges = tuple[tuple[int, int | None], ...]
 """Delays from the one to the other; None: the record sets no upper limit."""
 
 Shape = Orders | Process
 """A structure for one output."""
+
+Family = Literal["fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"]
+"""A structure that a user may fix."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +82,6 @@ class Candidate:
         steady: whether its plant is stable, as far as the record shows.
         certain: whether no parameter of the plant deviates by more than half its value.
         failed: names of the tests of its residuals that fail.
-        by_prediction: whether prediction errors alone rank it, as in a loop.
     """
 
     orders: Shape
@@ -88,21 +95,6 @@ class Candidate:
     steady: bool
     certain: bool
     failed: tuple[str, ...]
-    by_prediction: bool
-
-
-def price(unknowns: int, samples: int) -> float:
-    """Return the price of parameters in the log of a variance: that of BIC, and a share at least."""
-    return unknowns * max(float(np.log(samples)) / samples, _WORTH)
-
-
-def certain(theta: Array, deviations: Array, dead_times: NDArray[np.bool_], step: float) -> bool:
-    """Return whether no parameter (k,) deviates by more than half its value.
-
-    A dead time may deviate by up to a sample, `step`: it may be zero.
-    """
-    most = np.maximum(_UNCERTAIN * np.abs(theta), np.where(dead_times, step, 0.0))
-    return bool(np.all(deviations <= most))
 
 
 @dataclass(frozen=True)
@@ -127,42 +119,48 @@ class Chosen:
         """Return the one to take."""
         return self.candidates[0]
 
-    @property
-    def most(self) -> int:
-        """Return the longest delay that was tried."""
-        return self.swept.most
-
-    @property
-    def by_order(self) -> dict[int, float]:
-        """Return the errors (rms) of the regressions on the first part, by order."""
-        return {n: float(np.sqrt(one.loss)) for n, one in self.swept.by_order.items()}
-
     def ranges(self, candidate: Candidate) -> Ranges:
         """Return the 95 % interval of each delay of a candidate."""
         orders, model = candidate.orders, candidate.model
         found = orders.ranges(model.theta[model.in_plant], candidate.deviations)
         if not found:
-            near = self.swept.near(orders.order)
-            found = delay_ranges(self.estimated, near, least=self.least, most=self.most)
-            own = zip(found, orders.delays, strict=True)
-            found = tuple((min(low, delay), max(high, delay)) for (low, high), delay in own)
+            swept = self.swept
+            found = delay_ranges(
+                self.estimated, swept.near(orders.order), least=self.least, most=swept.most, own=orders.delays
+            )
         # A Gaussian estimate of a dead time may be wider than the record that it is made from.
         longest = max(len(y) for _, y in self.estimated)
         return tuple((low, high if high <= longest else None) for low, high in found)
 
 
-def ranked(usable: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+def price(unknowns: int, samples: int) -> float:
+    """Return the price of parameters in the log of a variance: that of BIC, and a share at least."""
+    return unknowns * max(float(np.log(samples)) / samples, _WORTH)
+
+
+def certain(theta: Array, deviations: Array, dead_times: NDArray[np.bool_], step: float) -> bool:
+    """Return whether no parameter (k,) deviates by more than half its value.
+
+    A dead time may deviate by up to a sample, `step`: it may be zero.
+    """
+    most = np.maximum(_UNCERTAIN * np.abs(theta), np.where(dead_times, step, 0.0))
+    return bool(np.all(deviations <= most))
+
+
+def ranked(
+    usable: Sequence[Candidate], *, by_prediction: bool = False
+) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
     """Return the candidates, the preferred one first, and the subset that simulates about equally well.
 
     In closed loop the input depends on the noise, so that a wrong plant may simulate the output better than
-    the right one. Prediction errors are free of this bias ([ljung-1999], Section 13.4).
+    the right one. Prediction errors are free of this bias ([ljung-1999], Section 13.4): they alone count.
     """
     error = min(100.0 - c.validation for c in usable)
     most, explained = max(_AS_GOOD * error, error + _POINTS), 1e4 - error**2
 
     def is_good(c: Candidate) -> bool:
         own = 100.0 - c.validation
-        return c.by_prediction or (own <= most and 1e4 - own**2 >= _EXPLAINED * explained)
+        return by_prediction or (own <= most and 1e4 - own**2 >= _EXPLAINED * explained)
 
     def preference(c: Candidate) -> tuple[float, ...]:
         by = c.criterion - _NAMED * c.orders.physical if is_good(c) else -c.validation
@@ -170,17 +168,6 @@ def ranked(usable: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], tuple[Ca
 
     every = tuple(sorted(usable, key=preference))
     return every, tuple(c for c in every if is_good(c))
-
-
-Family = Literal["fopdt", "sopdt", "integrator", "arx", "armax", "oe", "bj"]
-"""A structure that a user may fix."""
-
-_MOST_SAMPLES = 4000
-_HIGHEST, _HIGHEST_ARX, _ARX_KEPT = 5, 8, 2
-# Samples to a parameter, at least; steps of a search; rounds of whitening, and in a loop.
-_PER_PARAMETER, _STEPS, _ROUNDS, _ROUNDS_IN_LOOP = 5, 30, 1, 3
-# A dead time may settle _SETTLES samples beyond the sweep's, and at most at _RUN_OFF times the longest.
-_SETTLES, _RUN_OFF = 5, 2
 
 
 @dataclass(frozen=True)
@@ -210,65 +197,45 @@ class _Records:
         """Return the number of samples that estimate."""
         return sum(len(y) for _, y in self.first)
 
-    def candidate(self, orders: Shape) -> Candidate | None:
-        """Return a structure, estimated and judged; None if that fails."""
-        try:
-            return self._searched(orders)
-        except NOT_COMPUTED:
-            return None
+    def candidate(self, shape: Shape) -> Candidate:
+        """Return a structure, estimated and judged.
 
-    def _searched(self, orders: Shape) -> Candidate:
-        parts = self.first if orders.shared else self.white
-        near = self.swept.near(orders.order)
-        if not orders.physical and near.delays != orders.delays:
-            near = Regressed(parts, near.order).output_error(orders.delays, near.F)
-        theta, deviations, variance, converged, failing = self._estimated(
-            orders.model(), parts, orders.start(near)
-        )
-        orders = orders.at(theta)
-        if max(orders.delays) > _RUN_OFF * self.swept.most:
-            raise ArithmeticError("a dead time has run off to where nothing answers")
-        model = orders.noisy(theta, self.C, self.D)
-        model = model.at(model.theta, np.array([[variance]]))
-        plant = deviations[orders.model().in_plant]
-        judged = fits(model, self.judging, self.late)
-        unknowns = orders.size + (0 if orders.physical else len(orders.delays))
-        slow = orders.physical and orders.slowest(theta) > self.samples * self.step
-        return Candidate(
-            orders.coloured(self.C, self.D),
-            model,
-            plant,
-            fits(model, self.first, self.late).simulation[0],
-            judged.simulation[0],
-            judged.prediction[0],
-            float(np.log(max(variance, 1e-300))) + price(unknowns, self.samples),
-            converged or orders.physical,  # kinks at dead times stop a quick search early
-            orders.integrates or (is_steady(model, self.samples) and not slow),
-            certain(
-                model.theta[model.in_plant],
-                plant,
-                model.dead_times[model.in_plant],
-                self.step if orders.physical else 0.0,
-            ),
-            failing,
-            self.feedback,
-        )
-
-    def _estimated(
-        self, structure: Model, parts: Parts, start: Array
-    ) -> tuple[Array, Array, float, bool, tuple[str, ...]]:
-        """Return parameters (k,), deviations, variance of the errors, whether it settled, failing tests."""
-        kind = estimator(structure, 1.0)
+        Raises:
+            Exception: one of `NOT_COMPUTED`.
+        """
+        parts, near = self.first if shape.shared else self.white, self.swept.near(shape.order)
+        if not shape.physical and near.delays != shape.delays:
+            near = Regressed(parts, near.order).output_error(shape.delays, near.F)
+        kind, start = estimator(shape.model(), 1.0), shape.start(near)
         check_length(sum(len(y) for _, y in parts), len(kind.names), kind.recent, outputs=1)
         records = Records(kind, tuple(centred(parts))).begun_freely(kind.lateness(start))
         found = search(records, records.stabilised(start)[None], starts=1, quick=_STEPS)
-        point, white = found.point, White.of(records, found.point)
-        tests = score_tests(records, point.theta, white, feedback=self.feedback, robust=None)
-        noise = noise_of(point, kind.own())
+        point, theta, noise = found.point, found.point.theta, noise_of(records, found.point)
         factor = factor_at(records, point, noise)
         half = scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True)
-        failing = tuple(test.name for test in failed(tests))
-        return point.theta, np.linalg.norm(half, axis=0), float(noise[0, 0]), found.converged, failing
+        tests = score_tests(records, theta, White.of(records, point), feedback=self.feedback, robust=None)
+        deviations = np.linalg.norm(half, axis=0)[shape.model().in_plant]
+        shape = shape.at(theta)
+        if max(shape.delays) > _RUN_OFF * self.swept.most:
+            raise ArithmeticError("a dead time has run off to where nothing answers")
+        model = shape.noisy(theta, self.C, self.D)
+        model, plant = model.at(model.theta, noise), model.in_plant
+        judged = fits(model, self.judging, self.late)
+        unknowns, physical = shape.size + (0 if shape.physical else len(shape.delays)), bool(shape.physical)
+        return Candidate(
+            shape.coloured(self.C, self.D),
+            model,
+            deviations,
+            fits(model, self.first, self.late).simulation[0],
+            judged.simulation[0],
+            judged.prediction[0],
+            float(np.log(max(noise[0, 0], 1e-300))) + price(unknowns, self.samples),
+            found.converged or physical,  # kinks at dead times stop a quick search early
+            # Of a plant by its time constants, none may be longer than the record.
+            shape.integrates or is_steady(model, self.samples, *([1.0] if physical else [])),
+            certain(model.theta[plant], deviations, model.dead_times[plant], self.step * physical),
+            tuple(test.name for test in failed(tests)),
+        )
 
 
 def explore_structure(
@@ -289,40 +256,41 @@ def explore_structure(
         physical: whether plants in s are tried.
         only: the structure to take.
     """
-    records = _prepared(busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES), feedback, step, only)
+    first, second = (cut(parts, busiest(parts, _MOST_SAMPLES)) for parts in (first, second))
+    records = _prepared(first, second, feedback, step, only)
     every = dict.fromkeys(_shapes(records, physical) if only is None else _fixed(records, only))
     shapes = [shape for shape in every if _PER_PARAMETER * shape.size <= records.samples]
     found = list[Candidate]()
-    try:
-        for count, shape in enumerate(shapes):
-            tell(Counted(f"structures estimated, now {shape.family}", count, len(shapes)))
-            candidate = records.candidate(shape)
-            found += [candidate] if candidate is not None else []
-    except KeyboardInterrupt:
-        if not found:
-            raise
+    for count, shape in enumerate(shapes):
+        tell(Counted(f"structures estimated, now {shape.family}", count, len(shapes)))
+        try:
+            found.append(records.candidate(shape))
+        except NOT_COMPUTED:
+            continue
+        except KeyboardInterrupt:
+            if not found:
+                raise
+            break
     usable = [c for c in found if np.isfinite(c.validation)]
     if not usable:
         return None
     estimated = {c.orders.family for c in found}
-    dropped = tuple(
-        dict.fromkeys(s.family for s in shapes if s.coloured(records.C, records.D).family not in estimated)
-    )
-    return Chosen(*ranked(usable), records.first, records.swept, int(feedback), dropped)
+    wanted = dict.fromkeys(shape.coloured(records.C, records.D).family for shape in shapes)
+    dropped = tuple(family for family in wanted if family not in estimated)
+    chosen = ranked(usable, by_prediction=feedback)
+    return Chosen(*chosen, records.first, records.swept, int(feedback), dropped)
 
 
 def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: Family | None) -> _Records:
     """Return the records with their noise whitened, and the regressions of all orders."""
     samples, inputs = sum(len(y) for _, y in first), first[0][0].shape[1]
     highest = max(min(_HIGHEST, samples // (6 * (inputs + 1))), 1)
-    swept, white, A = sweep(first, highest, least=int(feedback)), first, np.ones(1)
-    C = D = np.ones(1)
+    swept, white, C, D = sweep(first, highest, least=int(feedback)), first, np.ones(1), np.ones(1)
     for _ in range(0 if only == "oe" else _ROUNDS_IN_LOOP if feedback else _ROUNDS):
-        best = swept.best(samples)
-        left = Regressed(first, best.order).errors(best)
-        A = whitening(left)
-        C, D = noise_model(left, int(feedback or only == "bj"))
-        white = whitened(first, A)
+        left = Regressed(first, swept.best.order).errors(swept.best)
+        if all(np.all(np.isfinite(e)) for e in left):
+            C, D = noise_model(left, int(feedback or only == "bj"))
+            white = whitened(first, whitening(left))
         swept = sweep(white, highest, least=int(feedback))
     longest = max(len(y) for _, y in judging)
     late = max(max(one.delays) for one in swept.by_order.values()) + _SETTLES
@@ -331,17 +299,17 @@ def _prepared(first: Parts, judging: Parts, feedback: bool, step: float, only: F
 
 def _shapes(records: _Records, physical: bool) -> Iterator[Shape]:
     """Yield the structures to try, the simplest first."""
-    swept, step = records.swept, records.step
-    near, highest = swept.best(records.samples), max(swept.by_order)
+    swept, step, near = records.swept, records.step, records.swept.best
     yield Orders("FIR", swept.near(1).delays, 1)
     if physical:
         yield from (Process(swept.near(n).delays, n, step) for n in range(1, min(max(near.order, 2), 3) + 1))
+    if physical and near.order > 1:
         yield Process(swept.near(2).delays, 2, step, zero=True)
     if physical and lingering(swept.near(1).F, records.samples):
         yield Process(swept.near(1).delays, 0, step)
-    for n in sorted({1, near.order, min(near.order + 1, highest)}):
+    for n in sorted({1, near.order}):
         yield Orders("OE", swept.near(n).delays, n if n > 1 else 2, f=n)
-    if highest > 1 and not records.feedback:
+    if max(swept.by_order) > 1 and not records.feedback:
         yield Orders("ARMAX", swept.near(2).delays, 2, a=2, c=2)
     yield from _best_arx(records)
 
@@ -351,24 +319,22 @@ def _fixed(records: _Records, only: Family) -> Iterator[Shape]:
     swept = records.swept
     if only == "arx":
         yield from _best_arx(records)
-    elif only in ("oe", "bj", "armax"):
-        for n, one in swept.by_order.items():
-            if only == "armax":
-                yield Orders("ARMAX", one.delays, n, a=n, c=n)
-            else:
-                yield Orders("OE", one.delays, n, f=n)
+    elif only == "armax":
+        yield from (Orders("ARMAX", one.delays, n, a=n, c=n) for n, one in swept.by_order.items())
+    elif only in ("oe", "bj"):
+        yield from (Orders("OE", one.delays, n, f=n) for n, one in swept.by_order.items())
     else:
         order = {"fopdt": 1, "sopdt": 2, "integrator": 0}[only]
         yield Process(swept.near(order).delays, order, records.step)
 
 
-def _best_arx(records: _Records) -> Iterator[Orders]:
-    """Yield the ARX models that the criterion prefers, of the delays of the sweep."""
-    delays, samples = records.swept.best(records.samples).delays, records.samples
+def _best_arx(records: _Records) -> list[Orders]:
+    """Return the ARX models that the criterion prefers, of the delays of the sweep."""
+    delays, samples = records.swept.best.delays, records.samples
     highest = max(min(_HIGHEST_ARX, samples // (6 * (len(delays) + 1))), 1)
     listed = [
         (float(np.log(max(loss, 1e-300))) + price(len(theta), rows), Orders("ARX", delays, b, a=a))
         for a, b, theta, loss, rows in arx_models(records.first, highest, delays)
         if np.all(np.isfinite(theta))
     ]
-    yield from (orders for _, orders in sorted(listed, key=lambda one: one[0])[:_ARX_KEPT])
+    return [orders for _, orders in sorted(listed, key=lambda one: one[0])[:_ARX_KEPT]]

@@ -15,6 +15,7 @@ from inputdesign_cli.expressions import Expression
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
+    Model,
     Parametrisation,
     PolynomialModel,
     Reparametrised,
@@ -189,15 +190,6 @@ class Process:
         low, high = (self._first(np.maximum(x, 0.0)) for x in (late - width, late + width))
         return tuple(zip(low, high, strict=True))
 
-    def slowest(self, theta: Array) -> float:
-        """Return the longest time constant at parameters (k,), also with zeta beyond one."""
-        width, found = len(self.letters), [0.0]
-        for row in theta[: width * len(self.delays)].reshape(-1, width).tolist():
-            named = dict(zip(self.letters, row, strict=True))
-            damped = max(named.get("zeta", 1.0), 1.0)
-            found += [named.get("T", 0.0) * (damped + np.sqrt(damped**2 - 1.0)), named.get("T3", 0.0)]
-        return float(max(found))
-
     def _late(self, theta: Array) -> Array:
         """Return the dead times (r,)."""
         width = len(self.letters)
@@ -250,76 +242,66 @@ class Process:
         return [T, max(0.5 * float(np.real(pair.sum())) * T, 0.02), 1.0 / abs(rest[-1])][: self.order]
 
 
-@dataclass(frozen=True)
-class _Texts:
-    """The entries of a transfer matrix as a spec writes them, and the values (by name) of its parameters."""
+def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance: Array) -> Reparametrised:
+    """Return structures of one output each, with their parameters (k,), as one model."""
+    above, below, late, values = [], [], [], dict[str, float]()
+    for i, (row, theta) in enumerate(zip(rows, thetas, strict=True), start=1):
+        single = len(rows) == len(row.delays) == 1
+        own = [
+            {letter: letter if single else f"{letter}_{i}{j}" for letter in row.letters}
+            for j in range(1, len(row.delays) + 1)
+        ]
+        every = [name for names in own for name in names.values()]
+        values |= dict(zip(every, theta.tolist(), strict=False))  # those of the noise follow
+        top = ("{K}*{Tz}", "{K}") if row.zero else ("{K}",)
+        above.append([[text.format(**names) for text in top] for names in own])
+        below.append([[text.format(**names) for text in _BELOW[row.order]] for names in own])
+        late.append([names["L"] for names in own])
+    names, at = tuple(values), np.array(list(values.values()))
 
-    numerator: list[list[list[str]]]
-    denominator: list[list[list[str]]]
-    delay: list[list[str]]
-    values: dict[str, float]
-
-    @classmethod
-    def of(cls, rows: Sequence[Process], thetas: Sequence[Array]) -> _Texts:
-        inputs = len(rows[0].delays)
-        single = len(rows) == inputs == 1
-        above, below, late, values = [], [], [], dict[str, float]()
-        for i, (row, theta) in enumerate(zip(rows, thetas, strict=True), start=1):
-            own = [
-                {letter: letter if single else f"{letter}_{i}{j + 1}" for letter in row.letters}
-                for j in range(inputs)
-            ]
-            every = [name for names in own for name in names.values()]
-            values |= dict(zip(every, theta.tolist(), strict=False))  # those of the noise follow
-            top = ("{K}*{Tz}", "{K}") if row.zero else ("{K}",)
-            above.append([[text.format(**names) for text in top] for names in own])
-            below.append([[text.format(**names) for text in _BELOW[row.order]] for names in own])
-            late.append([names["L"] for names in own])
-        return cls(above, below, late, values)
-
-    def continuous(self, covariance: Array) -> ContinuousModel:
-        """Return the matrix with the values of its parameters."""
-        names, at = tuple(self.values), np.array(list(self.values.values()))
-
-        def ascending(rows: list[list[list[str]]]) -> tuple[tuple[Array, ...], ...]:
-            return tuple(
-                tuple(np.array([Expression(text).at(names, at)[0] for text in entry[::-1]]) for entry in row)
-                for row in rows
-            )
-
-        late = tuple(tuple(np.array([self.values[name]]) for name in row) for row in self.delay)
-        return ContinuousModel.monic(
-            ascending(self.numerator), ascending(self.denominator), covariance, delay=late
+    def ascending(texts: list[list[list[str]]]) -> tuple[tuple[Array, ...], ...]:
+        return tuple(
+            tuple(np.array([Expression(text).at(names, at)[0] for text in entry[::-1]]) for entry in row)
+            for row in texts
         )
 
-    def term(self, parameter: Parameter) -> str:
+    def term(parameter: Parameter) -> str:
         """Return the expression of a coefficient of the monic matrix."""
         i, j = parameter.places[0]
         if parameter.letter == DELAY:
-            return self.delay[i][j]
-        entry = (self.numerator if parameter.letter == "b" else self.denominator)[i][j]
-        return f"({entry[-1 - parameter.power]})/({self.denominator[i][j][0]})"
+            return late[i][j]
+        entry = (above if parameter.letter == "b" else below)[i][j]
+        return f"({entry[-1 - parameter.power]})/({below[i][j][0]})"
 
-    def words(self) -> Words:
-        """Return them as a spec states them; a single entry without brackets."""
-        single = len(self.delay) == len(self.delay[0]) == 1
-        above, below, late = self.numerator, self.denominator, self.delay
-        plant = {
-            "parameters": dict(self.values),
-            "continuous": {
-                "numerator": above[0][0] if single else above,
-                "denominator": below[0][0] if single else below,
-                "delay": late[0][0] if single else late,
-            },
-            "sample": "zoh",
-        }
-        return Words(plant, {name: ("parameters", name) for name in self.values})
+    times = tuple(tuple(np.array([values[name]]) for name in row) for row in late)
+    matrix = ContinuousModel.monic(ascending(above), ascending(below), covariance, delay=times)
+    plant = SampledModel(matrix, rows[0].step)
+    model = _coloured(plant, rows, thetas)
+    noise = model.parameters[len(plant.parameters) :]
+    symbols = (*names, *(f"noise_{k}" for k in range(len(noise))))
+    parametrisation = Parametrisation(
+        (*names, *(parameter.name for parameter in noise)),
+        symbols,
+        np.array([*at, *(parameter.value for parameter in noise)]),
+        np.ones(len(symbols), dtype=bool),
+        tuple(map(Expression, (*map(term, plant.parameters), *symbols[len(names) :]))),
+    )
+    one = len(late) == len(late[0]) == 1  # a single entry is written without brackets
+    written = {
+        "numerator": above[0][0] if one else above,
+        "denominator": below[0][0] if one else below,
+        "delay": late[0][0] if one else late,
+    }
+    words = {"parameters": dict(values), "continuous": written, "sample": "zoh"}
+    return Reparametrised(
+        model, parametrisation, Words(words, {name: ("parameters", name) for name in values})
+    )
 
 
-def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance: Array) -> Reparametrised:
-    """Return structures of one output each, with their parameters (k,), as one model."""
-    texts = _Texts.of(rows, thetas)
-    plant = SampledModel(texts.continuous(covariance), rows[0].step)
+def _coloured(plant: SampledModel, rows: Sequence[Process], thetas: Sequence[Array]) -> Model:
+    """Return a plant with the noise of its rows, whose C and D stand last among their parameters."""
+    if not any(row.noise for row in rows):
+        return plant
     C, D = (
         tuple(
             np.concatenate([[1.0], theta[theta.size - (2 - k) * row.noise :][: row.noise]])
@@ -327,16 +309,4 @@ def process_models(rows: Sequence[Process], thetas: Sequence[Array], covariance:
         )
         for k in (0, 1)
     )
-    coloured = any(row.noise for row in rows)
-    model = Coloured(plant, C, D, (False,) * len(rows), (False,) * len(rows)) if coloured else plant
-    noise = model.parameters[len(plant.parameters) :]
-    symbols = (*texts.values, *(f"noise_{k}" for k in range(len(noise))))
-    terms = (*map(texts.term, plant.parameters), *symbols[len(texts.values) :])
-    parametrisation = Parametrisation(
-        (*texts.values, *(parameter.name for parameter in noise)),
-        symbols,
-        np.array([*texts.values.values(), *(parameter.value for parameter in noise)]),
-        np.ones(len(symbols), dtype=bool),
-        tuple(map(Expression, terms)),
-    )
-    return Reparametrised(model, parametrisation, texts.words())
+    return Coloured(plant, C, D, (False,) * len(rows), (False,) * len(rows))

@@ -15,20 +15,23 @@ import scipy
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore.fits import Parts
-from inputdesign_cli.explore.regressors import past, residuals
+from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.stability import reflected
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.plant.filtering import filtered
 
 _WIDE, _ROUNDS, _POLISH, _BESIDE = 3, 8, 3, 5
 _RIDGE = 1e-12
+# Where no coefficient of F changes by more, the rounds have settled.
+_SETTLED = 1e-6
+# So many orders in a row that BIC does not prefer end a sweep.
+_WORSE = 2
 # The longest delay that is tried, in samples and in shares of the longest record.
 _MOST_DELAY, _SHARE, _LONG = 300, 2, 6
 _CONFIDENCE = 0.95
 # Time constants of a root within a record, below which it may as well integrate.
 _FADES = 8.0
-# Orders of an autoregression for the noise, and samples that each lag takes.
-_LAGS, _PER_LAG = (0, 1, 2, 3, 5, 8, 12), 15
-_MOST_NOISE, _LONG_NOISE = 2, 12
+_MOST_NOISE = 2
 
 
 @dataclass(frozen=True)
@@ -61,19 +64,27 @@ class Regression:
 
 @dataclass(frozen=True)
 class Sweep:
-    """The best regression of every order, the longest delay that was tried, and the longest record."""
+    """The best regression of every order.
+
+    Attributes:
+        most: the longest delay that was tried.
+        longest, samples: of the longest record, and of all.
+    """
 
     by_order: dict[int, Regression]
     most: int
     longest: int
+    samples: int
 
-    def best(self, samples: int) -> Regression:
+    @property
+    def best(self) -> Regression:
         """Return the regression with the lowest BIC among the ones with the fewest integrating poles.
 
         Wandering noise looks like the free response of integrators.
         """
         return min(
-            self.by_order.values(), key=lambda one: (lingering(one.F, self.longest), one.criterion(samples))
+            self.by_order.values(),
+            key=lambda one: (lingering(one.F, self.longest), one.criterion(self.samples)),
         )
 
     def near(self, order: int) -> Regression:
@@ -90,21 +101,20 @@ def sweep(parts: Parts, highest: int, *, least: int = 0, line: bool = False) -> 
         line: whether the output drifts along one line through all records.
     """
     longest, inputs = max(len(y) for _, y in parts), parts[0][0].shape[1]
-    most = max(min(_MOST_DELAY, longest // _SHARE), 1)
-    begin, found = (max(least, 1),) * inputs, dict[int, Regression]()
+    samples, most = sum(len(y) for _, y in parts), max(min(_MOST_DELAY, longest // _SHARE), 1)
+    begin, found, price = (max(least, 1),) * inputs, dict[int, Regression](), list[float]()
     for n in range(1, highest + 1):
         # What acts before the longest delay is unknown: it counts, or all samples before are left out.
-        short = (longest // _LONG, 0)
+        short = (min(longest // _LONG, most), 0)
         wide: dict[int, list[tuple[int, int] | None]] = {1: [short, (most, most)], 2: [short, None]}
-        denominators = [np.ones(1), *(one.F for one in list(found.values())[-1:])]
-        tried = [
-            Regressed(parts, n, line).settled(begin, way, F, least)
-            for F in denominators
-            for way in wide.get(n, [None])
-        ]
-        found[n] = min(tried, key=lambda one: one.loss)
-        begin = found[n].delays
-    return Sweep(found, most, longest)
+        denominators = [np.ones(1), *(found[k].F for k in [n - 1] if k)]
+        regressed = Regressed(parts, n, line)
+        tried = [regressed.settled(begin, way, F, least) for F in denominators for way in wide.get(n, [None])]
+        found[n] = regressed.polished(min(tried, key=lambda one: one.loss), least)
+        begin, price = found[n].delays, [*price, found[n].criterion(samples)]
+        if len(price) - 1 - int(np.argmin(price)) == _WORSE:
+            break
+    return Sweep(found, most, longest, samples)
 
 
 @dataclass(frozen=True)
@@ -123,20 +133,24 @@ class Regressed:
     def settled(
         self, delays: tuple[int, ...], way: tuple[int, int] | None, F: Array, least: int
     ) -> Regression:
-        """Return a model, its delays from a wide range first, then from the next ones.
+        """Return a model, its delays of `least` or more from a wide range.
 
         Args:
             way: the longest delay of the wide range, and the samples to leave out; None: no wide range.
             F: where the search begins.
-            least: the shortest delay.
         """
         for _ in range(_WIDE if way else 0):
-            most, skipped = way or (0, 0)
+            (most, skipped), before = way or (0, 0), delays
             for j in range(len(delays)):
                 delays = self._best_delay(F, delays, j, (least, max(most, least + 1)), skipped)
             F = self._denominator(F, delays)
-        best = self.output_error(delays, F)
-        for j in range(len(delays)):
+            if delays == before:
+                break
+        return self.output_error(delays, F)
+
+    def polished(self, best: Regression, least: int) -> Regression:
+        """Return the model with the best delays of `least` or more near its own."""
+        for j in range(len(best.delays)):
             for step in (1, -1):
                 at, misses, tried = best.delays[j] + step, 0, 0
                 while least <= at and misses < 2 and tried < _BESIDE:
@@ -154,11 +168,11 @@ class Regressed:
         F = np.ones(1) if F is None else F
         best = self._at(F, delays)
         for _ in range(rounds):
-            F = self._denominator(F, delays)
+            F, before = self._denominator(F, delays), F
             new = self._at(F, delays)
             if new.loss < best.loss * (1.0 - 1e-6) or best.order != self.n:
                 best = new
-            elif not new.loss < 1.5 * best.loss:
+            elif not new.loss < 1.5 * best.loss or np.abs(F - before).max() < _SETTLED:
                 break
         return best
 
@@ -270,18 +284,24 @@ def _solved(gram: Array) -> tuple[Array, float]:
     return solution, max(float(left), 0.0)
 
 
-def delay_ranges(parts: Parts, model: Regression, *, least: int, most: int) -> tuple[tuple[int, int], ...]:
-    """Return the delays of each input that the likelihood ratio leaves at 95 % confidence."""
-    samples = sum(len(y) for _, y in parts)
-    limit, found = scipy.special.chdtri(1, 1.0 - _CONFIDENCE), []
-    for j, chosen in enumerate(model.delays):
+def delay_ranges(
+    parts: Parts, model: Regression, *, least: int, most: int, own: Sequence[int] = ()
+) -> tuple[tuple[int, int], ...]:
+    """Return the delays of each input that the likelihood ratio leaves at 95 % confidence.
+
+    Args:
+        own: delays of another model, which belong to the ranges.
+    """
+    samples, found = sum(len(y) for _, y in parts), []
+    limit = scipy.special.chdtri(1, 1.0 - _CONFIDENCE)
+    for j, (chosen, other) in enumerate(zip(model.delays, own or model.delays, strict=True)):
         losses = {}
         for delay in range(max(chosen - _BESIDE, least), min(chosen + _BESIDE, most) + 1):
             delays = (*model.delays[:j], delay, *model.delays[j + 1 :])
             losses[delay] = Regressed(parts, model.order).output_error(delays, model.F, _POLISH).loss
         smallest = max(min(losses.values(), default=1.0), 1e-300)
         kept = [d for d, loss in losses.items() if samples * np.log(loss / smallest) <= limit]
-        found.append((min(*kept, chosen), max(*kept, chosen)))
+        found.append((min(*kept, chosen, other), max(*kept, chosen, other)))
     return tuple(found)
 
 
@@ -306,48 +326,20 @@ def arx_models(
             yield a, b, theta[:-1], left / rows, rows
 
 
-def whitening(errors: Sequence[Array]) -> Array:
-    """Return the autoregression A (p + 1,) of errors (n,) whose order BIC prefers."""
-    samples = sum(len(e) for e in errors)
-    orders = [p for p in _LAGS if p * _PER_LAG <= samples]
-    long = [e[:, None] - e.mean() for e in errors if len(e) > 2 * orders[-1] and np.all(np.isfinite(e))]
-    if not long:
-        return np.ones(1)
-    most, best, found = orders[-1], np.inf, np.ones(1)
-    rows, targets = np.concatenate([past(e, most) for e in long]), np.concatenate([e[most:, 0] for e in long])
-    for p in orders:
-        A = np.linalg.lstsq(rows[:, :p], targets, rcond=1e-10)[0]
-        left = targets - rows[:, :p] @ A
-        criterion = len(left) * float(np.log(max(left @ left, 1e-300))) + p * float(np.log(len(left)))
-        if criterion < best:
-            best, found = criterion, np.concatenate([[1.0], -A])
-    return found
-
-
 def noise_model(errors: Sequence[Array], least: int = 0) -> tuple[Array, Array]:
-    """Return C and D of the order that BIC prefers for errors (n,), at least `least`.
+    """Return C and D of one order, at least `least`, preferred by BIC for the longest errors (n,)."""
+    v, tried = max(errors, key=len), list[tuple[float, Array, Array]]()
+    for n in range(least, _MOST_NOISE + 1):
+        C, D = (reflected(np.append(1.0, p)) for p in (noise_polynomials(v, n, n) if n else ([], [])))
+        power = max(float(np.mean(filtered(D, C, v) ** 2)), 1e-300)
+        tried.append((v.size * np.log(power) + 2 * n * np.log(v.size), C, D))
+    return min(tried, key=lambda one: one[0])[1:]
 
-    Past noise is taken from a long autoregression ([hannan-rissanen-1982]).
-    """
-    most, lags = _MOST_NOISE, _LONG_NOISE
-    long = [e[:, None] - e.mean() for e in errors if len(e) > 6 * lags and np.all(np.isfinite(e))]
-    none = np.eye(1, least + 1)[0]
-    if not long:
-        return none, none
-    new = residuals([past(v, lags) for v in long], [v[lags:] for v in long])
-    own = np.concatenate([past(v[lags:], most) for v in long])
-    noise = np.concatenate([past(e, most) for e in new])
-    targets = np.concatenate([v[lags + most :, 0] for v in long])
-    best, found = np.inf, (none, none)
-    for n in range(least, most + 1):
-        columns = np.column_stack([own[:, :n], noise[:, :n]])
-        theta = np.linalg.lstsq(columns, targets, rcond=1e-10)[0]
-        left = targets - columns @ theta
-        criterion = len(left) * np.log(max(float(left @ left), 1e-300)) + 2 * n * np.log(len(left))
-        if criterion < best:
-            C, D = (np.concatenate([[1.0], x]) for x in (theta[n:], -theta[:n]))
-            best, found = criterion, (reflected(C), reflected(D))
-    return found
+
+def whitening(errors: Sequence[Array]) -> Array:
+    """Return the autoregression (m,) that makes errors (n,) of records white."""
+    whole = np.concatenate(errors)[:, None]
+    return Whitening.of(whole, tuple(map(len, errors))).filters[0]
 
 
 def whitened(parts: Parts, A: Array) -> list[tuple[Array, Array]]:

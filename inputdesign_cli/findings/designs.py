@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from inputdesign_cli.accuracy import Requirement, model_errors
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.finding import Finding, doubt, note
+from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, finding
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import Powers, Signal
 from inputdesign_cli.outcome.units import Units
@@ -25,97 +25,75 @@ _SETTLED = 2.0
 _FREE = 1e-3
 _SUPPORT = 1e-3
 
-NOTHING_NEEDED = note(
+
+@finding(
+    NOTE,
     "no-excitation-needed",
-    "No excitation is needed. The noise in normal operation or prior knowledge meets the required accuracy.",
     "Estimate the model from a record of normal operation, or ask for more accuracy.",
 )
-INPUT_WITHOUT_POWER = doubt(
-    "input-without-power",
-    "The design does not excite an input. Criterion T adds up the information of all parameters. It may be "
-    "largest without power in an input.",
-    "Take criterion D, A or E, which require information on every parameter.",
-)
-EXPERIMENT_SHORT = doubt(
-    "experiment-short",
-    "The experiment ends before the slowest mode settles. The accuracy of a spectrum holds for long "
-    "records. A short record may be more or less accurate.",
-    "Compare with the accuracy of the samples of the record, and run `idesign simulate`.",
-)
-SIGN_OPEN = doubt(
-    "error-as-large-as-plant",
-    "The admissible error is as large as the plant. It is at least the gain of the plant at every frequency "
-    "of its band.",
-    "Ask for a smaller error. A `relative` error of 0.1 means 10 %.",
-)
-EXCITATION_FREE = note(
-    "excitation-almost-free",
-    "Power at low frequencies costs almost nothing. A loop with integral action suppresses slow excitation. "
-    "The power of the optimal excitation is then ill defined.",
-    "Give `cost.excitation_power` a small weight, or limit it.",
-)
-MET_WITHIN_TABLE = note(
-    "met-within-table",
-    "Interpolation of the table decides whether the requirement is met. A table gives a spectrum by its "
-    "rows and straight lines between them. The verdict is within the error of this interpolation.",
-    "Give the table more rows.",
-)
-
-
-def nothing_needed(experiment: Experiment, *, at_every_plant: bool) -> Finding:
-    """Return the finding for a design without excitation."""
+def nothing_needed(kind: FindingKind, experiment: Experiment, *, at_every_plant: bool) -> Finding:
+    """No excitation is needed. Noise in normal operation or prior knowledge meets the required accuracy."""
     sources = ["the noise in normal operation"] if experiment.loop is not None else []
     sources += ["experiment.prior"] if experiment.prior is not None else []
-    known = " and ".join(sources) or "the noise"
     kept = " at every plant that is not left out" if at_every_plant else ""
-    return NOTHING_NEEDED.found(
-        f"no excitation is needed: the information of {known} meets the accuracy{kept}", sources=sources
-    )
+    fact = f"the information of {' and '.join(sources) or 'the noise'} meets the accuracy{kept}"
+    return kind.found(fact, sources=sources)
 
 
-def inputs_without_power(excited: Sequence[float]) -> Iterator[Finding]:
-    """Yield a finding for each input without power; `excited` has the power of each."""
-    for number, power in enumerate(excited, start=1):
-        message = (
-            f"input {number} gets no power, so that its own effects stay unknown: criterion T adds up "
-            "information; D, A or E asks for every parameter"
-        )
-        if power <= _NOTHING * sum(excited):
-            yield INPUT_WITHOUT_POWER.found(message, where=f"input {number}")
+@finding(
+    DOUBT, "input-without-power", "Take criterion D, A or E, which require information on every parameter."
+)
+def inputs_without_power(kind: FindingKind, excited: Sequence[float]) -> list[Finding]:
+    """The design does not excite an input. Criterion T adds up the information of all parameters.
+
+    It may be largest without power in an input.
+
+    Args:
+        excited: the power of each input.
+    """
+    idle = [f"input {j}" for j, power in enumerate(excited, start=1) if power <= _NOTHING * sum(excited)]
+    return [kind.found(f"{name}, whose effects stay unknown", where=name) for name in idle]
 
 
-def short_experiment(experiment: Experiment) -> list[Finding]:
-    """Return a finding if the experiment ends before its slowest mode settles; not without a length."""
+@finding(
+    DOUBT,
+    "experiment-short",
+    "Compare with the accuracy of the samples of the record, and run `idesign simulate`.",
+)
+def short_experiment(kind: FindingKind, experiment: Experiment) -> list[Finding]:
+    """The experiment ends before the slowest mode settles. Spectra describe long records.
+
+    A short record may be more or less accurate.
+    """
     damping, samples = np.abs(experiment.singularities.imag), experiment.samples
     slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
     if experiment.model.continuous or samples == 1 or slowest * samples >= _SETTLED:
         return []
-    message = (
-        f"the slowest mode has a time constant of {1.0 / slowest:.2g} samples, the experiment {samples}: a "
-        "spectrum says what long records reach; trust what the record reaches by its own samples, and "
-        "idesign simulate"
-    )
-    return [EXPERIMENT_SHORT.found(message, time_constant=1.0 / slowest, samples=samples)]
+    fact = f"its time constant is {1.0 / slowest:.2g} samples, of {samples}"
+    return [kind.found(fact, time_constant=1.0 / slowest, samples=samples)]
 
 
-def sign_open(requirements: Iterable[Requirement]) -> list[Finding]:
-    """Return a finding for each admissible error that leaves the sign of G open."""
+@finding(DOUBT, "error-as-large-as-plant", "Ask for a smaller error. A `relative` error of 0.1 means 10 %.")
+def sign_open(kind: FindingKind, requirements: Iterable[Requirement]) -> list[Finding]:
+    """The admissible error is as large as the plant, at every frequency of its band."""
     found = {}
     for error in model_errors(requirements):
         size, admitted = error.nominal_size(error.grid), error.admissible.at(error.grid)
         acts = size > 0.0
         least = float(np.min(admitted[acts] / size[acts], initial=np.inf))
-        message = (
-            f"the admissible error is {least:.4g} times |G| or more at every frequency of its band: a model "
-            "that meets it may have the wrong sign (relative: 0.1 means 10 %)"
-        )
         if 1.0 - _ROUNDING <= least < np.inf:
-            found[message] = SIGN_OPEN.found(message, ratio=least)
+            fact = f"it is {least:.4g} times |G| or more, and G may have the wrong sign"
+            found[fact] = kind.found(fact, ratio=least)
     return list(found.values())
 
 
-def almost_free(units: Units, lines: Array, power: Array, costs: Array, dearest: float) -> list[Finding]:
-    """Return a finding if sinusoids of the design lie where power costs next to nothing.
+@finding(NOTE, "excitation-almost-free", "Give `cost.excitation_power` a small weight, or limit it.")
+def almost_free(
+    kind: FindingKind, units: Units, lines: Array, power: Array, costs: Array, dearest: float
+) -> list[Finding]:
+    """Power at low frequencies costs almost nothing. Integral action suppresses slow excitation.
+
+    The power of the optimal excitation is then ill defined.
 
     Args:
         lines: (n,) frequencies of the sinusoids, with their power (n,) and the price of power there (n,).
@@ -124,22 +102,19 @@ def almost_free(units: Units, lines: Array, power: Array, costs: Array, dearest:
     cheap = (costs < _FREE * dearest) & (power > _SUPPORT * power.sum())
     at = float(lines[cheap].max(initial=0.0)) / units.frequency
     near_zero = at < 1e-6 * np.pi / units.frequency
-    where = "near frequency zero" if near_zero else f"below {at:.3g} {units.per_time}"
-    message = (
-        f"power {where} is almost free of charge in this loop (integral action). The excitation power of "
-        "the optimum is ill defined: give cost.excitation_power a small weight, or limit it"
-    )
-    found = EXCITATION_FREE.found(message, where="cost.excitation_power", frequency=at)
-    return [found] if np.any(cheap) else []
+    band = "near frequency zero" if near_zero else f"below {at:.3g} {units.per_time}"
+    fact = f"in this loop {band}. The excitation power of the optimum is ill defined"
+    return kind.when(np.any(cheap), fact, where="cost.excitation_power", frequency=at)
 
 
-def met_within_table(error: float) -> Finding:
-    """Return the finding that the error of a table, of the worst ratio, decides."""
-    message = (
-        f"what is asked is met to within {error:.1g}: so far the table describes the spectrum, linear "
-        "between its rows"
-    )
-    return MET_WITHIN_TABLE.found(message, where="spectrum.given", error=error)
+@finding(NOTE, "met-within-table", "Give the table more rows.")
+def met_within_table(kind: FindingKind, error: float) -> Finding:
+    """Interpolation of the table decides whether the requirement is met.
+
+    A table gives a spectrum by its rows and straight lines between them. The verdict is within the error of
+    this interpolation.
+    """
+    return kind.found(f"it is met to within {error:.1g}", where="spectrum.given", error=error)
 
 
 LIMIT_NOT_KEPT = doubt(
@@ -174,29 +149,31 @@ def limits_not_kept(
     """
     channels = {"input": power.input, "output": power.output, "excitation": power.excitation}
     for limit in limits.powers:
-        found, key, most = channels[limit.kind] or (), limit.key, limit.bound
+        found, most = channels[limit.kind] or (), limit.bound
         value, of = sum(found), str(limit.kind)
         if limit.channel is not None:
             value, of = found[limit.channel], f"{limit.kind} {limit.channel + 1}"
         beyond = value / most if limit.upper else most / max(value, 1e-300)
-        side = "above" if limit.upper else "below"
-        message = f"{key} is not kept: the power of {of} is {value:.6g}, {side} {most:.6g}"
+        fact = f"the power of {of} is {value:.6g}, {'above' if limit.upper else 'below'} {most:.6g}"
         if beyond > 1.0 + _ROUNDING:
-            yield LIMIT_NOT_KEPT.found(message, where=key, value=value, limit=most)
+            yield _broken(limit.key, fact, value=value, limit=most)
     for key, bound, peaks in (
         ("limits.amplitude.input", limits.input, None if signal is None else signal.input_peak),
         ("limits.amplitude.output", limits.output, None if signal is None else signal.output_peak),
         ("limits.rate", limits.rate, None if signal is None else signal.input_move),
     ):
-        if bound is None or peaks is None:
-            continue
-        pairs = zip(peaks, np.broadcast_to(bound, len(peaks)).tolist(), strict=True)
-        for channel, (value, most) in enumerate(pairs, start=1):
-            of = f" of channel {channel}" if len(peaks) > 1 else ""
-            message = f"{key} is not kept: the record reaches {value:.6g}{of}, above {most:.6g}"
+        bounds = [] if bound is None or peaks is None else np.broadcast_to(bound, len(peaks)).tolist()
+        for channel, (value, most) in enumerate(zip(peaks or (), bounds, strict=False), start=1):
+            of = f" in channel {channel}" if len(bounds) > 1 else ""
             if value > most * (1.0 + _ROUNDING):
-                yield LIMIT_NOT_KEPT.found(message, where=key, value=value, limit=most, channel=channel)
-    key, longest = "limits.samples", limits.samples
+                fact = f"the record reaches {value:.6g}{of}, above {most:.6g}"
+                yield _broken(key, fact, value=value, limit=most, channel=channel)
+    longest = limits.samples
     if longest is not None and samples > longest:
-        message = f"{key} is not kept: the experiment has {samples} samples, more than {longest}"
-        yield LIMIT_NOT_KEPT.found(message, where=key, value=samples, limit=longest)
+        fact = f"the experiment has {samples} samples, more than {longest}"
+        yield _broken("limits.samples", fact, value=samples, limit=longest)
+
+
+def _broken(key: str, fact: str, **figures: object) -> Finding:
+    said = f"{key} is not kept, {fact}"
+    return LIMIT_NOT_KEPT.found(said, where=key, remedy="", severity=None, **figures)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.finding import Finding, doubt, note, unsure
+from inputdesign_cli.finding import DOUBT, NOTE, UNDECIDED, Finding, FindingKind, finding
 from inputdesign_cli.findings.refuted_structure import quantities
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification.stability import without_integrators
@@ -19,72 +19,36 @@ _ASIDE = 0.001
 _SEEN_AT_ONCE = 3.0
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
 
-NOT_SETTLED = unsure(
-    "search-not-settled",
-    "The search for the estimate did not converge. It still moved at its last step, perhaps far from the "
-    "minimum.",
-    "Lower the orders, which may be too high for these data, or start nearer to the plant.",
-    "unsettled",
-)
-STOPPED = unsure(
-    "stopped-at-an-end",
-    "The search stopped at the boundary of an expression. Beyond the estimate an expression of the spec is "
-    "not defined. The likeliest parameters may lie there, and the standard deviation is unreliable.",
-    "Rewrite it so that it is defined for every possible plant.",
-    "unsettled",
-)
-START = note(
-    "start-estimated",
-    "The initial state of a record was estimated too. The record may not begin at rest about zero. Output "
-    "levels and initial state cost some accuracy.",
-    "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
-)
-ON_CIRCLE = doubt(
-    "noise-on-the-circle",
-    "A noise polynomial has a root on the unit circle. The covariance is unreliable, and a design would "
-    "assume noise that vanishes or never decays.",
-    "Take more data, or a lower order.",
-)
-NEAR_ZERO = note(
-    "parameter-near-zero",
-    "A parameter may be zero. Zero lies within one standard deviation of its estimate.",
-    "Lower the order of a polynomial. For a physical quantity take more data, or list it in `plant.known` "
-    "if it is known.",
-)
-BAND_LIMITED = note(
-    "input-taken-as-band-limited",
-    "The input was taken as band-limited. The plant is in continuous time, and tests refute the model.",
-    "If the input is held between the samples, write `plant.sample: zoh`.",
-)
-UNASKED = unsure(
-    "no-accuracy-here",
-    "The requirement cannot be evaluated at the estimate. The loop may be unstable there, for instance. "
-    "There is no error bound r_u, and no verdict.",
-    "See the message: correct the spec, or take data that give another estimate.",
-    "unasked",
-)
-LARGER_NOISE = note(
-    "noise-estimated-along",
-    "The noise has more structure than the spec says. Small orders of C and D were estimated too. Tests, "
-    "covariance and verdict hold for this larger model.",
-    "Copy `noise` from `model.yaml` into the spec, because the next design depends on it.",
-)
-
 
 def unsettled(model: Model, estimate: Estimate) -> list[Finding]:
     """Return findings on a search for `model` that did not settle, or that an expression's end stopped."""
+    return [*_not_settled(estimate), *stopped_at_ends(model, estimate)]
+
+
+@finding(
+    UNDECIDED,
+    "search-not-settled",
+    "Lower the orders, which may be too high for these data, or start nearer to the plant.",
+    "unsettled",
+)
+def _not_settled(kind: FindingKind, estimate: Estimate) -> list[Finding]:
+    """The search for the estimate did not converge. It still moved at its last step.
+
+    The estimate may be far from the minimum.
+    """
     search = estimate.search
-    begun = "its only start" if search.starts == 1 else f"the best of {search.starts} starts"
-    message = (
-        f"the search did not settle after {search.steps} steps from {begun}: the estimate may be far from "
-        "the minimum; the orders may be too high for these data"
-    )
-    found = [NOT_SETTLED.found(message, steps=search.steps, starts=search.starts)]
-    return [*([] if search.converged else found), *stopped_at_ends(model, estimate)]
+    fact = f"{search.steps} steps from the best of {search.starts} starts"
+    return kind.when(not search.converged, fact, steps=search.steps, starts=search.starts)
 
 
-def stopped_at_ends(model: Model, estimate: Estimate) -> list[Finding]:
-    """Return a finding for each parameter that the search left where an expression ends."""
+@finding(
+    UNDECIDED, "stopped-at-an-end", "Rewrite it so that it is defined for every possible plant.", "unsettled"
+)
+def stopped_at_ends(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
+    """The search stopped at the boundary of an expression. Beyond it, the expression is not defined.
+
+    The likeliest parameters may lie there, and the standard deviation is unreliable.
+    """
     found = []
     deviations = np.sqrt(np.diag(estimate.covariance))
     for k in np.flatnonzero(~model.dead_times).tolist():
@@ -92,89 +56,93 @@ def stopped_at_ends(model: Model, estimate: Estimate) -> list[Finding]:
         flaws = (model.at(model.theta + way * step).flaw for way in (-1.0, 1.0))
         flaw, value = next(filter(None, flaws), None), float(model.theta[k])
         if flaw is not None:
-            message = (
-                f"the search stopped at {model.names[k]} = {value:.6g}, beyond which {flaw}: the likeliest "
-                "parameters may lie there, and its deviation is not to be trusted; write the expression so "
-                "that it is defined wherever the plant may be"
-            )
-            found.append(STOPPED.found(message, where=model.names[k], value=value))
+            fact = f"the search stopped at {model.names[k]} = {value:.6g}, beyond which {flaw}"
+            found.append(kind.found(fact, where=model.names[k], value=value))
     return found
 
 
-def started(estimate: Estimate) -> list[Finding]:
-    """Return a finding where levels and starts of the records were estimated, with the largest residual."""
+@finding(
+    NOTE,
+    "start-estimated",
+    "If the plant was at rest before, `--operating-point` with the levels gives a more accurate estimate.",
+)
+def started(kind: FindingKind, estimate: Estimate) -> list[Finding]:
+    """The initial state of a record was estimated too. The record may not begin at rest about zero.
+
+    Output levels and initial state cost some accuracy.
+    """
     if not estimate.start.free:
         return []
-    along = "the level of every output and the state at the start were estimated along"
-    single = len(estimate.start.first) == 1
     if not estimate.start.rest_refuted:
-        begins = "the record begins" if single else "the records begin"
-        return [START.found(f"whether {begins} at rest was not asked: {along}")]
+        return [kind.found("whether it begins at rest was not asked")]
     ratio = np.abs(estimate.start.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = float(estimate.start.first[which, output]), float(np.sqrt(estimate.noise[output, output]))
-    seen = (
-        f"a first residual of {first:.3g} where the noise has {noise:.3g}"
-        if np.max(ratio) > _SEEN_AT_ONCE
-        else "the first residuals together are larger than noise would make them"
-    )
-    message = (
-        f"the record{' does' if single else 's do'} not begin at rest about zero ({seen}): {along}. Where "
-        "the plant was at rest before, --operating-point with the levels of inputs and outputs then makes "
-        "the estimate more certain"
-    )
-    return [START.found(message, where=f"y{output + 1}", first_residual=first, noise=noise)]
+    fact = "the first residuals together are larger than the noise explains"
+    if np.max(ratio) > _SEEN_AT_ONCE:
+        fact = f"a first residual is {first:.3g}, and the noise {noise:.3g}"
+    return [kind.found(fact, where=f"y{output + 1}", first_residual=first, noise=noise)]
 
 
-def on_the_circle(model: Model, estimate: Estimate) -> list[Finding]:
-    """Return a finding where a polynomial of the predictor has a root on the unit circle."""
+@finding(DOUBT, "noise-on-the-circle", "Take more data, or a lower order.")
+def on_the_circle(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
+    """A noise polynomial has a root on the unit circle. The covariance is unreliable.
+
+    A design would assume noise that vanishes or never decays.
+    """
     samples = len(estimate.errors)
     letters = " and ".join(
         letter
         for letter, polynomials in predictor_of(model).items()
         if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
     )
-    message = (
-        f"{letters} has a root on the unit circle, as far as {samples} samples can show: the covariance is "
-        "not to be trusted there, and a design on this model would count on noise that vanishes or never "
-        "fades; take more data, or a lower order"
-    )
-    return [ON_CIRCLE.found(message, where=letters, samples=samples)] if letters else []
+    fact = f"{letters}, as far as {samples} samples can show"
+    return kind.when(letters, fact, where=letters, samples=samples)
 
 
-def near_zero(model: Model, estimate: Estimate) -> list[Finding]:
-    """Return findings on parameters that may be zero: coefficients have orders, quantities do not."""
+@finding(
+    NOTE,
+    "parameter-near-zero",
+    "Lower the order of a polynomial. For a physical quantity take more data, or list it in `plant.known` "
+    "if it is known.",
+)
+def near_zero(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
+    """A parameter may be zero. Zero lies within one standard deviation of its estimate."""
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = np.flatnonzero(deviations > np.abs(estimate.theta))
     quantity, found = quantities(model), []
-    for physical, advice in (
-        (True, "the data hardly determine it; take more of them, or list what is known in plant.known"),
-        (False, "an order may be too high"),
+    for physical, remedy in (
+        (True, "The data hardly determine it. Take more of them, or list what is known in plant.known."),
+        (False, "An order may be too high."),
     ):
         listed = ", ".join(estimate.names[k] for k in vague if quantity[k] == physical)
-        if listed:
-            message = f"zero lies within a standard deviation of {listed}: {advice}"
-            found.append(NEAR_ZERO.found(message, where=listed))
+        found += kind.when(listed, listed, where=listed, remedy=remedy)
     for k in vague[model.dead_times[vague]]:
         most, name = float(estimate.theta[k] + _NORMAL * deviations[k]), estimate.names[k]
-        message = f"{name} of a dead time cannot be distinguished from zero: {most:.3g} at most (95 %)"
-        found.append(NEAR_ZERO.found(message, where=name, at_most=most))
+        fact = f"{name} of a dead time is at most {most:.3g} (95 %)"
+        found.append(kind.found(fact, where=name, remedy="Nothing", at_most=most))
     return found
 
 
-def band_limited(model: Model, estimate: Estimate) -> list[Finding]:
-    """Return a finding where the input between samples may explain why tests refute a continuous model."""
-    message = (
-        "the input was taken for the band-limited interpolation of its samples; where it is held between "
-        "them, write plant.sample: zoh"
-    )
-    refuted = model.continuous and estimate.tests.failed
-    return [BAND_LIMITED.found(message, where="plant.sample")] if refuted else []
+@finding(
+    NOTE,
+    "input-taken-as-band-limited",
+    "If the input is held between the samples, write `plant.sample: zoh`.",
+)
+def band_limited(kind: FindingKind, model: Model, estimate: Estimate) -> list[Finding]:
+    """The input was taken as band-limited. The plant is in continuous time, and tests refute the model."""
+    return kind.when(model.continuous and estimate.tests.failed, where="plant.sample")
 
 
-def unasked(why: str) -> list[Finding]:
-    """Return the finding that what is asked has no answer at the estimate, and why."""
-    return [UNASKED.found(f"there is no r_u for this estimate: {why}")] if why else []
+@finding(
+    UNDECIDED, "no-accuracy-here", "Correct the spec, or take data that give another estimate.", "unasked"
+)
+def unasked(kind: FindingKind, why: str) -> list[Finding]:
+    """The requirement cannot be evaluated at the estimate. The loop may be unstable there, for instance.
+
+    There is no error bound r_u, and no verdict.
+    """
+    return kind.when(why, f"there is no r_u: {why}")
 
 
 def noise_probability(estimate: Estimate) -> float:
@@ -182,8 +150,19 @@ def noise_probability(estimate: Estimate) -> float:
     return min(test.probability for test in estimate.tests.scores if test.fault == "noise")
 
 
-def larger_noise(model: Model, probability: float | None) -> list[Finding]:
-    """Return a finding if a larger noise was estimated; `probability` is that of the residuals before."""
+@finding(
+    NOTE,
+    "noise-estimated-along",
+    "Copy `noise` from `model.yaml` into the spec, because the next design depends on it.",
+)
+def larger_noise(kind: FindingKind, model: Model, probability: float | None) -> list[Finding]:
+    """The noise has more structure than the spec says. Small orders of C and D were estimated too.
+
+    Tests, covariance and verdict hold for this larger model.
+
+    Args:
+        probability: of the residuals with the noise of the spec; None if none other was estimated.
+    """
     if probability is None:
         return []
     noise = {letter: rows for letter, rows in blocks_of(model)["noise"].items() if letter in ("C", "D")}
@@ -191,10 +170,6 @@ def larger_noise(model: Model, probability: float | None) -> list[Finding]:
         f"{letter} of order {max(len(row) for row in (rows if isinstance(rows[0], list) else [rows])) - 1}"
         for letter, rows in noise.items()
     ]
-    message = (
-        f"the residuals are not white with the noise of the spec (probability {chance(probability)}): "
-        f"{' and '.join(orders)} {'were' if len(orders) > 1 else 'was'} estimated along, and everything "
-        "here is of this model. Write noise as in model.yaml before the next design"
-    )
+    fact = f"{' and '.join(orders)}, since the residuals were not white (probability {chance(probability)})"
     stated = ", ".join(f"{letter}: {rows}" for letter, rows in noise.items())
-    return [LARGER_NOISE.found(message, where="noise", probability=probability, noise=stated)]
+    return [kind.found(fact, where="noise", probability=probability, noise=stated)]

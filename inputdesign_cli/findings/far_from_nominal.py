@@ -33,7 +33,7 @@ FAR = doubt(
     "far-from-the-spec",
     "The estimate lies far from the plant of the spec. The parameters of G together differ by more than "
     "five standard deviations. The plant, the units or the values of the spec may be wrong.",
-    "The verdict holds for the estimate. Put it into the spec before the next design.",
+    "The verdict holds for the estimate: r_u and r_adm are at its parameters. Put it into the spec.",
 )
 
 
@@ -115,50 +115,34 @@ def far_from_nominal(units: Units, distance: Distance) -> list[Finding]:
     another = worst is not None and worst.share > _ANOTHER
     if found.probability > (level("far from nominal") if another else _FIVE_DEVIATIONS):
         return []
-    listed = f"{'; ' * bool(distance.listed)}{', '.join(distance.listed)}"
-    chi_squared = (
-        f"chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom{listed}"
-    )
-    kind, message = (
-        FAR,
-        (
-            f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the spec (all "
-            f"parameters of G together, {chi_squared}): the plant differs, its units are others, or the "
-            "numbers of the spec, on which the design rested, were poor. The verdict holds for the "
-            "estimate: r_u and r_adm are those at its parameters"
-        ),
-    )
+    listed = "".join(f", {one}" for one in distance.listed)
+    kind = FAR
+    fact = f"the parameters of G are {found.deviations:.3g} standard deviations away"
     if worst is not None and another:
         sign = "of the opposite sign at low frequency, and " if found.opposite_sign else ""
-        kind, message = (
-            ANOTHER,
-            (
-                f"the estimate contradicts the plant of the spec: G{worst.entry} is {sign}up to "
-                f"{100 * worst.share:.0f} % of the larger one apart at {worst.frequency:.4g} "
-                f"{units.per_time} ({chi_squared}). The design rested on the plant of the spec; what is "
-                "admitted here is that of the estimate. Check signs and units of the record; if they are "
-                "right, put the estimate into the spec"
-            ),
+        kind = ANOTHER
+        fact = (
+            f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
+            f"{worst.frequency:.4g} {units.per_time}"
         )
-    return [kind.found(message, where="plant", deviations=found.deviations, probability=found.probability)]
+    fact += f" (chi-squared {found.statistic:.4g} with {found.degrees_of_freedom} degrees of freedom{listed})"
+    return [kind.found(fact, where="plant", deviations=found.deviations, probability=found.probability)]
 
 
 def of_first_part(distance: Distance) -> list[Finding]:
     """Return a note if the first of several parts finds a plant far from the spec's, as it may."""
     found = distance.nominal
-    if found.probability > level("far from nominal"):
-        return []
-    sign = " and G has the opposite sign at low frequency: check the signs of the record"
-    return [
-        FAR.found(
-            f"the estimate lies {found.deviations:.3g} standard deviations from the plant of the "
-            f"spec{sign if found.opposite_sign else ''}. From now on plans rest on the estimates",
-            where="plant",
-            severity=Severity.NOTE,
-            deviations=found.deviations,
-            probability=found.probability,
-        )
-    ]
+    sign = ", and G has the opposite sign at low frequency: check the signs of the record"
+    fact = f"{found.deviations:.3g} standard deviations{sign if found.opposite_sign else ''}"
+    return FAR.when(
+        found.probability <= level("far from nominal"),
+        fact,
+        where="plant",
+        remedy="From now on plans rest on the estimates.",
+        severity=Severity.NOTE,
+        deviations=found.deviations,
+        probability=found.probability,
+    )
 
 
 def _apart(

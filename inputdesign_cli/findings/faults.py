@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.finding import Finding, refuted
+from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, refuted
 from inputdesign_cli.findings.places import SHOWN, Samples, file_of, of_file, places, rows_of, without_option
 from inputdesign_cli.identification import (
     Estimate,
@@ -38,17 +38,33 @@ FROZEN = refuted(
     "The sensor is frozen or saturated, or the logger repeats its last value.",
     "Leave these rows out with `--without`, which cuts the record there.",
 )
-MISALIGNED = refuted(
-    "columns-misaligned",
-    "A column was logged at another time. The controller of the spec computes u from r and y. The data "
-    "follow this law much better with one column shifted by some samples.",
-    "Shift the column, or correct the controller of the spec.",
-)
 
 
 def faults(units: Units, estimate: Estimate, data: Samples) -> list[Finding]:
-    """Return a finding for each output and kind of fault."""
-    return [*_spikes(units, estimate, data), *_frozen(units, estimate, data)]
+    """Return a finding for each output and kind of fault, with its rows."""
+    found = []
+    for one in spikes(estimate.errors):
+        rows, name = rows_of(data, [(at, at) for at in one.samples]), _named(units, one.output)
+        fact = (
+            f"{len(one.samples)} of {len(estimate.errors)} samples of {name} hold {100.0 * one.share:.3g} % "
+            f"of the squares (at {places(units, data, one.samples)})"
+        )
+        remedy = f"Leave out rows that are faults of measurement: {without_option(rows)}."
+        times, at = [float(data.time[at]) for at in one.samples], [row for _, row, _ in rows]
+        found.append(SPIKES.found(fact, where=name, remedy=remedy, share=one.share, times=times, rows=at))
+    for output, stretches in _still(estimate, data).items():
+        runs = [(one.first, one.first + one.length - 1) for one in stretches]
+        rows, still, name = rows_of(data, runs), sum(one.length for one in stretches), _named(units, output)
+        listed = ", ".join(
+            f"rows {first} to {last}{of_file(data, at)}"
+            for (at, _), (_, first, last) in zip(runs[:SHOWN], rows, strict=False)
+        )
+        more = ", .." * (len(runs) > SHOWN)
+        fact = f"{name} keeps its value for {still} of {len(data.y)} samples ({listed}{more})"
+        remedy = f"Leave these rows out, which cuts the record there: {without_option(rows)}."
+        span = [[first, last] for _, first, last in rows]
+        found.append(FROZEN.found(fact, where=name, remedy=remedy, samples=still, rows=span))
+    return found
 
 
 def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[float]) -> Iterator[Finding]:
@@ -59,26 +75,20 @@ def biasing(units: Units, estimate: Estimate, data: Samples, fitted: Sequence[fl
     """
     for output, runs in _still(estimate, data).items():
         share, name = sum(one.length for one in runs) / len(data.y), _named(units, output)
-        message = (
-            f"{name} stands still at {100.0 * share:.2g} % of the samples while the input moves: a model of "
-            "what a sensor does not follow has another gain, and other dynamics, than the plant; leave "
-            "these rows out (--without), which cuts the record there"
-        )
-        if share >= _BIASING:
-            yield FROZEN.found(message, where=name, share=share)
+        fact = f"{name} at {100.0 * share:.2g} % of the samples, so that gain and dynamics are biased"
+        yield from FROZEN.when(share >= _BIASING, fact, where=name, share=share)
     for one in spikes(estimate.errors):
         name, fit = _named(units, one.output), fitted[one.output]
-        message = (
-            f"a few samples hold {100.0 * one.share:.3g} % of the squares of the residuals of {name}, and "
-            f"the simulation explains {fit:.1f} % of it: spikes, or events that the model does not know, "
-            "decide what it is; leave rows out that are faults of measurement (--without)"
-        )
-        if fit < _HALF:
-            yield SPIKES.found(message, where=name, share=one.share)
+        fact = f"they hold {100.0 * one.share:.3g} % of the squares of {name}, and its fit is {fit:.1f} %"
+        yield from SPIKES.when(fit < _HALF, fact, where=name, share=one.share)
 
 
-def loop_faults(controller: TransferMatrix | None, data: Samples) -> list[Finding]:
-    """Return a finding for each signal that obeys the controller of the loop at another time."""
+@finding(REFUTED, "columns-misaligned", "Shift the column, or correct the controller of the spec.")
+def loop_faults(kind: FindingKind, controller: TransferMatrix | None, data: Samples) -> list[Finding]:
+    """A column was logged at another time. The controller of the spec computes u from r and y.
+
+    The data follow this law much better with one column shifted by some samples.
+    """
     if controller is None or data.r is None:
         return []
     found = {}
@@ -86,14 +96,11 @@ def loop_faults(controller: TransferMatrix | None, data: Samples) -> list[Findin
         several = data.u.shape[1] > 1 and one.letter != "y"
         name = f"{one.letter}{one.channel + 1}" if several else one.letter
         count = abs(one.lag)
-        when = f"{count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}"
-        message = (
-            f"{name} was logged {when}: the controller of the spec, u = r - C y, leaves "
-            f"{100 * one.left:.3g} % of u as the columns stand, and {100 * one.then:.2g} % with {name} "
-            "moved; a model of the loop would take the shift for a delay: move the column, or mend the "
-            "controller of the spec"
+        fact = (
+            f"{name} is {count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}. u = r - C y "
+            f"leaves {100 * one.left:.3g} % of u unexplained, and {100 * one.then:.2g} % with {name} shifted"
         )
-        found[message] = MISALIGNED.found(message, where=name, lag=one.lag, left=one.left, then=one.then)
+        found[fact] = kind.found(fact, where=name, lag=one.lag, left=one.left, then=one.then)
     return list(found.values())
 
 
@@ -114,60 +121,22 @@ def _still(estimate: Estimate, data: Samples) -> dict[int, list[Frozen]]:
     return dict(sorted(found.items()))
 
 
-def _frozen(units: Units, estimate: Estimate, data: Samples) -> Iterator[Finding]:
-    for output, stretches in _still(estimate, data).items():
-        runs = [(one.first, one.first + one.length - 1) for one in stretches]
-        rows, still, name = rows_of(data, runs), sum(one.length for one in stretches), _named(units, output)
-        listed = ", ".join(
-            f"rows {first} to {last}{of_file(data, at)}"
-            for (at, _), (_, first, last) in zip(runs[:SHOWN], rows, strict=False)
-        )
-        message = (
-            f"{name} stands still while the input moves, for {still} of {len(data.y)} samples "
-            f"({listed}{', ..' * (len(runs) > SHOWN)}), and rounding does not explain it: the sensor is "
-            "frozen or saturated, or the logger repeats its last value; leave these rows out, which cuts "
-            f"the record there: {without_option(rows)}"
-        )
-        at = [[first, last] for _, first, last in rows]
-        yield FROZEN.found(message, where=name, samples=still, rows=at)
-
-
-def _spikes(units: Units, estimate: Estimate, data: Samples) -> Iterator[Finding]:
-    for one in spikes(estimate.errors):
-        many, output = len(one.samples), _named(units, one.output)
-        rows = rows_of(data, [(at, at) for at in one.samples])
-        message = (
-            f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
-            f"{100 * one.share:.3g} % of the squares of its residuals (at "
-            f"{places(units, data, one.samples)}): spikes, or events that the model does not know, decide "
-            "what these data say; leave rows out that are faults of measurement, which cuts the record "
-            f"there: {without_option(rows)}"
-        )
-        times, at = [float(data.time[at]) for at in one.samples], [row for _, row, _ in rows]
-        yield SPIKES.found(message, where=output, share=one.share, times=times, rows=at)
-
-
-LEVEL_SHIFT = refuted(
-    "level-shift",
-    "An output shifts without an input. It rises or falls at one time and stays there. The model attributes "
-    "the shift to the inputs.",
-    "Leave the shift out with `--without`, or record what changed as one more input.",
+@finding(
+    REFUTED, "level-shift", "Leave the shift out with `--without`, or record what changed as a further input."
 )
+def shifted_levels(kind: FindingKind, estimate: Estimate, data: Samples, time_unit: str) -> list[Finding]:
+    """An output shifts without an input. It rises or falls at one time and stays there.
 
-
-def shifted_levels(estimate: Estimate, data: Samples, time_unit: str) -> list[Finding]:
-    """Return a finding where outputs shift, if that explains more than what other tests found."""
+    A load or the gain may have changed. The model attributes the shift to the inputs.
+    """
     if not estimate.tests.shifted or data.recorded is None:
         return []
     every = np.arange(len(data.y))
     what, runs = _described(estimate.tests.shifted, data, data.recorded.rows, every, time_unit)
-    message = (
-        f"{what}: did a load change, or the gain? The model takes it for what the inputs do. Leave it out, "
-        f"which gives each part a level of its own: {without_option(runs)}; or log what changed as one more "
-        "input"
-    )
+    remedy = f"Leave the shift out: {without_option(runs)}; or record what changed as a further input."
     rows = [[first, last] for _, first, last in runs]
-    return [LEVEL_SHIFT.found(message, probability=chance_of_shifts(estimate.tests.shifted)[0], rows=rows)]
+    probability = chance_of_shifts(estimate.tests.shifted)[0]
+    return [kind.found(what, remedy=remedy, probability=probability, rows=rows)]
 
 
 def left_out(
@@ -182,10 +151,10 @@ def left_out(
     rows = np.arange(len(log.y)) if log.recorded is None else log.recorded.rows
     what, runs = _described(shifts, log, rows, samples, time_unit)
     listed = " and ".join(f"{first} to {last}{f' of {name}' if name else ''}" for name, first, last in runs)
-    besides = f", with {short} samples beside them that are too few for a segment" if short else ""
+    besides = f", and {short} samples next to them, too few for a segment" if short else ""
     return (
-        f"{what} (a change of load, or of the gain?): rows {listed} were left out{besides}, and each part "
-        f"has a level of its own; identify and assess need {without_option(runs)} for that"
+        f"{what} (a change of load, or of the gain?): rows {listed} were left out{besides}. Each part has "
+        f"its own level; identify and assess need {without_option(runs)}"
     )
 
 
@@ -206,8 +175,5 @@ def _described(
             f"({record.time[at]:.6g} {time_unit})"
         )
         runs.append((file_of(record.files, at), int(rows[first]), int(rows[last])))
-    return (
-        f"{' and '.join(events)}, and stays so, though no input does that (probability "
-        f"{chance(chance_of_shifts(shifts)[0])} by chance)",
-        runs,
-    )
+    probability = chance(chance_of_shifts(shifts)[0])
+    return f"{' and '.join(events)}, which no input explains (probability {probability} by chance)", runs

@@ -7,15 +7,15 @@ with these data.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, Severity, doubt, note
-from inputdesign_cli.findings.refuted_structure import REMEDY
+from inputdesign_cli.finding import DOUBT, NOTE, REFUTED, Finding, FindingKind, finding
+from inputdesign_cli.findings.refuted_structure import OF_ONE
 from inputdesign_cli.identification import RISING, Directed, Estimate, Moves, that_matter
 from inputdesign_cli.outcome import Neglected as Entry
 from inputdesign_cli.outcome.shares import chance
@@ -24,20 +24,6 @@ from inputdesign_cli.plant import Model
 
 # Two-sided 95 % of the normal distribution.
 _ALLOWED = 1.959963984540054
-
-MATTERS = doubt(
-    "neglected-parameter",
-    "A neglected parameter may change G too much. No test refutes the model, but one more parameter is "
-    "likely. Its effect on G and the error of the estimate together exceed the admissible error.",
-    "Estimate the parameter too, or excite the frequencies where G would change.",
-)
-RESTS_ON_STRUCTURE = note(
-    "verdict-rests-on-structure",
-    "The verdict depends on the model structure. One more parameter, or a steadily changing gain, could "
-    "change G by more than the admissible error. The data do not exclude it. The message gives its largest "
-    "effect (95 %).",
-    "If the structure is not known from physics, excite the frequencies where G would change.",
-)
 
 
 @dataclass(frozen=True)
@@ -97,32 +83,58 @@ def mattering(found: Sequence[Neglected]) -> list[Neglected]:
     return [found[i] for i in that_matter([one.directed for one in found], [one.moves for one in found])]
 
 
-def objections(units: Units, found: Sequence[Neglected], *, met: bool) -> Iterator[Finding]:
-    """Yield a finding for each parameter that matters, which contradicts a verdict of `met`."""
-    severity = Severity.REFUTED if met else Severity.DOUBT  # more parameters miss it all the more
+@finding(
+    DOUBT,
+    "neglected-parameter",
+    "Estimate the parameter too, or excite the frequencies where G would change.",
+)
+def objections(kind: FindingKind, units: Units, found: Sequence[Neglected], *, met: bool) -> list[Finding]:
+    """A neglected parameter may change G too much. No test refutes the model, but the parameter is likely.
+
+    Its effect on G and the error of the estimate together exceed the admissible error.
+
+    Args:
+        met: whether the verdict would be `met`, which a parameter that matters contradicts.
+    """
+    severity = REFUTED if met else DOUBT  # more parameters miss it all the more
+    against = []
     for one in mattering(found):
-        test, moves = one.directed.test, one.moves.largest
-        along = "" if moves > 1.0 else ", beyond it with the error of the estimate,"
-        message = (
-            f"{one.directed.alternatives[0].phrase} would move G by {moves:.3g} times the admissible error "
-            f"about {units.named(one.frequency)}{along} (probability {chance(test.probability)} without "
-            f"it): {REMEDY[test.fault]}"
+        test, moves, tried = one.directed.test, one.moves.largest, one.directed.alternatives[0]
+        along = "" if moves > 1.0 else ", and beyond it with the error of the estimate"
+        against.append(
+            kind.found(
+                f"{tried.phrase} would move G by {moves:.3g} times the admissible error about "
+                f"{units.named(one.frequency)}{along} (probability {chance(test.probability)} without it)",
+                where=test.name,
+                remedy=OF_ONE[test.fault].remedy,
+                severity=severity,
+                moves=moves,
+                may_move=one.may_move,
+                probability=test.probability,
+            )
         )
-        figures = {"moves": moves, "may_move": one.may_move, "probability": test.probability}
-        yield MATTERS.found(message, where=test.name, severity=severity, **figures)
+    return against
 
 
-def unseen(units: Units, found: Sequence[Neglected]) -> list[Finding]:
-    """Return a finding where a parameter more, or else a gain that drifts, may move G too far."""
+@finding(
+    NOTE,
+    "verdict-rests-on-structure",
+    "If the structure is not known from physics, excite the frequencies where G would change.",
+)
+def unseen(kind: FindingKind, units: Units, found: Sequence[Neglected]) -> list[Finding]:
+    """The verdict depends on the model structure. A further parameter or a drifting gain may matter.
+
+    It could change G by more than the admissible error, and the data do not exclude it. The message gives its
+    largest effect (95 %).
+    """
     structure = [one for one in found if one.directed.of_structure]
     rising = [one for one in found if one.directed.test.name.endswith(RISING)]
     largest = (max(those, key=lambda one: one.may_move) for those in (structure, rising) if those)
     worst = next((one for one in largest if one.may_move > 1.0), None)
     if worst is None:
         return []
-    message = (
-        f"the verdict rests on the structure of the model: {worst.directed.alternatives[0].phrase} that "
-        f"these data do not rule out would move G by up to {worst.may_move:.3g} times the admissible error, "
-        f"at {units.named(worst.frequency)} (95 %)"
+    fact = (
+        f"{worst.directed.alternatives[0].phrase} is not excluded, and could move G by {worst.may_move:.3g} "
+        f"times the admissible error, at {units.named(worst.frequency)} (95 %)"
     )
-    return [RESTS_ON_STRUCTURE.found(message, where=worst.directed.test.name, may_move=worst.may_move)]
+    return [kind.found(fact, where=worst.directed.test.name, may_move=worst.may_move)]

@@ -11,17 +11,11 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Location
-from inputdesign_cli.finding import Finding, note, refuted
+from inputdesign_cli.finding import REFUTED, Finding, FindingKind, finding, note, refuted
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.levels import level
 from inputdesign_cli.outcome.shares import chance
 
-PRIOR_COUNTS = note(
-    "prior-counts",
-    "The estimate includes the prior. `experiment.prior` has its parameters. Estimate, covariance and "
-    "accuracy combine prior and data.",
-    "Remove the prior to see the estimate from the data alone.",
-)
 PRIOR_LEFT_OUT = note(
     "prior-left-out",
     "The estimate does not include the prior. `experiment.prior` gives information without its parameters, "
@@ -39,18 +33,6 @@ PRIOR_REPEATED = refuted(
     "samples would count twice.",
     "Remove the prior, or give only records that it does not include.",
 )
-RECORDS_DIFFER = refuted(
-    "records-differ",
-    "The records come from different systems. Parameters estimated from each record alone differ by more "
-    "than chance.",
-    "Assess each record alone, and find out what has changed between them.",
-)
-SAMPLES_REPEATED = refuted(
-    "samples-repeated",
-    "Two files have rows in common. The estimate would look more accurate than it is.",
-    "Give each sample once.",
-)
-
 
 # This many rows in a row, half of them different, come again in another record by copying only.
 _IN_A_ROW = 8
@@ -61,19 +43,8 @@ _PRIOR = "experiment.prior"
 
 def prior_notes(estimate: Estimate, *, stated: bool) -> list[Finding]:
     """Return what a prior that the spec `stated` has to do with the estimate."""
-    if not stated:
-        return []
-    if estimate.prior is None:
-        message = (
-            "experiment.prior does not count for this estimate: it is information without the parameters "
-            "that it belongs to; write parameters: {b1: 3.6, ..} beside a matrix, name the model.yaml of "
-            "the earlier data, or give their records as further files"
-        )
-        return [PRIOR_LEFT_OUT.found(message, where=_PRIOR)]
-    counted = (
-        "experiment.prior counts: estimate, covariance and accuracy are those of prior and data together"
-    )
-    return [PRIOR_COUNTS.found(counted, where=_PRIOR), *contradictions(estimate)]
+    without = stated and estimate.prior is None
+    return [*PRIOR_LEFT_OUT.when(without, where=_PRIOR), *(contradictions(estimate) if stated else [])]
 
 
 def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
@@ -84,39 +55,29 @@ def contradictions(estimate: Estimate, looks: int = 1) -> list[Finding]:
     """
     if estimate.prior is None:
         return []
-    differing, alike = estimate.prior.differing, estimate.prior.alike
-    if differing * looks < level("prior"):
-        message = (
-            f"experiment.prior and these data contradict each other (probability {chance(differing)} for "
-            "one system): remove the prior, or look for what has changed since"
-        )
-        return [PRIOR_CONTRADICTED.found(message, where=_PRIOR, probability=differing)]
-    if alike * looks < level("prior"):
-        message = (
-            "experiment.prior and these data agree more closely than others do (probability "
-            f"{chance(alike)}): the prior seems to be made of this record, or of a part or copy of it, "
-            "which would count twice; leave it out, or give only records that it was not made of"
-        )
-        return [PRIOR_REPEATED.found(message, where=_PRIOR, probability=alike)]
+    for kind, likely in (
+        (PRIOR_CONTRADICTED, estimate.prior.differing),
+        (PRIOR_REPEATED, estimate.prior.alike),
+    ):
+        if likely * looks < level("prior"):
+            return [kind.found(f"probability {chance(likely)}", where=_PRIOR, probability=likely)]
     return []
 
 
-def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> list[Finding]:
-    """Return a finding where the experiments are not of one system; all share the level (Bonferroni).
+@finding(REFUTED, "records-differ", "Assess each record alone, and find out what has changed between them.")
+def differences(kind: FindingKind, estimate: Estimate, files: Sequence[str], looks: int = 1) -> list[Finding]:
+    """The records come from different systems. Their own parameters differ by more than chance.
 
     Args:
-        looks: see `contradictions`.
+        looks: how often it is asked; all records and looks share the level (Bonferroni).
     """
     probability, name = min(zip(estimate.tests.alike, files, strict=False), default=(1.0, ""))
-    if not estimate.tests.alike or probability * len(estimate.tests.alike) * looks >= level("one system"):
-        return []
     others = [other for other in files if other != name]
     against = others[0] if len(others) == 1 else "the other records"
-    message = (
-        f"{name} and {against} are not of one system (probability {chance(probability)} that their "
-        "parameters differ as much by chance): assess each alone, and look for what has changed between them"
-    )
-    return [RECORDS_DIFFER.found(message, where=name, probability=probability, against=against)]
+    fact = f"{name} and {against} (probability {chance(probability)} for one system)"
+    certain = probability * len(estimate.tests.alike) * looks < level("one system")
+    found = kind.when(certain, fact, where=name, probability=probability, against=against)
+    return found if estimate.tests.alike else []
 
 
 def shared(one: Array, other: Array) -> NDArray[np.bool_]:
@@ -136,8 +97,12 @@ def shared(one: Array, other: Array) -> NDArray[np.bool_]:
     return found
 
 
-def samples_repeated(paths: Sequence[Path], records: Sequence[Array]) -> list[Finding]:
-    """Say which files, each (n, c) as it stands there, have a part in common.
+@finding(REFUTED, "samples-repeated", "Give each sample once.")
+def samples_repeated(kind: FindingKind, paths: Sequence[Path], records: Sequence[Array]) -> list[Finding]:
+    """Two files have rows in common. The estimate would look more accurate than it is.
+
+    Args:
+        records: (n, c) of each file, as it stands there.
 
     Raises:
         DataError: `data-repeated`, one holds what another does.
@@ -153,10 +118,7 @@ def samples_repeated(paths: Sequence[Path], records: Sequence[Array]) -> list[Fi
             )
             where = Location(str(path), 1, 1, "")
             raise DataError.because("data-repeated", message, "give each record once", "", where)
-        message = (
-            f"{count} of {len(ours)} samples of {path.name} stand in {other.name} as well. Counted twice, "
-            "they make the estimate look more accurate than it is."
-        )
-        own = SAMPLES_REPEATED.found(message, where=path.name, samples=count, of=len(ours), other=other.name)
-        found += [own] if share >= _PART else []
+        fact = f"{count} of {len(ours)} samples of {path.name} stand in {other.name} as well"
+        if share >= _PART:
+            found.append(kind.found(fact, where=path.name, samples=count, of=len(ours), other=other.name))
     return found

@@ -103,15 +103,11 @@ def _spikes(y: Array) -> NDArray[np.int64]:
 
 def _replaced(name: str, y: Array, at: NDArray[np.int64], lines: NDArray[np.int64]) -> list[Finding]:
     """Say which samples of an output y (n,), with their rows in the file, were replaced."""
-    if not at.size:
-        return []
-    first = int(at[0])
-    said = f"{name} has {len(at)} single spikes ({listed(lines[at])}). Interpolation replaces them."
+    fact = f"{name} in {listed(lines[at])}"
     if len(at) == 1:
-        around = 0.5 * (y[first - 1] + y[first + 1])
-        said = f"{name} has a spike in row {lines[first]}: {y[first]:.6g} between values about {around:.6g}. "
-        said += "Interpolation replaces it."
-    return [SPIKES_REPLACED.found(said, where=name, rows=lines[at].tolist(), values=y[at].tolist())]
+        around = 0.5 * (y[at[0] - 1] + y[at[0] + 1])
+        fact += f", {y[at[0]]:.6g} between values about {around:.6g}"
+    return SPIKES_REPLACED.when(at.size, fact, where=name, rows=lines[at].tolist(), values=y[at].tolist())
 
 
 def outlying(name: str, x: Array, u: Array | None, lines: NDArray[np.int64]) -> list[Finding]:
@@ -122,11 +118,10 @@ def outlying(name: str, x: Array, u: Array | None, lines: NDArray[np.int64]) -> 
     far = _far(x)
     if u is not None and np.any(far):
         far &= _far(x - _caused(u, x))
-    count = int(far.sum())
-    if not 0 < count <= _OFTEN * x.size:
-        return []
-    said = f"{name} has {count} outlying value{'s' * (count > 1)} ({listed(lines[far])}): look at the record."
-    return [OUTLYING_VALUES.found(said, where=name, values=count, rows=lines[far][:5].tolist())]
+    count, rows = int(far.sum()), lines[far]
+    fact = f"{count} of {name} ({listed(rows)})"
+    seldom = 0 < count <= _OFTEN * x.size
+    return OUTLYING_VALUES.when(seldom, fact, where=name, values=count, rows=rows[:5].tolist())
 
 
 def sensor_limits(name: str, x: Array) -> list[Finding]:
@@ -138,19 +133,15 @@ def sensor_limits(name: str, x: Array) -> list[Finding]:
         runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
         stays = int(runs[runs >= _RUN].sum())
         if levels.size > _FEW_LEVELS and stays > _CLIPPED * x.size:
-            said = f"{name} stays at its {word} value {value:.6g} for {stays} samples: is it saturated?"
-            found.append(SENSOR_SATURATED.found(said, where=name, value=value, samples=stays))
+            fact = f"{name} at its {word} value {value:.6g} for {stays} samples"
+            found.append(SENSOR_SATURATED.found(fact, where=name, value=value, samples=stays))
     gaps = np.diff(levels)
     step = float(gaps.min(initial=np.inf))
     # Values that are not rounded hardly come again.
-    rounded = step < np.inf and 2 * levels.size < x.size
-    if (
-        rounded
-        and step > _COARSE * spread
-        and np.all(np.abs(gaps / step - np.round(gaps / step)) < _OFF_GRID)
-    ):
-        said = f"{name} is rounded to steps of {step:.3g}, {step / spread:.2f} of its standard deviation."
-        found.append(SENSOR_ROUNDED.found(said, where=name, step=step, share=step / spread))
+    visible = _COARSE * spread < step < np.inf and 2 * levels.size < x.size
+    if visible and np.all(np.abs(gaps / step - np.round(gaps / step)) < _OFF_GRID):
+        fact = f"{name} in steps of {step:.3g}, {step / spread:.2f} of its standard deviation"
+        found.append(SENSOR_ROUNDED.found(fact, where=name, step=step, share=step / spread))
     return found
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, Severity, doubt, unsure
+from inputdesign_cli.finding import DOUBT, NOTE, UNDECIDED, Finding, FindingKind, finding
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.faults import Spikes
 from inputdesign_cli.identification.nonlinearity import Cubes, SilentLines
@@ -23,20 +23,6 @@ _DOUBT = 0.05
 _WAYS = 2
 MATTERS = 0.5
 """From this share of the admissible error on, a quarter in mean square, a change leaves a verdict open."""
-
-SILENT_LINES = doubt(
-    "silent-lines-answer",
-    "Outputs respond at lines that are not excited. A linear plant does not. Odd nonlinearities respond at "
-    "odd harmonics, even ones at even harmonics. An F test compares the power there with the noise.",
-    "Look for saturation, dead zones and backlash. Check that the input was applied as recorded.",
-)
-NONLINEAR = unsure(
-    "nonlinear-response",
-    "A nonlinearity changes the measured response. Odd lines without excitation show by how much. From half "
-    "of the admissible error on, the response does not count as met.",
-    "Measure at a smaller amplitude, or with other phases. More periods do not help.",
-    "nonlinearity",
-)
 
 
 @dataclass(frozen=True)
@@ -104,77 +90,67 @@ def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:
     return min(float(silent[kind].probability.min()) * tests, 1.0)
 
 
-def silent_lines_answer(silent: Mapping[str, SilentLines]) -> list[Finding]:
-    """Return a finding for each kind of lines, odd or even, with more than noise."""
+@finding(
+    DOUBT,
+    "silent-lines-answer",
+    "Look for saturation, dead zones and backlash. Check that the input was applied as recorded.",
+)
+def silent_lines_answer(kind: FindingKind, silent: Mapping[str, SilentLines]) -> list[Finding]:
+    """Outputs respond at lines that are not excited. A linear plant does not.
+
+    Odd nonlinearities respond at odd harmonics, even ones at even harmonics. An F test compares the power
+    there with the noise.
+    """
     seen = []
-    for kind, found in silent.items():
-        chance, rms = _chance(silent, kind), ", ".join(f"{value:.3g}" for value in found.rms)
-        message = (
-            f"the outputs answer at {kind} lines that are not excited (rms {rms}, probability of chance "
-            f"{chance:.2g}). Either a nonlinearity of {kind} degree acts, or an input was not applied as "
-            "recorded"
-        )
-        if chance < _SPEAKS:
-            seen.append(SILENT_LINES.found(message, where=kind, probability=chance, rms=found.rms.tolist()))
+    for parity, found in silent.items():
+        chance, rms = _chance(silent, parity), ", ".join(f"{value:.3g}" for value in found.rms)
+        fact = f"{parity} lines have rms {rms} (probability of chance {chance:.2g})"
+        seen += kind.when(chance < _SPEAKS, fact, where=parity, probability=chance, rms=found.rms.tolist())
     return seen
 
 
+@finding(
+    UNDECIDED,
+    "nonlinear-response",
+    "Measure at a smaller amplitude, or with other phases. More periods do not help.",
+    "nonlinearity",
+)
 def nonlinear_response(
-    units: Units, found: Distorted | None, w: Array, *, decided: bool = False
+    kind: FindingKind, units: Units, found: Distorted | None, w: Array, *, decided: bool = False
 ) -> list[Finding]:
-    """Return a finding on the change of a response at lines w (L,), in the unit of the user.
+    """A nonlinearity changes the measured response. Odd lines without excitation show by how much.
+
+    From half of the admissible error on, the response does not count as met.
 
     Args:
+        w: (L,), the lines, in the unit of the user.
         decided: whether noise alone decides already.
     """
     if found is None:
         return []
-    frequency, severity = float(w[found.line]), Severity.NOTE
-    change = f"about {found.share:.2g} of what is admitted, at {frequency:.3g} {units.per_time}"
-    message = f"a nonlinearity changes the response by little: {change}"
+    frequency, severity, remedy = float(w[found.line]), NOTE, "Nothing"
+    fact = f"about {found.share:.2g} of the admissible error, at {frequency:.3g} {units.per_time}"
     if found.matters:
-        severity = Severity.DOUBT if decided else Severity.UNDECIDED
-        cause = f"the cube of {found.cubed}" if found.cubed else "a nonlinearity"
-        message = (
-            f"{cause} changes the response by {change}. Odd lines that are not excited show it (probability "
-            f"of chance {found.probability:.2g}). More periods do not help: measure at a smaller amplitude, "
-            "or with other phases, and see whether the response stays"
-        )
+        severity, remedy = DOUBT if decided else UNDECIDED, ""
+        fact += f", by the cube of {found.cubed}" if found.cubed else ""
+        fact += f" (probability of chance {found.probability:.2g})"
     share, cubed, p = found.share, found.cubed or None, found.probability
-    return [
-        NONLINEAR.found(
-            message, severity=severity, share=share, frequency=frequency, cubed=cubed, probability=p
-        )
-    ]
+    figures = {"share": share, "frequency": frequency, "cubed": cubed, "probability": p}
+    return [replace(kind.found(fact, severity=severity, remedy=remedy), figures=figures)]
 
 
-SPIKES = unsure(
-    "spiked-periods",
-    "A few samples dominate the differences between periods. They hold most of the squared deviations from "
-    "the median of the periods. No verdict is possible.",
-    "Empty the faulty cells, and assess again.",
-    "spikes",
-)
-DRIFT = unsure(
-    "drifting-periods",
-    "Outputs drift from period to period. The means of the periods follow a polynomial in time. Drift leaks "
-    "into every line and changes the response or its scatter.",
-    "Add `--detrend linear`, or subtract the slow trend from the column first.",
-    "drift",
-)
-CHANCE = unsure(
-    "response-within-chance",
-    "The scatter of the periods leaves the verdict open. The admissible error lies between two limits for "
-    "the true deviation (95 % for all lines together).",
-    "Record as many periods as the finding names.",
-    "chance",
-)
-
-
+@finding(UNDECIDED, "spiked-periods", "Empty the faulty cells, and assess again.", "spikes")
 def spiked_periods(
-    units: Units, found: Sequence[Spikes], places: Sequence[str], samples: int, periods: int
-) -> Iterator[Finding]:
-    """Yield a finding for every output with spikes.
+    kind: FindingKind,
+    units: Units,
+    found: Sequence[Spikes],
+    places: Sequence[str],
+    samples: int,
+    periods: int,
+) -> list[Finding]:
+    """A few samples dominate the differences between periods. No verdict is possible.
+
+    They hold most of the squared deviations from the median of the periods.
 
     Args:
         places: where the samples of each of them stand, in words.
@@ -182,21 +158,29 @@ def spiked_periods(
         periods: of the same phase; of two nobody knows which one is wrong.
     """
     either = ", one of each two a period apart" if periods == 2 else ""
+    spiked = []
     for one, place in zip(found, places, strict=True):
         name = signal_name("y", one.output, units.outputs)
-        message = (
-            f"spikes decide how the periods of {name} differ: {len(one.samples)} of {samples} samples (at "
-            f"{place}{either}) hold {100 * one.share:.3g} % of the squares. Noise, nonlinearity and needed "
-            "periods cannot be judged. Empty the cells that are faults of measurement, and assess again: "
-            "the other whole periods count"
+        fact = (
+            f"{len(one.samples)} of {samples} samples of {name} (at {place}{either}) hold "
+            f"{100 * one.share:.3g} % of the squares"
         )
-        yield SPIKES.found(message, where=name, samples=list(one.samples), share=one.share)
+        spiked.append(kind.found(fact, where=name, samples=list(one.samples), share=one.share))
+    return spiked
 
 
+@finding(
+    UNDECIDED,
+    "drifting-periods",
+    "Add `--detrend linear`, or subtract the slow trend from the column first.",
+    "drift",
+)
 def drifting_periods(
-    units: Units, drift: PeriodDrift, moved: Array, w: Array, *, lined: bool
+    kind: FindingKind, units: Units, drift: PeriodDrift, moved: Array, w: Array, *, lined: bool
 ) -> list[Finding]:
-    """Return a finding on a drift that changes the response enough to decide.
+    """Outputs drift from period to period. The means of the periods follow a polynomial in time.
+
+    Drift leaks into every line and changes the response or its scatter.
 
     Args:
         moved: (L,), the change over what is admitted, at frequencies w in the unit of the user.
@@ -208,30 +192,37 @@ def drifting_periods(
     sizes = {signal_name("y", i, units.outputs): float(np.ptp(drift.curve[:, i])) for i in moving}
     listed = " and ".join(f"{name} drifts by {size:.3g}" for name, size in sizes.items())
     straight = int(drift.degree.max()) == 1 and not lined
-    remedy = "add --detrend linear" if straight else "subtract its course, which is no line, from the column"
-    message = (
-        f"{listed} over the record, by the means of the periods. This changes the response, or its scatter, "
-        f"by up to {share:.2g} of what is admitted, at {frequency:.3g} {units.per_time}. Neither more "
-        f"periods nor another amplitude helps: {remedy}, and assess again"
+    fact = (
+        f"{listed}. The response, or its scatter, changes by up to {share:.2g} of the admissible error, at "
+        f"{frequency:.3g} {units.per_time}"
     )
-    where = ", ".join(sizes)
-    found = DRIFT.found(
-        message, where=where, drift=sizes, share=share, frequency=frequency, straight=straight
+    return kind.when(
+        share >= MATTERS,
+        fact,
+        where=", ".join(sizes),
+        remedy="Add --detrend linear." if straight else "Subtract the drift, which is no line, first.",
+        drift=sizes,
+        share=share,
+        frequency=frequency,
+        straight=straight,
     )
-    return [found] if share >= MATTERS else []
 
 
+@finding(UNDECIDED, "response-within-chance", "Record as many periods as the finding names.", "chance")
 def within_chance(
-    units: Units, ratio: float, limits: tuple[float, float], frequency: float, enough: str
+    kind: FindingKind, units: Units, ratio: float, limits: tuple[float, float], frequency: float, enough: str
 ) -> Finding:
-    """Return the finding that limits of the largest deviation over the admitted one enclose 1.
+    """The scatter of the periods leaves the verdict open. The true deviation lies between two limits.
+
+    The admissible error is between them (95 % for all lines together).
 
     Args:
+        ratio: the largest one of a deviation to the admissible one; `limits`: of the true one.
         frequency: of the largest ratio, in the unit of the user.
         enough: how many periods are needed, in words.
     """
-    message = (
-        f"the largest deviation is {ratio:.4g} of what is admitted, at {frequency:.4g} {units.per_time}. By "
-        f"chance the true one may lie between {limits[0]:.3g} and {limits[1]:.3g}: {enough}"
+    fact = (
+        f"the largest deviation is {ratio:.4g} of the admissible one, at {frequency:.4g} {units.per_time}, "
+        f"and the true one between {limits[0]:.3g} and {limits[1]:.3g}"
     )
-    return CHANCE.found(message, ratio=ratio, limits=limits, frequency=frequency)
+    return kind.found(fact, remedy=f"{enough}.", ratio=ratio, limits=limits, frequency=frequency)

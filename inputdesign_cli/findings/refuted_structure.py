@@ -14,7 +14,7 @@ from inputdesign_cli.outcome.shares import chance
 from inputdesign_cli.plant import Model
 
 _SHARE = 0.1  # of the lag that is there: where the search for another one begins
-_LAG = "one more lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
+_LAG = "a further lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
 def remedies_of(model: Model) -> dict[str, str]:
@@ -39,21 +39,21 @@ def _of_plant(plant: Mapping[str, Plain]) -> str:
     if "gain" in stated:
         return _lag_more(stated)
     if "state_space" in plant:
-        return "give A, B and C of the state space one more state"
+        return "give A, B and C of the state space a further state"
     if "parameters" not in plant:
         if "continuous" in plant:
             return "raise the orders of numerator and denominator"
         return "raise the orders of B and F (or A), or change the delay"
     if "continuous" in plant:
-        return f"give the numerator one more coefficient, or the denominator {_LAG}"
-    return "give B or F (or A) one more coefficient, by a name in parameters"
+        return f"give the numerator a further coefficient, or the denominator {_LAG}"
+    return "give B or F (or A) a further coefficient, by a name in parameters"
 
 
 def _lag_more(stated: Mapping[str, Plain]) -> str:
     """Return the advice that writes a plant given by gain and time constants with an additional lag."""
     kept = ", ".join(stated)
     if not all(isinstance(value, (int, float)) for value in stated.values()):
-        return f"write entries by numerator and denominator, with one more lag, in place of {kept}"
+        return f"write entries by numerator and denominator, with a further lag, in place of {kept}"
     if "time_constant" in stated:
         slow, poles, own = stated["time_constant"], "[T1, 1]", {"T1": stated["time_constant"]}
     else:
@@ -100,7 +100,7 @@ DRIFT = refuted(
 )
 MISSING = refuted(
     "parameter-missing",
-    "The model lacks a parameter. One more parameter of plant or noise explains the data much better than "
+    "The model lacks a parameter. A further parameter of plant or noise explains the data much better than "
     "chance would.",
     "Estimate this parameter too.",
 )
@@ -116,70 +116,35 @@ NONLINEAR = refuted(
     "linear model alone.",
     "Use the input range for which the model is meant, or record the true output of the actuator as u.",
 )
-
 # Drift makes other tests fail; an error of G makes tests of the noise fail.
-OF_MANY = {
-    "drift": (
-        DRIFT,
-        "the residuals drift slowly{where} (probability {p}), which other tests notice too: {remedy}, "
-        "remove the trend from the record, or use a part of it without drift",
-    ),
-    "plant": (
-        PLANT,
-        "past inputs explain residuals{where} (probability {p}), most at lag {lag}: the plant has more "
-        "structure than the model; {remedy}, or compare with an FIR model (B: [0, 1, 1, ..]) that is long "
-        "enough",
-    ),
-    "noise": (
-        NOISE,
-        "the residuals are not white{where} (probability {p}), most at lag {lag}: the noise has more "
-        "structure than the model, and the covariance is not to be trusted; {remedy}",
-    ),
-}
-_ONE_MISSING = "one parameter is missing (probability {p} without it): {phrase}"
-_OF_ONE = {
-    "plant": (MISSING, _ONE_MISSING),
-    "noise": (MISSING, _ONE_MISSING),
-    "change": (
-        CHANGED,
-        "the plant did not stay the same: {phrase} explains the data better (probability {p} without it); "
-        "{remedy}",
-    ),
-    "nonlinear": (
-        NONLINEAR,
-        "the plant is not linear: {phrase} explains the data better (probability {p} without it); {remedy}",
-    ),
-}
-REMEDY = {
-    "plant": "estimate it along",
-    "noise": "estimate it along",
-    "change": "assess the parts of the record one by one (--range), and look for what changed between them",
-    "nonlinear": "a linear model holds for one range of the input only: use the range that the model is for, "
-    "or give as u what the actuator really does",
+OF_MANY = {"drift": DRIFT, "plant": PLANT, "noise": NOISE}
+OF_ONE = {"plant": MISSING, "noise": MISSING, "change": CHANGED, "nonlinear": NONLINEAR}
+_FURTHER = {
+    "drift": ", remove the trend from the record, or use a part of it without drift",
+    "plant": ", or compare with a long FIR model (B: [0, 1, 1, ..])",
+    "noise": "",
 }
 
 
 def refutations(model: Model, estimate: Estimate) -> list[Finding]:
-    """Return the strongest test of each kind of fault, and the single parameters that are missing.
-
-    Of an output that shifts see `level_shifts.py`.
-    """
+    """Return the strongest test of each kind of fault, and the single parameters that are missing."""
     directed = {one.test: one.alternatives for one in estimate.tests.directed}
     failing = sorted(estimate.tests.failed_besides, key=lambda test: test.probability)
     remedies, found = remedies_of(model), []
-    for fault, (kind, sentence) in OF_MANY.items():
+    for fault, kind in OF_MANY.items():
         test = next((test for test in failing if test.fault == fault and test not in directed), None)
         if test is not None:
-            p, remedy, where = chance(test.probability), remedies[fault], _where(model, test)
-            said = sentence.format(p=p, lag=test.lag, remedy=remedy, where=where)
-            found.append(kind.found(said, where=test.name, probability=test.probability, lag=test.lag))
+            lag = "" if fault == "drift" else f", most at lag {test.lag}"
+            fact = f"probability {chance(test.probability)} by chance{lag}{_where(model, test)}"
+            remedy = f"{remedies[fault][:1].upper()}{remedies[fault][1:]}{_FURTHER[fault]}."
+            p = test.probability
+            found.append(kind.found(fact, where=test.name, remedy=remedy, probability=p, lag=test.lag))
     for test in failing:
         if test in directed:
-            kind, sentence = _OF_ONE[test.fault]
             first, *others = (one.phrase for one in directed[test])
-            said = sentence.format(p=chance(test.probability), phrase=first, remedy=REMEDY[test.fault])
-            said += f"; nearly the same on these data: {', '.join(others)}" if others else ""
-            found.append(kind.found(said, where=test.name, probability=test.probability))
+            fact = f"{first} (probability {chance(test.probability)} without it)"
+            fact += f"; nearly the same on these data: {', '.join(others)}" if others else ""
+            found.append(OF_ONE[test.fault].found(fact, where=test.name, probability=test.probability))
     return found
 
 
@@ -189,6 +154,6 @@ def _where(model: Model, test: ScoreTest) -> str:
         return ""
     output, source = f"y{test.output + 1}", test.source + 1
     if test.fault == "plant":
-        return f", those of {output} by u{source} most"
+        return f", for {output} by u{source}"
     own = test.fault == "drift" or test.output == test.source
-    return f", those of {output} most" if own else f", those of {output} after those of y{source} most"
+    return f", for {output}" if own else f", for {output} after y{source}"

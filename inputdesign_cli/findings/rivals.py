@@ -9,7 +9,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.finding import Finding, Severity, doubt, note, unsure
+from inputdesign_cli.finding import DOUBT, NOTE, UNDECIDED, Finding, FindingKind, finding
 from inputdesign_cli.identification import Estimate, Rival
 from inputdesign_cli.outcome.design import Rival as Entry
 from inputdesign_cli.outcome.units import Units
@@ -17,31 +17,6 @@ from inputdesign_cli.plant import Model
 
 # Parameters that are named: the few that differ most.
 _MOST_NAMES = 4
-
-OTHER_MINIMUM = unsure(
-    "other-minimum",
-    "Other parameters explain the data nearly as well. The likelihood has another minimum of nearly the "
-    "same depth. Its G differs by more than the error bound or the admissible error.",
-    "Excite more frequencies, or fix known parameters with `plant.known`.",
-)
-RULED_OUT = note(
-    "minimum-ruled-out",
-    "The uncertainty excludes another minimum. Its parameters explain the data nearly as well, but lie far "
-    "outside the region of `uncertainty` for the plant.",
-    "Check whether `uncertainty` is right.",
-)
-FORESEEN = doubt(
-    "other-minimum-foreseen",
-    "A record of the design may have other minima. The likelihood of a simulated record has another minimum "
-    "of nearly the same depth, with another G. Estimates may end there, and `assess` would then be "
-    "undecided.",
-    "Excite more frequencies, or fix a known dead time with `plant.known`.",
-)
-NOT_FORESEEN = note(
-    "other-minima-not-looked-at",
-    "Other minima were not searched for. A plant with dead times may have some, whole periods away.",
-    "Allow more time, or try `idesign simulate`.",
-)
 
 
 @dataclass(frozen=True)
@@ -101,7 +76,9 @@ def most_apart(estimate: Estimate, rival: Rival) -> list[int]:
     return sorted(most.tolist())
 
 
+@finding(UNDECIDED, "other-minimum", "Excite more frequencies, or fix known parameters with `plant.known`.")
 def other_minima(
+    kind: FindingKind,
     units: Units,
     model: Model,
     estimate: Estimate,
@@ -109,7 +86,9 @@ def other_minima(
     unstated: Sequence[OnModelError],
     information: Array,
 ) -> list[Finding]:
-    """Return a finding for each rival with another G: it is undecided where more than admitted depends on it.
+    """Other parameters explain the data nearly as well. The likelihood has another minimum.
+
+    It is nearly as deep, and its G differs by more than the error bound or the admissible error.
 
     Args:
         errors: what is asked of the model error.
@@ -120,11 +99,9 @@ def other_minima(
     decides = beyond(model, estimate, errors) if errors else doubtful
     undecided = {id(one.rival) for one in decides}
     return [
-        OTHER_MINIMUM.found(
-            f"other parameters explain the data nearly as well ({_parameters(estimate, one.rival)}; -2 log "
-            f"likelihood is {one.rival.excess:.3g} higher), and their G differs by {_far(units, one)}: "
-            "excite more frequencies, or hold what is known (plant.known)",
-            severity=Severity.UNDECIDED if id(one.rival) in undecided else Severity.DOUBT,
+        kind.found(
+            f"{_values(estimate, one.rival)}, {_higher(one.rival)}, with another G ({_far(units, one)})",
+            severity=UNDECIDED if id(one.rival) in undecided else DOUBT,
             ratio=one.ratio,
             measure=one.measure,
             excess=one.rival.excess,
@@ -133,41 +110,48 @@ def other_minima(
     ]
 
 
-def ruled_out(estimate: Estimate, found: Sequence[Rival]) -> list[Finding]:
-    """Return a finding on minima that what the spec knows of the plant rules out."""
+@finding(NOTE, "minimum-ruled-out", "Check whether `uncertainty` is right.")
+def ruled_out(kind: FindingKind, estimate: Estimate, found: Sequence[Rival]) -> list[Finding]:
+    """The uncertainty excludes another minimum. Its parameters explain the data nearly as well.
+
+    They lie far outside the region of `uncertainty` for the plant.
+    """
     if not found:
         return []
     first = min(found, key=lambda one: one.excess)
-    message = (
-        f"{_parameters(estimate, first)}{_more(found)} would explain the data nearly as well "
-        f"({_higher(first)}), but is far outside the uncertainty of the plant, and does not count"
-    )
-    return [RULED_OUT.found(message, where="uncertainty", excess=first.excess, minima=len(found))]
+    fact = f"{_values(estimate, first)}, {_higher(first)}{_more(found)}"
+    return [kind.found(fact, where="uncertainty", excess=first.excess, minima=len(found))]
 
 
-def foreseen_rivals(units: Units, estimate: Estimate, found: Sequence[Apart], remedy: str) -> list[Finding]:
-    """Return a finding on rivals that a record of the design would leave."""
+@finding(
+    DOUBT, "other-minimum-foreseen", "Excite more frequencies, or fix a known dead time with `plant.known`."
+)
+def foreseen_rivals(
+    kind: FindingKind, units: Units, estimate: Estimate, found: Sequence[Apart], remedy: str
+) -> list[Finding]:
+    """Other parameters would explain a record of the design nearly as well. Its likelihood has other minima.
+
+    The record was simulated. Estimates may end at another G, and `assess` would then be undecided.
+    """
     if not found:
         return []
     nearest = min(found, key=lambda one: one.rival.excess)
-    message = (
-        "other parameters would explain this kind of record nearly as well: in a simulated one also "
-        f"{_parameters(estimate, nearest.rival)}{_more(found)}, of which {_higher(nearest.rival)} and G "
-        f"differs by {_far(units, nearest)}. Estimates may end there, whatever r_u says, and assess would "
-        f"call such a record undecided: {remedy}"
+    fact = (
+        f"{_values(estimate, nearest.rival)}, {_higher(nearest.rival)}{_more(found)}, with another G "
+        f"({_far(units, nearest)})"
     )
-    return [FORESEEN.found(message, excess=nearest.rival.excess, ratio=nearest.ratio, minima=len(found))]
+    figures = {"excess": nearest.rival.excess, "ratio": nearest.ratio, "minima": len(found)}
+    return [replace(kind.found(fact, remedy=f"{remedy[:1].upper()}{remedy[1:]}."), figures=figures)]
 
 
-def not_foreseen(reason: str) -> Finding:
-    """Return the finding that other minima were not looked for, and why."""
-    return NOT_FORESEEN.found(
-        f"{reason}: whether other dead times would explain the record nearly as well was not examined"
-    )
+@finding(NOTE, "other-minima-not-looked-at", "Allow more time, or try `idesign simulate`.")
+def not_foreseen(kind: FindingKind, reason: str) -> Finding:
+    """Other minima were not searched for. A plant with dead times may have some, whole periods away."""
+    return kind.found(reason)
 
 
 def _higher(one: Rival) -> str:
-    return f"-2 log likelihood is {abs(one.excess):.3g} {'higher' if one.excess >= 0.0 else 'lower'}"
+    return f"-2 log likelihood {abs(one.excess):.3g} {'higher' if one.excess >= 0.0 else 'lower'}"
 
 
 def _more(found: Sequence[object]) -> str:
@@ -175,8 +159,8 @@ def _more(found: Sequence[object]) -> str:
 
 
 def _far(units: Units, one: Apart) -> str:
-    return f"{one.ratio:.3g} times {one.measure} about {units.named(one.w)}"
+    return f"by {one.ratio:.3g} times {one.measure} about {units.named(one.w)}"
 
 
-def _parameters(estimate: Estimate, rival: Rival) -> str:
+def _values(estimate: Estimate, rival: Rival) -> str:
     return ", ".join(f"{estimate.names[i]} = {rival.theta[i]:.4g}" for i in most_apart(estimate, rival))

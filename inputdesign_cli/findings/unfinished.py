@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from inputdesign_cli.compute.time_limit import more_time, what_ended
-from inputdesign_cli.finding import Finding, doubt, note
+from inputdesign_cli.finding import DOUBT, NOTE, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.outcome import Objective
 from inputdesign_cli.outcome.robust import FloorUse
 from inputdesign_cli.outcome.shares import per_cent
 
 DESIGN_UNFINISHED = doubt(
     "design-unfinished",
-    "The time limit ended the design before its proof closed. The design meets all requirements. The gap "
+    "The design ended before its proof closed. It meets all requirements. The gap "
     "bounds how much better another design could be.",
     "Allow more time.",
 )
@@ -32,95 +32,6 @@ ONLY_APPROACHED = doubt(
     "power there. No record reaches this limit.",
     "Give this excitation a cost or a limit, or exclude its frequency by `limits.band`.",
 )
-NO_RECORD_IN_TIME = doubt(
-    "no-record-in-time",
-    "There was no time for a record. The spectrum is complete, but no record of it was found.",
-    "Allow more time, or try fewer records (`signal.candidates`) or shorter ones (`signal.samples`).",
-)
-ON_GRID = doubt(
-    "accuracy-on-grid",
-    "The accuracy holds only on a grid of frequencies. `solver.method: lmi` is the program of the papers. "
-    "Between the grid points the accuracy may be missed.",
-    "Use `solver.method: exchange`, which keeps the accuracy at every frequency.",
-)
-
-
-def ended_early(status: str, objective: Objective) -> list[Finding]:
-    """Return what the end of the time left open: the proof, or the bound over every spectrum."""
-    if status == "gap_open":
-        message = (
-            f"{what_ended()} ended the design: it meets all that is required, and {_how_far(objective)}; "
-            f"{more_time()} to close the gap"
-        )
-        return [DESIGN_UNFINISHED.found(message, where="solver", relative_gap=objective.relative_gap)]
-    if objective.any_spectrum_bound is not None:
-        return []
-    message = (
-        f"{what_ended()} came before the bound over every spectrum; solver.any_spectrum_tolerance: 0.01 "
-        "would take less time"
-    )
-    return [OTHER_SPECTRA_LEFT_OUT.found(message, where="solver")]
-
-
-def _how_far(objective: Objective) -> str:
-    if objective.upper_bound:
-        return f"no other gets above {objective.upper_bound:.6g}"
-    if not objective.lower_bound:
-        return "nothing is proved yet of others"
-    gap = per_cent(1.0 if objective.relative_gap is None else objective.relative_gap, 2)
-    return f"no other gets below {objective.lower_bound:.6g} ({gap} lower)"
-
-
-def other_spectra_left_out() -> Finding:
-    """Return the finding that the bound over every spectrum was not asked for."""
-    message = (
-        "the design is the best of its spectrum type; what other spectra reach was not computed "
-        "(solver.any_spectrum: false, or --fast)"
-    )
-    return OTHER_SPECTRA_LEFT_OUT.found(message, where="solver.any_spectrum")
-
-
-def uncounted_excitation(message: str, *, bounded: bool) -> Finding:
-    """Return the finding that spectra come ever nearer to excitation that nothing counts.
-
-    Args:
-        message: what is not counted, and what to do.
-        bounded: whether what they reach has a bound.
-    """
-    return (ONLY_APPROACHED if bounded else NO_BOUND_EXISTS).found(message)
-
-
-def no_record_in_time(candidates: int) -> Finding:
-    """Return the finding that the time was over before a record was found, of a number of candidates."""
-    fewer = "fewer records (signal.candidates: 1) or shorter ones" if candidates > 1 else "a shorter one"
-    message = (
-        f"there is no record: {what_ended()} came before one was found; the spectrum is that of the design. "
-        f"To have one, {more_time()}, or try {fewer} (signal.samples)"
-    )
-    return NO_RECORD_IN_TIME.found(message, where="signal", candidates=candidates)
-
-
-def on_grid(lines: int, ratio: float) -> Finding:
-    """Return the finding that the accuracy holds at a number of frequencies, with the largest ratio."""
-    message = (
-        f"the accuracy holds on the grid of {lines} frequencies; over the whole band r_u / r_adm is at most "
-        f"{ratio:.6g} (solver.method: exchange keeps it at every frequency)"
-    )
-    return ON_GRID.found(message, where="solver.method", grid=lines, worst_ratio=ratio)
-
-
-FRESH_PLANTS_CUT = note(
-    "fresh-plants-cut-short",
-    "The trial on new plants was cut short. It includes fewer plants than `uncertainty.fresh`. The 95 % "
-    "limits hold for these.",
-    "Allow more time.",
-)
-DRAWS_UNSTABLE = doubt(
-    "draws-unstable",
-    "Most draws are unstable plants. They could not be in operation, and are drawn again. Every statement "
-    "concerns stable plants only.",
-    "Restrict `uncertainty` to plants that can be in operation, or check the controller.",
-)
 LOST_PLANTS = doubt(
     "plants-lost",
     "For some plants no experiment is enough. The controller misses the requirement at these plants even if "
@@ -135,21 +46,84 @@ RAISED_PLANTS = doubt(
 )
 
 
-def fewer_plants(tried: int, asked: int) -> list[Finding]:
-    """Return a finding if fewer fresh plants were tried than were asked for."""
-    message = f"{what_ended()} ended the trial on fresh plants after {tried} of {asked} (uncertainty.fresh)"
-    found = FRESH_PLANTS_CUT.found(message, where="uncertainty.fresh", tried=tried, asked=asked)
-    return [found] if tried < asked else []
-
-
-def unstable_draws(rejected: int, drawn: int) -> list[Finding]:
-    """Return a finding if most of the draws were no plants that could be in operation."""
-    message = (
-        f"{rejected} of {drawn} draws were unstable, or no plants, and were drawn again: results hold for "
-        "the others alone; state what the plant can be in operation (uncertainty), or check the controller"
+def ended_early(status: str, objective: Objective) -> list[Finding]:
+    """Return what the end of the time left open: the proof, or the bound over every spectrum."""
+    if status == "gap_open":
+        fact = f"{what_ended()} ended the design, {_how_far(objective)}"
+        remedy, gap = f"To close the gap, {more_time()}.", objective.relative_gap
+        return [DESIGN_UNFINISHED.found(fact, where="solver", remedy=remedy, relative_gap=gap)]
+    remedy = f"To have it, {more_time()}, or write solver.any_spectrum_tolerance: 0.01."
+    fact = f"{what_ended()} came before it"
+    return OTHER_SPECTRA_LEFT_OUT.when(
+        objective.any_spectrum_bound is None, fact, where="solver", remedy=remedy
     )
-    found = DRAWS_UNSTABLE.found(message, where="uncertainty", rejected=rejected, drawn=drawn)
-    return [found] if 2 * rejected > drawn else []
+
+
+def _how_far(objective: Objective) -> str:
+    if objective.upper_bound:
+        return f"and no other design gets above {objective.upper_bound:.6g}"
+    if not objective.lower_bound:
+        return "and nothing is proved yet of other designs"
+    gap = per_cent(1.0 if objective.relative_gap is None else objective.relative_gap, 2)
+    return f"and no other design gets below {objective.lower_bound:.6g} ({gap} lower)"
+
+
+def other_spectra_left_out() -> Finding:
+    """Return the finding that the bound over every spectrum was not asked for."""
+    return OTHER_SPECTRA_LEFT_OUT.found("it was not requested", where="solver.any_spectrum")
+
+
+def uncounted_excitation(message: str, *, bounded: bool) -> Finding:
+    """Return the finding that spectra come ever nearer to excitation that nothing counts.
+
+    Args:
+        message: what is not counted, and what to do.
+        bounded: whether what they reach has a bound.
+    """
+    return (ONLY_APPROACHED if bounded else NO_BOUND_EXISTS).found(message, remedy="Nothing")
+
+
+@finding(
+    DOUBT,
+    "no-record-in-time",
+    "Allow more time, or try fewer records (`signal.candidates`) or shorter ones (`signal.samples`).",
+)
+def no_record_in_time(kind: FindingKind, candidates: int) -> Finding:
+    """There was no time for a record. The spectrum is complete, but no record of it was found."""
+    return kind.found(f"{what_ended()} came before one was found", where="signal", candidates=candidates)
+
+
+@finding(
+    DOUBT, "accuracy-on-grid", "Use `solver.method: exchange`, which keeps the accuracy at every frequency."
+)
+def on_grid(kind: FindingKind, lines: int, ratio: float) -> Finding:
+    """The accuracy holds only on a grid of frequencies. `solver.method: lmi` is the program of the papers.
+
+    Between the grid points the accuracy may be missed.
+    """
+    fact = f"on the grid of {lines} frequencies; over the whole band r_u / r_adm is at most {ratio:.6g}"
+    return kind.found(fact, where="solver.method", grid=lines, worst_ratio=ratio)
+
+
+@finding(NOTE, "fresh-plants-cut-short", "Allow more time.")
+def fewer_plants(kind: FindingKind, tried: int, asked: int) -> list[Finding]:
+    """The trial on new plants was cut short. The 95 % limits hold for the plants that were tried."""
+    fact = f"{what_ended()} ended it after {tried} of {asked}"
+    return kind.when(tried < asked, fact, where="uncertainty.fresh", tried=tried, asked=asked)
+
+
+@finding(
+    DOUBT,
+    "draws-unstable",
+    "Restrict `uncertainty` to plants that can be in operation, or check the controller.",
+)
+def unstable_draws(kind: FindingKind, rejected: int, drawn: int) -> list[Finding]:
+    """Most draws are unstable plants. They could not be in operation, and are drawn again.
+
+    Every statement concerns stable plants only.
+    """
+    fact = f"{rejected} of {drawn}"
+    return kind.when(2 * rejected > drawn, fact, where="uncertainty", rejected=rejected, drawn=drawn)
 
 
 def floor_findings(floor: FloorUse | None, scenarios: int) -> list[Finding]:
@@ -157,24 +131,17 @@ def floor_findings(floor: FloorUse | None, scenarios: int) -> list[Finding]:
     found: list[Finding] = []
     if floor is None:
         return found
-    share, lost, raised = f"{floor.share:g}", len(floor.lost), len(floor.raised)
+    lost, raised, where = list(floor.lost), len(floor.raised) - len(floor.lost), "uncertainty.floor"
+    share = f"{floor.share:g} of that at the plant of the spec"
     if floor.worst:
         first = floor.worst[0]
         values = ", ".join(f"{name} {value:.4g}" for name, value in first.parameters.items())
         reaches = "" if first.peak is None else f" (|S| reaches {first.peak:.4g})"
-        message = (
-            f"{lost} of {scenarios} plants miss what is asked even if they are known exactly, like plant "
-            f"{first.scenario}{reaches}: {values}. Their r_adm is that of uncertainty.floor, {share} of "
-            "that of the plant of the spec. No experiment makes this controller keep what is asked there: "
-            "ask for less, take another controller, or state the plant more tightly (floor in result.json)"
+        fact = (
+            f"{len(lost)} of {scenarios} plants, like plant {first.scenario}{reaches}: {values}. Their "
+            f"r_adm is {share}"
         )
-        found.append(LOST_PLANTS.found(message, where="uncertainty.floor", lost=list(floor.lost)))
-    if raised > lost:
-        message = (
-            f"at {raised - lost} of {scenarios} plants r_adm is somewhere less than {share} of that of the "
-            "plant of the spec. The design holds them to that share (uncertainty.floor): what is asked is "
-            "not promised there; a smaller floor holds them to their own r_adm"
-        )
-        at = [number for number in floor.raised if number not in floor.lost]
-        found.append(RAISED_PLANTS.found(message, where="uncertainty.floor", raised=at))
-    return found
+        found.append(LOST_PLANTS.found(fact, where=where, lost=lost))
+    at = [number for number in floor.raised if number not in lost]
+    fact = f"{raised} of {scenarios} plants, which have an r_adm of {share}"
+    return [*found, *RAISED_PLANTS.when(raised > 0, fact, where=where, raised=at)]

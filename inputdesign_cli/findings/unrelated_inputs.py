@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.explore import early_answers
-from inputdesign_cli.finding import Finding, doubt, note, refuted
+from inputdesign_cli.finding import REFUTED, Finding, FindingKind, doubt, finding, note
 from inputdesign_cli.identification import Estimate, ScoreTest
 from inputdesign_cli.identification.checks import signal_name
 from inputdesign_cli.identification.response_chance import driven_by_nothing, like_nothing_elsewhere
@@ -19,28 +19,10 @@ _OTHERWISE = 1e-6
 # Of the squares of prediction errors: what the future of an input explains if it moves the output.
 _MOSTLY = 0.5
 
-ANSWERING = refuted(
-    "input-answers-output",
-    "An input responds to the outputs. Prediction errors help to predict an input. In open loop no input "
-    "responds to the noise.",
-    "Correct late or swapped columns, or state a loop as `experiment.controller`.",
-)
-LATE = refuted(
-    "input-logged-late",
-    "An output moves before the input. The input was logged some samples late, or the columns use different "
-    "clocks.",
-    "Find out when the plant really gets its input, and log both together.",
-)
-IDLE = refuted(
-    "input-without-effect",
-    "An input has no visible effect. Its G cannot be distinguished from zero, though the plant of the spec "
-    "would respond clearly.",
-    "Check that the columns are of one experiment. If the plant does not respond, correct the spec.",
-)
 UNEXPLAINED = doubt(
     "output-unexplained",
-    "The inputs do not explain an output. Their simulation fits it worse than its mean. No effect can be "
-    "distinguished from zero.",
+    "The inputs explain nothing of an output. Their simulation fits it worse than its mean. No effect can "
+    "be distinguished from zero.",
     "Check that the columns belong to the plant, in the right order and units.",
 )
 NOISE_PREVAILS = note(
@@ -51,36 +33,37 @@ NOISE_PREVAILS = note(
 )
 
 
-def answering(units: Units, estimate: Estimate) -> list[Finding]:
-    """Return a finding for each input that answers outputs, or comes after their answer; none in a loop."""
+@finding(
+    REFUTED,
+    "input-answers-output",
+    "Correct late or swapped columns, or state a loop as `experiment.controller`.",
+)
+def answering(kind: FindingKind, units: Units, estimate: Estimate) -> list[Finding]:
+    """An input responds to the outputs. Prediction errors help to predict an input.
+
+    In open loop no input responds to the noise.
+    """
     found = []
     for test in estimate.tests.answering:
-        name = signal_name("u", test.source, units.inputs)
-        message = (
-            f"prediction errors help to predict {name} (probability {chance(test.probability)}), and no "
-            "input in open loop answers the noise: it was logged late, columns are swapped, or the data "
-            "come from a loop; mend the columns, or state the loop as experiment.controller"
-        )
-        answers = ANSWERING.found(message, where=name, probability=test.probability)
-        late = test.statistic > _MOSTLY * estimate.errors.size
-        found.append(_late(units.inputs, units.outputs, test) if late else answers)
+        if test.statistic > _MOSTLY * estimate.errors.size:
+            found.append(_late(units.inputs, units.outputs, test))
+            continue
+        name, p = signal_name("u", test.source, units.inputs), test.probability
+        found.append(kind.found(f"{name} (probability {chance(p)} by chance)", where=name, probability=p))
     return found
 
 
-def _late(inputs: int, outputs: int, test: ScoreTest) -> Finding:
-    """Return the finding for an input that an output answers some samples before it moves."""
-    name, output, lag = (
-        signal_name("u", test.source, inputs),
-        signal_name("y", test.output, outputs),
-        test.lag,
+@finding(
+    REFUTED, "input-logged-late", "Find out when the plant really gets its input, and log both together."
+)
+def _late(kind: FindingKind, inputs: int, outputs: int, test: ScoreTest) -> Finding:
+    """An output moves before the input. The input was logged late, or the columns use different clocks."""
+    name, output = signal_name("u", test.source, inputs), signal_name("y", test.output, outputs)
+    fact = (
+        f"{output} responds to {name} up to {test.lag} sample{'s' * (test.lag != 1)} early (probability "
+        f"{chance(test.probability)} by chance). It was logged late, columns are swapped, or clocks differ"
     )
-    message = (
-        f"{output} answers {name} up to {lag} {'sample' if lag == 1 else 'samples'} before that moves "
-        f"(probability {chance(test.probability)} by chance): the input was logged late, columns are "
-        "swapped, or the columns are not of one clock. See when the plant really gets its input, and write "
-        "both at the same times"
-    )
-    return LATE.found(message, where=name, samples=lag, probability=test.probability)
+    return kind.found(fact, where=name, samples=test.lag, probability=test.probability)
 
 
 def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
@@ -89,41 +72,37 @@ def late_inputs(parts: Sequence[tuple[Array, Array]]) -> list[Finding]:
     return [_late(inputs, outputs, test) for test in early_answers(parts)]
 
 
-def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> Iterator[Finding]:
-    """Yield a finding for each input that explains nothing, though at the plant of the spec it would.
+@finding(
+    REFUTED,
+    "input-without-effect",
+    "Check that the columns are of one experiment. If the plant does not respond, correct the spec.",
+)
+def idle(
+    kind: FindingKind, units: Units, nominal: Model, estimated: Model, estimate: Estimate
+) -> list[Finding]:
+    """An input explains nothing. Its G cannot be distinguished from zero.
+
+    The plant of the spec would respond clearly.
 
     Args:
         nominal, estimated: of one structure.
     """
+    found = []
     for j, zero, expected in like_nothing_elsewhere(nominal, estimated, estimate, units.step):
         name = signal_name("u", j, units.inputs)
-        message = (
-            f"{name} explains nothing of what was measured: G cannot be told from zero (probability "
-            f"{chance(zero)}), and the plant of the spec can: see whether the columns are those of one "
-            "experiment; if the plant does not answer, correct the spec"
+        fact = (
+            f"{name} (probability {chance(zero)} for no effect), though the plant of the spec would respond"
         )
-        if expected < _OTHERWISE:
-            yield IDLE.found(message, where=name, probability=zero)
+        found += kind.when(expected < _OTHERWISE, fact, where=name, probability=zero)
+    return found
 
 
-def hardly_explained(units: Units, model: Model, estimate: Estimate) -> Iterator[Finding]:
-    """Yield a finding for outputs that are farther from the simulation than from their mean."""
+def hardly_explained(units: Units, model: Model, estimate: Estimate) -> list[Finding]:
+    """Return a finding for outputs that are farther from the simulation than from their mean."""
     far = {i for i, fit in enumerate(estimate.simulation.fit) if fit is not None and fit < 0.0}
     unrelated = set(driven_by_nothing(model, estimate, units.step)) if far else set()
-    for kind, sentence, listed in (
-        (
-            UNEXPLAINED,
-            "the inputs explain nothing of {} in this model: see whether the columns are those of the "
-            "plant, in their order and their units, before anything is built on it",
-            far & unrelated,
-        ),
-        (
-            NOISE_PREVAILS,
-            "what the inputs cause in {} is seen, but noise and drift move it more: simulated from the "
-            "inputs alone, the model is farther off than the mean",
-            far - unrelated,
-        ),
-    ):
-        outputs = " and ".join(signal_name("y", i, len(estimate.noise)) for i in sorted(listed))
-        if listed:
-            yield kind.found(sentence.format(outputs), where=outputs)
+    found = []
+    for kind, idle_ in ((UNEXPLAINED, far & unrelated), (NOISE_PREVAILS, far - unrelated)):
+        outputs = " and ".join(signal_name("y", i, len(estimate.noise)) for i in sorted(idle_))
+        found += kind.when(outputs, outputs, where=outputs)
+    return found

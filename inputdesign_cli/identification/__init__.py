@@ -2,7 +2,11 @@
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
 from inputdesign_cli.identification.control_law import Shift as Shift, shifted as shifted
-from inputdesign_cli.identification.directed import Alternative as Alternative, Directed as Directed
+from inputdesign_cli.identification.directed import (
+    Directed as Directed,
+    Moves as Moves,
+    that_matter as that_matter,
+)
 from inputdesign_cli.identification.earlier import Earlier as Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
 from inputdesign_cli.identification.estimators import (
@@ -28,15 +32,11 @@ from inputdesign_cli.identification.level_shifts import (
     LevelShift as LevelShift,
     chance_of_shifts as chance_of_shifts,
 )
-from inputdesign_cli.identification.mattering import Moves as Moves, that_matter as that_matter
-from inputdesign_cli.identification.minima import Rival as Rival
-from inputdesign_cli.identification.noise_first import (
-    Noise as Noise,
-    noises_of_residuals as noises_of_residuals,
-)
 from inputdesign_cli.identification.residual_tests import (
     ResidualTest as ResidualTest,
     cross_correlations as cross_correlations,
     whiteness as whiteness,
 )
+from inputdesign_cli.identification.search import Rival as Rival
 from inputdesign_cli.identification.variations import RISING as RISING
+from inputdesign_cli.identification.white import Noise as Noise, noises_of_residuals as noises_of_residuals

@@ -15,17 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.noise_first import Whitening
-from inputdesign_cli.identification.problem import Point
-from inputdesign_cli.identification.records import Records, shifted
-from inputdesign_cli.identification.white import DEPENDENT, White
+from inputdesign_cli.identification.records import Point, Records, shifted
+from inputdesign_cli.identification.white import DEPENDENT, White, Whitening
 from inputdesign_cli.levels import level
 
 _LAGS = 25
@@ -63,8 +61,7 @@ class ScoreTest:
     source: int = 0
 
 
-@dataclass(frozen=True)
-class Regressors:
+class Regressors(NamedTuple):
     """What a test tries: columns (p, N, m) for every output, and their lags if they have any."""
 
     name: str
@@ -74,12 +71,27 @@ class Regressors:
     of_residuals: bool = False
 
     def white(self, white: White) -> Array:
-        """Return columns ((N + M) p, p m), each in one output, in units of the noise."""
-        return white.columns(_of_outputs(self.columns))
+        """Return columns ((N + M) p, p m), each in one output and zero in others, in units of the noise."""
+        p, samples, m = self.columns.shape
+        found = np.zeros((p, m, samples, p))
+        for output, own in enumerate(self.columns):
+            found[output, :, :, output] = own.T
+        return white.columns(found.reshape(p * m, samples, p))
+
+    def means(self, white: White) -> Array:
+        """Return the means of the scores (p m,): not zero of past residuals that unknown starts correlate."""
+        p, _, m = self.columns.shape
+        if not self.of_residuals:
+            return np.zeros(p * m)
+        lags = list(dict.fromkeys(self.lags))
+        echoes = np.zeros((p, len(lags), p, max(lags) + 1, p, p))
+        each = np.einsum("io,sj->osij", white.root, np.linalg.inv(white.root))
+        for number, lag in enumerate(lags):
+            echoes[:, number, :, lag] = each
+        return white.mean(echoes.reshape(p * m, -1, p, p))
 
 
-@dataclass(frozen=True)
-class Score:
+class Score(NamedTuple):
     """What regressors explain of residuals once estimated parameters and starts are taken off.
 
     Attributes:
@@ -117,21 +129,15 @@ def score_tests(
         feedback: whether u(t) depends on y(t); then past inputs begin with u(t - 1).
         robust: the estimate with whitened residuals, for all regressors but past residuals.
     """
-    tests = []
-    of_inputs = caused(records, theta, feedback=feedback)
-    for tried in [*of_inputs, *past_residuals(records, white), _trend(records, theta)]:
-        own = white if robust is None or tried.of_residuals else robust
-        found = _tested(records, own, tried)
-        tests += [] if found is None else [found]
-    return tuple(tests)
+    of_inputs = past_inputs(records, theta, feedback=feedback)
+    every = [*of_inputs, *past_residuals(records, white), _trend(records, theta)]
+    found = (tested(white if one.of_residuals else robust or white, one) for one in every)
+    return tuple(test for test in found if test is not None)
 
 
-def _tested(records: Records, white: White, tried: Regressors) -> ScoreTest | None:
-    columns = tried.white(white)
-    means = np.zeros(columns.shape[1])
-    if tried.of_residuals and white.foreseen:
-        means = _mean_scores(records, white, tried.lags)
-    found = score(white, columns, means)
+def tested(white: White, tried: Regressors) -> ScoreTest | None:
+    """Return the test of regressors; None where the estimate explains all of them."""
+    found = score(white, tried.white(white), tried.means(white))
     freedom = found.directions.shape[1]
     if not freedom:
         return None
@@ -188,12 +194,12 @@ def robust_white(
     """
 
     def white_enough(judged: White) -> bool:
-        tests = [_tested(records, judged, tried) for tried in past_residuals(records, judged)]
+        tests = (tested(judged, tried) for tried in past_residuals(records, judged))
         return not failed([test for test in tests if test is not None])
 
     if white_enough(white) or white_enough(less):
         return None
-    of_inputs = caused(records, point.theta, feedback=feedback)
+    of_inputs = past_inputs(records, point.theta, feedback=feedback)
     single = [white.columns(np.array(more))] if more else []
     columns = np.column_stack([*(tried.white(white) for tried in of_inputs), *single])
     trend = _trend(records, point.theta).white(white)
@@ -210,36 +216,36 @@ def future_tests(records: Records, theta: Array, white: White) -> tuple[ScoreTes
     Whatever past inputs explain is taken off, since an input is foretold by its own past.
     """
     channels = records.u.shape[1] + records.y.shape[1]
-    lags = _each(1, min(_AHEAD, max(records.samples // (_SAMPLES_A_DIRECTION * channels), 1)))
-    past = [tried.white(white) for tried in caused(records, theta, feedback=False)]
+    last = min(_AHEAD, max(records.samples // (_SAMPLES_A_DIRECTION * channels), 1))
+    past = [tried.white(white) for tried in past_inputs(records, theta, feedback=False)]
     white, turned = white.without(np.column_stack(past)), replace(records, parts=records.parts[::-1])
     u = records.whitened(theta, records.u)[:, ::-1]
     found = []
     for j in range(u.shape[2]):
-        ahead, at = _summed(turned, u[:, :, j : j + 1], lags)
-        test = _tested(records, white, Regressors(f"future of u{j + 1}", "feedback", ahead[:, ::-1], at))
+        ahead, at = _summed(turned, u[:, :, j : j + 1], _runs(1, last + 1))
+        test = tested(white, Regressors(f"future of u{j + 1}", "feedback", ahead[:, ::-1], at))
         found += [] if test is None else [replace(test, source=j)]
     return tuple(found)
 
 
-def caused(records: Records, theta: Array, *, feedback: bool) -> list[Regressors]:
+def past_inputs(records: Records, theta: Array, *, feedback: bool) -> list[Regressors]:
     """Return past inputs at lags of the structure, and sums of them over ever longer runs of lags."""
     n, first = records.samples, int(feedback)
     u = records.whitened(theta, records.u)
-    most = max(n // _SAMPLES_A_DIRECTION, 2)
-    near = _each(first, min(records.kind.recent + _FEW, most // u.shape[2]))
-    bins = _bins(first, min(n // 6, _FARTHEST), most // u.shape[2])
+    most = max(n // _SAMPLES_A_DIRECTION, 2) // u.shape[2]
+    near = _runs(first, min(records.kind.recent + _FEW, most) + 1)
+    older = _runs(first, min(n // 6, _FARTHEST), growth=_GROWTH)[:most]
     return [
         Regressors("recent_inputs", "plant", *_summed(records, u, near)),
-        Regressors("older_inputs", "plant", *_summed(records, u, bins)),
+        Regressors("older_inputs", "plant", *_summed(records, u, older)),
     ]
 
 
 def past_residuals(records: Records, white: White) -> list[Regressors]:
     """Return past residuals at few lags and at many."""
     n, p = records.y.shape
-    most = max(n // _SAMPLES_A_DIRECTION, 2)
-    few, many = (_each(1, min(lags, max(most // p, 1))) for lags in (_FEW, _LAGS))
+    most = max(max(n // _SAMPLES_A_DIRECTION, 2) // p, 1)
+    few, many = (_runs(1, min(lags, most) + 1) for lags in (_FEW, _LAGS))
     own = np.repeat(white.errors[None], p, axis=0)
     return [
         Regressors("recent_residuals", "noise", *_summed(records, own, few), of_residuals=True),
@@ -255,46 +261,19 @@ def _trend(records: Records, theta: Array) -> Regressors:
     return Regressors("trend", "drift", records.whitened(theta, np.stack(slow, axis=1)))
 
 
-def _of_outputs(signals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return signals (p, N, m), each of its output and zero of the others, (p m, N, p)."""
-    p, samples, m = signals.shape
-    found = np.zeros((p, m, samples, p))
-    for output, own in enumerate(signals):
-        found[output, :, :, output] = own.T
-    return found.reshape(p * m, samples, p)
-
-
-def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
-    """See `White.echoes`, of the residuals of every output at every lag, for every output: (p lags,)."""
-    p = len(white.root)
-    starts = white.starts.reshape(white.residuals.size // p, p, -1)[: white.samples]
-    here = np.einsum("nqm,qp->nmp", starts, white.root)
-    there = np.einsum("nqm,qp->nmp", starts, np.linalg.inv(white.root).T)
-    each = [
-        -white.variance * np.einsum("nmp,nms->ps", here, shifted(there, lag, records.lengths))
-        for lag in dict.fromkeys(lags)
-    ]
-    return np.stack(each, axis=1).reshape(-1)
-
-
-def _bins(first: int, last: int, most: int) -> list[tuple[int, int]]:
-    """Return lags from `first` on, one by one and then in ever longer runs: first and one past the last."""
-    bins: list[tuple[int, int]] = []
+def _runs(first: int, last: int, *, growth: float = 1.0) -> list[tuple[int, int]]:
+    """Return lags one by one, or in ever longer runs: the first of each, and one past its last."""
+    runs: list[tuple[int, int]] = []
     begin, width = first, 1.0
-    while begin < last and len(bins) < most:
+    while begin < last:
         end = min(begin + int(np.ceil(width)), last)
-        bins.append((begin, end))
-        begin, width = end, width * (_GROWTH if end > _FEW else 1.0)
-    return bins
-
-
-def _each(first: int, last: int) -> list[tuple[int, int]]:
-    """Return lags one by one, as runs of one."""
-    return [(lag, lag + 1) for lag in range(first, last + 1)]
+        runs.append((begin, end))
+        begin, width = end, width * (growth if end > _FEW else 1.0)
+    return runs
 
 
 def _summed(
-    records: Records, x: NDArray[np.float64], bins: Sequence[tuple[int, int]]
+    records: Records, x: NDArray[np.float64], runs: Sequence[tuple[int, int]]
 ) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     """Return sums of signals x (p, N, m) over runs of lags, and the first lag of each run."""
     pieces = np.split(x, np.cumsum(records.lengths)[:-1], axis=1)
@@ -303,5 +282,5 @@ def _summed(
     def until(lag: int) -> NDArray[np.float64]:
         return shifted(total, lag, records.lengths).swapaxes(0, 1)
 
-    parts = [until(begin) - until(end) for begin, end in bins]
-    return np.concatenate(parts, axis=2), tuple(begin for begin, _ in bins for _ in range(x.shape[2]))
+    parts = [until(begin) - until(end) for begin, end in runs]
+    return np.concatenate(parts, axis=2), tuple(begin for begin, _ in runs for _ in range(x.shape[2]))

@@ -143,9 +143,3 @@ def factor_of_data(names: Sequence[str], theta: Array, rows: Array, again: Array
             key="u",
         )
     return factor
-
-
-def fit_percent(y: Array, simulated: Array, lengths: Sequence[int]) -> float:
-    """Per cent of the rms of y (samples,), the mean of each record taken off, that a simulation explains."""
-    varying = np.concatenate([part - part.mean() for part in np.split(y, np.cumsum(lengths)[:-1])])
-    return float(100.0 * (1.0 - np.linalg.norm(y - simulated) / np.linalg.norm(varying)))

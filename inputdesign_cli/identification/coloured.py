@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import Echoes, Extension, Kind, Part, Starts, shares
-from inputdesign_cli.identification.noise_first import late_echo
+from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts
+from inputdesign_cli.identification.polynomial_starts import noise_polynomials
 from inputdesign_cli.identification.stability import is_stable, reflected
-from inputdesign_cli.identification.start import Start, density, noise_before
-from inputdesign_cli.identification.starts import noise_polynomials
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import Coloured
 from inputdesign_cli.plant.filtering import filtered
 
@@ -45,10 +44,6 @@ class ColouredKind(Kind):
         """Return `whitening` of the plant, with True for C and D (k,)."""
         return np.concatenate([self.plant.whitening, np.ones(len(self.model.own_parameters), dtype=bool)])
 
-    def own(self) -> Array:
-        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
-        return self.plant.own() + shares(self.model.own_parameters, self.outputs)
-
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
         model = self.model.at(theta)
@@ -67,13 +62,9 @@ class ColouredKind(Kind):
 
     def starts(self, theta: Array, samples: int, late: int, *, free: bool) -> tuple[Start, ...]:
         """Return the starts of the plant, filtered, and the effect of noise before the record through C/D."""
-        found, raw = [], self.plant.starts(theta[: self._first], samples, late, free=free)
-        for start, (D, C) in zip(raw, self.model.at(theta).inverse_filters, strict=True):
-            through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
-            past = np.concatenate([noise, noise_before(C, D, samples)])
-            zeros = start.zeros + density(C) if C.size > 1 else start.zeros
-            found.append(Start(through, start.disturbance, past, zeros))
-        return tuple(found)
+        raw = self.plant.starts(theta[: self._first], samples, late, free=free)
+        filters = self.model.at(theta).inverse_filters
+        return tuple(start.through(C, D) for start, (D, C) in zip(raw, filters, strict=True))
 
     def in_starts(self, late: int, *, free: bool) -> NDArray[np.int64]:
         """Return the parameters on which the starts depend: in the plant, and all of C and D."""
@@ -97,10 +88,8 @@ class ColouredKind(Kind):
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """Return signals (N, m) through the inverse of each output's noise model (p, N, m)."""
-        raw, filters = (
-            self.plant.whitened(theta[: self._first], signals),
-            self.model.at(theta).inverse_filters,
-        )
+        raw = self.plant.whitened(theta[: self._first], signals)
+        filters = self.model.at(theta).inverse_filters
         return np.array([filtered(*own, x, axis=0) for own, x in zip(filters, raw, strict=True)])
 
     def stabilised(self, theta: Array, samples: int) -> Array:
@@ -119,7 +108,7 @@ class ColouredKind(Kind):
         clear = [(_clear(known, u), _clear(known, y)) for u, y in parts]
         found = self.plant.starting_points(clear, None if given is None else given[: self._first])
         points = [np.concatenate([theta, self._noise(*parts[0], theta)]) for theta in found.points]
-        return found.with_points(points, given)
+        return Starts(np.array(points), found.tried).and_given(given)
 
     def _noise(self, u: Array, y: Array, theta: Array) -> Array:
         """Return C and D from the plant's residuals in one record; shared ones are means over outputs."""
@@ -144,20 +133,9 @@ class ColouredKind(Kind):
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """Return the extensions of the plant; the tests of many signals look at C and D."""
         found, here = [], self.model.at(theta)
-        for extension in self.plant.extensions(theta[: self._first], feedback=feedback):
-            larger = replace(here, plant=extension.model)
-            found.append(replace(extension, model=larger, kind=ColouredKind(larger, extension.kind)))
-        return tuple(found)
-
-    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Return the echoes of C and D, or None if the plant has its own: filtered, they are not known."""
-        if self.plant.echoes(theta[: self._first], lengths) != ():
-            return None
-        model, found = self.model.at(theta), []
-        for index, one in enumerate(model.own_parameters, start=self._first):
-            filters = {i: model.below(one.letter, i) for i, _ in one.places}
-            known = {i: (below, sign) for i, (below, sign) in filters.items() if below is not None}
-            found.append((index, late_echo(known, one.power, lengths)))
+        for one in self.plant.extensions(theta[: self._first], feedback=feedback):
+            larger = replace(here, plant=one.model)
+            found.append(one._replace(model=larger, kind=ColouredKind(larger, one.kind)))
         return tuple(found)
 
     def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:

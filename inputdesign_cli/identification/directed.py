@@ -7,20 +7,22 @@ narrow band of excitation hardly contradicts a model that is wrong at its edge.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.identification.adequacy import Fault, Score, ScoreTest, score
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.kind import Echo, Extension
-from inputdesign_cli.identification.problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.kind import Extension
+from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
 from inputdesign_cli.identification.white import White
+from inputdesign_cli.levels import level
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.model import DELAY
 
@@ -31,6 +33,10 @@ _OPEN, _LITTLE = 0.3, 0.1
 # Directions with a larger cosine are one.
 _SAME = 0.99
 _LAGS = ("a", "f", DELAY)
+# The odds from which nothing is promised any more. Odds beforehand that something is missing, shared among
+# parameters that stand for it: what plants mostly have beyond their model is a lag or a longer dead time.
+_ODDS, _OF_LAGS, _OF_OTHERS = 0.7, 1.0, 0.2
+_LEAST = 1e-300
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,7 @@ class Alternative:
         slopes: of a model at frequencies (n,), the derivative of G with respect to it, (states, n, p, r): in
             each state that a plant may be in.
         lag: whether it is a pole or a dead time of the plant.
-        echo: what past errors add to `column`; None if they add nothing.
+        echo: (lags, p, p), how `column` responds to past errors; None if it does not.
         estimated: returns the larger model from the same data, and the statistic of its likelihood ratio;
             None if no larger model is estimated.
     """
@@ -55,13 +61,8 @@ class Alternative:
     column: NDArray[np.float64]
     slopes: Callable[[Model, ArrayLike], ComplexArray]
     lag: bool = False
-    echo: Echo | None = None
+    echo: NDArray[np.float64] | None = None
     estimated: Callable[[], tuple[Model, float]] | None = None
-
-    @property
-    def of_structure(self) -> bool:
-        """Return whether the parameter belongs to a larger structure, not to a varying gain."""
-        return self.fault in ("plant", "noise")
 
 
 @dataclass(frozen=True)
@@ -125,9 +126,8 @@ def directed_tests(
         if size <= _EXPLAINED * np.linalg.norm(column):
             continue
         tried = (alternative, column, left / size)
-        alike = (group for group in groups if abs(group[0][2] @ tried[2]) > _SAME)
-        group = next(alike, None)
-        groups.append([tried]) if group is None else group.append(tried)
+        alike = next((group for group in groups if abs(group[0][2] @ tried[2]) > _SAME), None)
+        groups.append([tried]) if alike is None else alike.append(tried)
     return tuple(_tested(white, group, parameters) for group in groups)
 
 
@@ -136,22 +136,20 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
     statistic, directions = found.statistic, found.directions
     larger: Model | None = None
     if white.whitening is None and white.probability(statistic, directions) < _OPEN:
-        ends = [(one.estimated(), one) for one, _, _ in group if one.estimated is not None]
+        ends = [(one[0].estimated(), one) for one in group if one[0].estimated is not None]
         if ends:
             ends.sort(key=lambda end: -end[0][1])
             larger, ratio = ends[0][0]
-            likeliest = [one for _, one in ends]
-            group.sort(key=lambda tried: likeliest.index(tried[0]) if tried[0] in likeliest else len(group))
+            group = [*(one for _, one in ends), *(one for one in group if one[0].estimated is None)]
             # A likelihood ratio has no mean to be compared with.
             statistic = max(statistic, ratio) if abs(mean) <= _LITTLE else statistic
             found, _ = _score(white, group[0])
-    _, column, along = group[0]
+    first, column, along = group[0]
     size = float(along @ column)
     scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
     explained = np.linalg.lstsq(white.explained / scale, column, rcond=1e-12)[0] / scale
     alternatives = tuple(alternative for alternative, _, _ in group)
-    faults = [alternative.fault for alternative in alternatives]
-    fault: Fault = "plant" if "plant" in faults else faults[0]
+    fault = "plant" if any(one.fault == "plant" for one in alternatives) else first.fault
     name = " or ".join(sorted(alternative.name for alternative in alternatives))
     return Directed(
         ScoreTest(name, fault, statistic, 1, white.probability(statistic, directions), None),
@@ -166,8 +164,9 @@ def _tested(white: White, group: list[_Tried], parameters: int) -> Directed:
 def _score(white: White, tried: _Tried) -> tuple[Score, float]:
     """Return the score of a regressor, and the mean of it in its standard deviations."""
     alternative, column, along = tried
-    own = white.echoes(alternative.echo) if white.foreseen and alternative.echo is not None else 0.0
-    mean = np.array([own])
+    mean = np.zeros(1)
+    if alternative.echo is not None:
+        mean = white.mean((white.root @ alternative.echo @ np.linalg.inv(white.root))[None])
     expected = float(white.mean_left(column[:, None], mean)[0])
     return score(white, column[:, None], mean), expected / float(along @ column)
 
@@ -175,16 +174,16 @@ def _score(white: White, tried: _Tried) -> tuple[Score, float]:
 def alternative(extension: Extension, records: Records) -> Alternative:
     """Return the parameter as a regressor of the prediction errors of records."""
     model, index = extension.model, extension.model.names.index(extension.name)
-    larger = replace(records, kind=extension.kind, earlier=None)
+    larger, in_plant = replace(records, kind=extension.kind, earlier=None), bool(model.in_plant[index])
     again = partial(_estimated, larger, model, index)
     return Alternative(
         extension.name,
         f"one more {extension.what} ({extension.name})",
-        "plant" if model.in_plant[index] else "noise",
+        "plant" if in_plant else "noise",
         larger.gradient(model.theta, index),
         lambda model, w: extension.model.plant_gradient(w)[None, :, index],
         lag=model.parameters[index].letter in _LAGS,
-        echo=None if extension.through is None else extension.through(records.lengths),
+        echo=extension.kind.echoes(model.theta, records.longest)[index],
         estimated=again if extension.nested and records.earlier is None else None,
     )
 
@@ -202,3 +201,65 @@ def _estimated(records: Records, model: Model, index: int) -> tuple[Model, float
     cost = point.cost - float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
     ratio = float(point.near.freedom * np.log(cost / max(float(found.cost[0]), 1e-300)))
     return model.at(found.theta[0]), ratio
+
+
+@dataclass(frozen=True)
+class Moves:
+    """What a parameter more does to G at n frequencies, in units of the admissible error.
+
+    Attributes:
+        estimated: (n,), how far G moves if the parameter is estimated along.
+        deviation: (n,), the standard deviation of that.
+        known: (n,), the largest standard deviation of G of the model itself.
+    """
+
+    estimated: Array
+    deviation: Array
+    known: Array
+
+    @property
+    def largest(self) -> float:
+        """Return the largest estimated move of G."""
+        return float(np.max(self.estimated))
+
+    def odds(self, probability: float) -> float:
+        """Return the odds that the parameter exists and G exceeds the admissible error, from even prior odds.
+
+        The evidence for the parameter is the Bayes factor of a normal estimate ([kass-raftery-1995]). A
+        priori it is normal about zero, of a size that moves G by about the admissible error.
+
+        Args:
+            probability: of an estimate as far from zero, if the parameter is not there.
+        """
+        reach = float(np.max(self.deviation))
+        if reach == 0.0:
+            return 0.0
+        left = 1.0 / (1.0 + reach**2)  # of the estimate, once the prior draws it to zero
+        statistic = float(scipy.special.chdtri(1.0, max(probability, _LEAST)))
+        evidence = np.exp(0.5 * (np.log1p(-left) + left * statistic))
+        spread = np.sqrt(self.known**2 + left * self.deviation**2)
+        beyond = sum(
+            scipy.special.ndtr((sign * left * self.estimated - 1.0) / np.maximum(spread, _LEAST))
+            for sign in (1.0, -1.0)
+        )
+        return float(evidence * np.max(beyond))
+
+
+def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
+    """Return the indices of the parameters that speak against a verdict of |error of G| <= r_adm.
+
+    It is neither enough nor necessary that the parameter is beyond chance: what counts is that it exists and
+    that G is beyond r_adm, after the estimated move and with its uncertainty.
+    """
+    # A gain that varies often has a large effect that the record hardly shows: it matters where it would move
+    # G by more than is admitted, at a level that is shared among all that would. What is not a number is no
+    # promise: it is compared so that it speaks against one.
+    varying = [i for i, one in enumerate(tried) if not (one.of_structure or moves[i].largest <= 1.0)]
+    found = [i for i in varying if not tried[i].test.probability * len(varying) >= level("varying gain")]
+    structure = [i for i, one in enumerate(tried) if one.of_structure]
+    among = Counter(tried[i].lag for i in structure)
+    for i in structure:
+        beforehand = (_OF_LAGS if tried[i].lag else _OF_OTHERS) / among[tried[i].lag]
+        if not beforehand * moves[i].odds(tried[i].test.probability) <= _ODDS:
+            found.append(i)
+    return sorted(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -12,13 +13,10 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
+from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data
 from inputdesign_cli.identification.directed import alternative
-from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.minima import Rival
-from inputdesign_cli.identification.problem import Point, inverses, rounding
-from inputdesign_cli.identification.records import Records, split
-from inputdesign_cli.identification.search import Search
+from inputdesign_cli.identification.records import Point, Records, inverses, shares, split
+from inputdesign_cli.identification.search import Rival, Search
 from inputdesign_cli.identification.tests import Tests, tests_of
 from inputdesign_cli.identification.variations import variations
 from inputdesign_cli.information.coordinates import triangular_factor
@@ -27,13 +25,8 @@ from inputdesign_cli.information.coordinates import triangular_factor
 _LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
-class Ended:
-    """How a search ended: whether it settled, after `steps` from the best of `starts`.
-
-    Attributes:
-        rivals: other minima that explain the data nearly as well.
-    """
+class Ended(NamedTuple):
+    """How a search ended: whether it settled, after `steps` from the best of `starts`, and other minima."""
 
     converged: bool
     steps: int
@@ -41,8 +34,7 @@ class Ended:
     rivals: tuple[Rival, ...]
 
 
-@dataclass(frozen=True)
-class Begun:
+class Begun(NamedTuple):
     """How the records begin.
 
     Attributes:
@@ -56,8 +48,7 @@ class Begun:
     first: Array
 
 
-@dataclass(frozen=True)
-class Simulation:
+class Simulation(NamedTuple):
     """What the inputs and the start of each record cause in the model, `outputs` (samples, p).
 
     Attributes:
@@ -69,8 +60,7 @@ class Simulation:
     fit: tuple[float | None, ...]
 
 
-@dataclass(frozen=True)
-class Agreement:
+class Agreement(NamedTuple):
     """How an earlier estimate, which is combined with the data, goes with them.
 
     Attributes:
@@ -80,11 +70,6 @@ class Agreement:
 
     differing: float
     alike: float
-
-    @classmethod
-    def of(cls, earlier: Earlier, theta: Array, factor: Array) -> Agreement:
-        """Return the agreement with an estimate from both, of information L L^T, L the `factor` (k, k)."""
-        return cls(earlier.agreement(theta, factor), earlier.likeness(theta, factor))
 
 
 @dataclass(frozen=True)
@@ -114,7 +99,7 @@ class Estimate:
 
     def with_rivals(self, rivals: tuple[Rival, ...]) -> Estimate:
         """Return the estimate with other rivals."""
-        return replace(self, search=replace(self.search, rivals=rivals))
+        return replace(self, search=self.search._replace(rivals=rivals))
 
     @cached_property
     def information(self) -> Array:
@@ -160,7 +145,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
         SpecError: `noise-free-data` or `not-exciting`.
     """
     records, point, kind, theta = found.records, found.point, found.records.kind, found.point.theta
-    noise = noise_of(point, kind.own())
+    noise = noise_of(records, point)
     check_noisy(np.diag(noise), records.y)
     check_apart(noise)
     factor, earlier = factor_at(records, point, noise), records.earlier
@@ -168,6 +153,9 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
     known = None if kind.continuous or None in simulation.fit else simulation.outputs
     larger = [alternative(one, records) for one in kind.extensions(theta, feedback=feedback)]
     alternatives = [*larger, *variations(records, theta, known)]
+    prior = None
+    if earlier is not None:
+        prior = Agreement(earlier.agreement(theta, factor), earlier.likeness(theta, factor))
     return Estimate(
         kind.names,
         np.asarray(theta, dtype=float),
@@ -178,7 +166,7 @@ def concluded(found: Search, y: Array, *, experiments: Sequence[int], feedback: 
         Ended(found.converged, found.steps, found.starts, found.rivals),
         Begun(records.free, found.rest_refuted, found.first),
         simulation,
-        None if earlier is None else Agreement.of(earlier, theta, factor),
+        prior,
         tests_of(records, point, noise, alternatives, experiments=experiments, feedback=feedback),
     )
 
@@ -189,16 +177,18 @@ def _simulation(records: Records, point: Point, y: Array) -> Simulation:
     parts = zip(records.parts, split(point.errors, point.near.begun, lengths), strict=True)
     caused = [kind.caused(point.theta, *signals, *errors) for signals, errors in parts]
     outputs = np.concatenate(caused) + y - records.y
-    fit = tuple(
-        fit_percent(measured, explained, lengths) if runs else None
-        for measured, explained, runs in zip(y.T, outputs.T, kind.simulates(point.theta), strict=True)
-    )
-    return Simulation(outputs, fit)
+    varying = np.concatenate([own - own.mean(axis=0) for own in np.split(y, np.cumsum(lengths)[:-1])])
+    with np.errstate(over="ignore", invalid="ignore"):  # of unstable outputs
+        left = np.linalg.norm(y - outputs, axis=0) / np.linalg.norm(varying, axis=0)
+    able = kind.simulates(point.theta)
+    fit = (float(100.0 * (1.0 - x)) if runs else None for x, runs in zip(left, able, strict=True))
+    return Simulation(outputs, tuple(fit))
 
 
-def noise_of(point: Point, own: Array) -> Array:
-    """(p, p) covariance of e: the parameters `own` (p,) of every output count, and unknown starts."""
+def noise_of(records: Records, point: Point) -> Array:
+    """(p, p) covariance of e: the parameters of every output count, and unknown starts."""
     samples, outputs = point.errors.shape
+    own = shares(np.any(records.from_rest(point.theta)[1], axis=1))
     left = np.sqrt(np.maximum(samples - own - point.near.unknowns / outputs, 1.0))
     every = point.near.all_errors
     return np.asarray(every.T @ every / np.outer(left, left))
@@ -240,7 +230,7 @@ def _over_minima(found: Search, factor: Array, noise: Array) -> Array:
         half = scipy.linalg.solve_triangular(own, factor, lower=True)
         away = factor.T @ (point.theta - found.point.theta)
         spreads.append(half.T @ half + np.outer(away, away))
-        smaller = np.sum(np.log(np.abs(np.diag(factor)))) - np.sum(np.log(np.abs(np.diag(own))))
+        smaller = np.sum(np.log(np.abs(np.diag(factor) / np.diag(own))))
         logarithms.append(float(smaller - 0.5 * excess))
     if len(logarithms) == 1:
         return factor
@@ -257,4 +247,4 @@ def information_of(records: Records, point: Point, noise: Array) -> Array:
 
 def _weights(records: Records, noise: Array) -> Array:
     """Return W (p, p), the inverse of the noise, which may be no more than rounding."""
-    return inverses((noise + rounding(records))[None])[0][0]
+    return inverses((noise + records.rounding)[None])[0][0]

@@ -25,13 +25,21 @@ from inputdesign_cli.identification.estimate import (
 )
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.kind import Kind, Starts
-from inputdesign_cli.identification.polynomials import FromRest, PolynomialKind
-from inputdesign_cli.identification.problem import RecordProblem, evaluate, inverses
-from inputdesign_cli.identification.records import Records, centred, longest, split
+from inputdesign_cli.identification.polynomial_rows import FromRest
+from inputdesign_cli.identification.polynomials import PolynomialKind
+from inputdesign_cli.identification.records import (
+    RecordProblem,
+    Records,
+    centred,
+    evaluate,
+    inverses,
+    longest,
+    split,
+)
 from inputdesign_cli.identification.reparametrised import ReparametrisedKind
 from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.state_space import StateSpaceKind
-from inputdesign_cli.identification.transfer_matrix import TransferKind, refine
+from inputdesign_cli.identification.transfer_matrix import TransferKind
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -62,34 +70,17 @@ def estimator(model: Model, step: float) -> Kind:
     raise TypeError(f"no estimator is registered for {type(model).__name__}")
 
 
-@estimator.register
-def _(model: PolynomialModel, step: float) -> Kind:
-    return PolynomialKind(model)
-
-
-@estimator.register
-def _(model: ContinuousModel, step: float) -> Kind:
-    return TransferKind(model, Intersample(step, hold=False))
-
-
-@estimator.register
-def _(model: SampledModel, step: float) -> Kind:
-    return TransferKind(model.continuous_plant, Intersample(model.sample_time, hold=True))
-
-
-@estimator.register
-def _(model: Reparametrised, step: float) -> Kind:
-    return ReparametrisedKind(model, estimator(model.coefficients, step))
-
-
-@estimator.register
-def _(model: StateSpaceModel, step: float) -> Kind:
-    return StateSpaceKind(model)
-
-
-@estimator.register
-def _(model: Coloured, step: float) -> Kind:
-    return ColouredKind(model, estimator(model.plant, step))
+estimator.register(PolynomialModel, lambda model, step: PolynomialKind(model))
+estimator.register(StateSpaceModel, lambda model, step: StateSpaceKind(model))
+estimator.register(ContinuousModel, lambda model, step: TransferKind(model, Intersample(step, hold=False)))
+estimator.register(
+    SampledModel,
+    lambda model, step: TransferKind(model.continuous_plant, Intersample(model.sample_time, hold=True)),
+)
+estimator.register(
+    Reparametrised, lambda model, step: ReparametrisedKind(model, estimator(model.coefficients, step))
+)
+estimator.register(Coloured, lambda model, step: ColouredKind(model, estimator(model.plant, step)))
 
 
 def identify(
@@ -137,14 +128,13 @@ def identify(
     def searched(records: Records, known: Array | None) -> Search:
         chosen = longest(parts)
         if near and start is not None:
-            begin = Starts(start[None], np.zeros(1, dtype=np.int64), 1)
+            begin = Starts(start[None], 1)
         else:
             begin = kind.starting_points(centred(chosen) if records.free else chosen, start)
-        others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
-        points = np.concatenate([begin.points, *(theta[None] for theta in others)])
-        steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
+        others = [theta[None] for theta in (known, earlier and earlier.theta) if theta is not None]
+        points = np.concatenate([begin.points, *others])
         tell(Counted("starting points followed to a minimum", 0, len(points)))
-        return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
+        return search(records, points, starts=begin.tried + (earlier is not None))
 
     records = Records(kind, parts, earlier=earlier, ramp=ramp)
     best = from_rest_or_free(records, False if ramp else rest, searched, start)
@@ -172,41 +162,23 @@ def fit_batch(
 def _fitted(kind: Kind, u: Array, y: Array, start: Array) -> BatchEstimate:
     """Return the estimates of records (runs, N, r), (runs, N, p) from starts (runs, k)."""
     records = tuple(Records(kind, (run,)) for run in zip(u, y, strict=True))
-    return _from(records, start, np.zeros(len(y), dtype=np.int64))
-
-
-@_fitted.register
-def _(kind: TransferKind, u: Array, y: Array, start: Array) -> BatchEstimate:
-    records = tuple(Records(kind, (run,)) for run in zip(u, y, strict=True))
-    refined = [
-        refine(record, kind, evaluate(record, record.stabilised(row)))
-        for record, row in zip(records, start, strict=True)
-    ]
-    theta = np.array([point.theta for point, _ in refined])
-    return _from(records, theta, np.array([steps for _, steps in refined]))
+    found = minimise(RecordProblem(records), start)
+    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
+    noise = np.array([noise_of(*each) for each in zip(records, points, strict=True)])
+    information = np.array([information_of(*each) for each in zip(records, points, noise, strict=True)])
+    return BatchEstimate(found.theta, noise, information, found.converged, found.steps)
 
 
 @_fitted.register
 def _(kind: PolynomialKind, u: Array, y: Array, start: Array) -> BatchEstimate:
-    problem = FromRest(kind.rows, *(np.ascontiguousarray(x.swapaxes(1, 2)) for x in (u, y)))
+    """Return the estimates from records at rest, noise as well, all in one go."""
+    problem = FromRest.of(kind.model, u, y)
     found = minimise(problem, start)
-    sums, left = problem.sums(found.theta), np.sqrt(np.maximum(y.shape[1] - kind.own(), 1.0))
+    sums = problem.sums(found.theta)
+    left = np.sqrt(np.maximum(y.shape[1] - sums.own, 1.0))
     noise = sums.errors / np.outer(left, left)
     information = sums.weighed(inverses(noise)[0])[0]
     return BatchEstimate(found.theta, noise, information, found.converged, found.steps)
-
-
-def _from(records: tuple[Records, ...], start: Array, steps: Array) -> BatchEstimate:
-    """Return the estimates of many runs from starts (runs, k), and the `steps` (runs,) made to each."""
-    found = minimise(RecordProblem(records), start)
-    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
-    noise = np.array(
-        [noise_of(point, record.kind.own()) for record, point in zip(records, points, strict=True)]
-    )
-    information = np.array([information_of(*each) for each in zip(records, points, noise, strict=True)])
-    return BatchEstimate(
-        found.theta, noise, information, found.converged, found.steps + steps.astype(np.int64)
-    )
 
 
 def information_of_data(

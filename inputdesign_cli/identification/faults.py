@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.noise_first import Whitening
 from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.levels import level
 
 # The median of the absolute value of a normal variable, in standard deviations.
@@ -78,17 +78,13 @@ def period_spikes(y: Array, periods: Periods, *, repeats: int = 1) -> list[Spike
     Medians of the periods, and over them, so that neither a spike nor a level that drifts counts elsewhere.
 
     Args:
-        repeats: how many records of equal length with the same input follow each other.
+        repeats: see `Periods.parts`.
     """
-
-    def parts(signal: Array) -> NDArray[np.float64]:
-        return np.concatenate([periods.parts(one) for one in np.split(signal, repeats)], axis=1)
-
-    each = parts(y)
+    each = periods.parts(y, repeats)
     apart = each - np.median(each, axis=1, keepdims=True)
     levelled = each - np.median(apart, axis=2, keepdims=True)
     errors = levelled - np.median(levelled, axis=1, keepdims=True)
-    at = parts(np.arange(float(len(y)))[:, None]).ravel().astype(np.int64)
+    at = periods.parts(np.arange(float(len(y)))[:, None], repeats).ravel().astype(np.int64)
     found = spikes(errors.reshape(-1, y.shape[1]))
     return [replace(one, samples=tuple(sorted(at[list(one.samples)].tolist()))) for one in found]
 

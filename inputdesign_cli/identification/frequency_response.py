@@ -10,8 +10,7 @@ for example the reference of a loop, are instruments: G is the response of y to 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -44,6 +43,10 @@ REPEATS = 1e-9
 """Of the size of a signal that repeats, what one period may be off the next."""
 
 Method = Literal["lines", "local_polynomial"]
+_Records = Sequence[tuple[Array, Array, Array]]  # x, u, y of each, (N, channels)
+_Lines = Sequence[tuple[NDArray, ...]]  # frequencies, and the transforms of x, u and y there
+# G (p, r), its radius, the noise and the coherence (p,), at one frequency.
+_Found = tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -86,16 +89,27 @@ def frequency_response(
     at = np.cumsum(lengths or [len(y)])[:-1]
     outside = u if x is None else x
     records = list(zip(*(np.split(signal, at) for signal in (outside, u, y)), strict=True))
-    if len(records) == 1 and u.shape[1] == 1:
-        period = found_period(records[0][0][:, 0])
-        if period:
-            return _by_lines(outside, u, y, period)
-    found = _local_polynomial(records)
+    if len(records) == 1 and u.shape[1] == 1 and (period := found_period(outside[:, 0])):
+        periods = _settled(period, len(y))
+        response = periodic_response(u, y, periods, excited_harmonics(outside, periods))
+        return None if response is None else of_periods(response, period)
+    found = _usable(_local_polynomial(records))
     if x is not None or delays is None:
         return found
-    late = delays(max(len(y) for *_, y in records))
-    other = _delayed(late, records) if _turns(late, records) else None
-    return found if other is None or (found is not None and _leaves_less(found, other)) else other
+    longest = max(len(y) for *_, y in records)
+    late = delays(longest)
+    # A parabola cannot follow a phase that turns so far.
+    turns = 2.0 * np.pi * late.max() * _window(records) / longest > _TURN
+    other = _usable(_delayed(late, records)) if turns else None
+    if found is None or other is None:
+        return found or other
+    unexplained = [np.mean(np.log(np.maximum(one.noise, 1e-300))) for one in (found, other)]
+    return found if unexplained[0] <= unexplained[1] else other
+
+
+def _settled(period: int, samples: int) -> Periods:
+    """Return periods of which the first is transient, if there are three or more."""
+    return Periods(period, skip=int(samples // period > 2))
 
 
 def found_period(x: Array) -> int:
@@ -106,10 +120,8 @@ def found_period(x: Array) -> int:
     begin = x[: min(_BEGINNING, x.size // 2)]  # so that it stands a second time in what follows
     windows = np.lib.stride_tricks.sliding_window_view(x[1 : x.size // 2 + begin.size], begin.size)
     same = np.flatnonzero(np.all(np.abs(windows - begin) <= tolerance, axis=1)) + 1
-    for period in same[same <= x.size // 2][:_TRIED]:
-        if np.all(np.abs(x[period:] - x[:-period]) <= tolerance):
-            return int(period)
-    return 0
+    repeated = (p for p in same[same <= x.size // 2][:_TRIED] if np.all(np.abs(x[p:] - x[:-p]) <= tolerance))
+    return int(next(repeated, 0))
 
 
 def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.int64]:
@@ -127,14 +139,6 @@ def response_delays(model: Model, samples: int, *, step: float) -> NDArray[np.in
     return np.asarray(np.argmax(size >= _BEGUN * size.max(axis=1, keepdims=True), axis=1).T)
 
 
-def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | None:
-    """Return the response to one repeated input; the first of three periods or more is transient."""
-    times = len(y) // period
-    periods = Periods(period, skip=int(times > 2))
-    found = periodic_response(u, y, periods, excited_harmonics(x, periods))
-    return None if found is None else of_periods(found, period)
-
-
 def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
     """What outputs have at odd and even harmonics that one input (N, 1) which repeats does not excite.
 
@@ -143,17 +147,13 @@ def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
     period = found_period(u[:, 0]) if u.shape[1] == 1 else 0
     if not period:
         return {}
-    periods = Periods(period, skip=int(len(y) // period > 2))
+    periods = _settled(period, len(y))
     # A drift is the same ramp in every period, and would speak at all lines.
     level = y - line_of_periods(y, periods)
-    inside = np.arange(1, (period + 1) // 2)
-    silent = np.setdiff1d(inside, excited_harmonics(u, periods))
-    found = {}
-    for kind, harmonics in (("odd", silent[silent % 2 == 1]), ("even", silent[silent % 2 == 0])):
-        lines = silent_lines(periods.transforms(level)[:, :, harmonics])
-        if lines is not None:
-            found[kind] = lines
-    return found
+    silent = np.setdiff1d(np.arange(1, (period + 1) // 2), excited_harmonics(u, periods))
+    kinds = {"odd": silent[silent % 2 == 1], "even": silent[silent % 2 == 0]}
+    found = {kind: silent_lines(periods.transforms(level)[:, :, at]) for kind, at in kinds.items()}
+    return {kind: lines for kind, lines in found.items() if lines is not None}
 
 
 def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
@@ -168,111 +168,82 @@ def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
     )
 
 
-def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
-    """(x, u, y) of every record, each (N, channels)."""
-    inputs, window = records[0][1].shape[1], _window(records)
-    found = []
-    longest = max(len(y) for *_, y in records)
+def _local_polynomial(records: _Records) -> FrequencyResponse | None:
+    """Return the response at lines of the longest record, not a number where inputs are not separable."""
+    (_, u, y), longest = records[0], max(len(y) for *_, y in records)
+    window = _window(records)
     if min(len(y) for *_, y in records) < 2 * window + 4:
         return None
-    transformed = [_transforms(*record) for record in records]
-    for w in _centres(longest):
-        one = _at(w, transformed, window, inputs, _PARABOLA)
-        if one is not None:
-            G, radius, *more = one
-            straight = _at(w, transformed, window, inputs, _PARABOLA - 1)
-            bent = 0.0 if straight is None else _bent(G - straight[0], radius)
-            found.append((w, G, radius + bent, *more))
-    if not found:
+    transformed = [
+        (
+            2.0 * np.pi * np.arange(len(record[0])) / len(record[0]),
+            *(np.fft.fft(signal, axis=0) / np.sqrt(len(signal)) for signal in record),
+        )
+        for record in records
+    ]
+    # At most as many as can be looked at, evenly on a logarithmic axis.
+    last = (longest - 1) // 2
+    lines = np.arange(1, last + 1)
+    if last > _MOST_FREQUENCIES:
+        lines = np.unique(np.geomspace(1, last, _MOST_FREQUENCIES).round())
+    frequency = np.asarray(2.0 * np.pi * lines / longest)
+    found = []
+    for w in frequency:
+        one = _at(w, transformed, window, u.shape[1], _PARABOLA)
+        if one is None:
+            unknown, each = np.full((y.shape[1], u.shape[1]), np.nan), np.full(y.shape[1], np.nan)
+            found.append((unknown + 0j, unknown, each, each))
+            continue
+        G, radius, *more = one
+        # What a parabola may be off where G bends: as much as a line is off it, beyond the noise.
+        straight = _at(w, transformed, window, u.shape[1], _PARABOLA - 1)
+        apart = 0.0 if straight is None else np.abs(G - straight[0]) ** 2
+        found.append((G, radius + np.sqrt(np.maximum(apart - radius**2, 0.0)), *more))
+    each = (np.array(values) for values in zip(*found, strict=True))
+    return FrequencyResponse(frequency, *each, "local_polynomial")
+
+
+def _usable(found: FrequencyResponse | None) -> FrequencyResponse | None:
+    """Return the response where it is a number; None if it is nowhere."""
+    if found is None or not np.any(at := np.all(np.isfinite(found.noise), axis=1)):
         return None
-    w, G, radius, noise, coherence = (np.array(values) for values in zip(*found, strict=True))
-    return FrequencyResponse(w, G, radius, noise, coherence, "local_polynomial")
+    every = (found.frequency, found.G, found.radius, found.noise, found.coherence)
+    return FrequencyResponse(*(values[at] for values in every), found.method)
 
 
-def _window(records: Sequence[tuple[Array, ...]]) -> int:
+def _window(records: _Records) -> int:
     """Return how many lines of each record the parabolas are fitted to."""
     unknowns = _PARABOLA * (records[0][1].shape[1] + len(records))
     return -(-(unknowns + _FREEDOM) // len(records)) + 1
 
 
-def _turns(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> bool:
-    """Return whether a parabola cannot follow the phase of these delays."""
-    longest = max(len(y) for *_, y in records)
-    return bool(2.0 * np.pi * delays.max() * _window(records) / longest > _TURN)
-
-
-def _delayed(delays: NDArray[np.int64], records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
+def _delayed(delays: NDArray[np.int64], records: _Records) -> FrequencyResponse | None:
     """The response, output by output, to inputs that are delayed first; what lies before them is left out."""
     found, begin = [], int(delays.max())
     for i, late in enumerate(delays):
-        moved = [
-            (
-                np.stack([u[begin - d : len(u) - d, j] for j, d in enumerate(late)], axis=1),
-                y[begin:, i : i + 1],
-            )
-            for _, u, y in records
-            if len(y) > begin
-        ]
-        one = _local_polynomial([(u, u, y) for u, y in moved]) if moved else None
+        moved = []
+        for _, u, y in records:
+            if len(y) > begin:
+                own = np.stack([u[begin - d : len(u) - d, j] for j, d in enumerate(late)], axis=1)
+                moved.append((own, own, y[begin:, i : i + 1]))
+        one = _local_polynomial(moved) if moved else None
         if one is None:
             return None
-        turned = np.exp(-1j * np.outer(one.frequency, late))
-        found.append(replace(one, G=one.G * turned[:, None, :]))
-    common = reduce(np.intersect1d, [one.frequency for one in found])
-    if not common.size:
-        return None
-    at = [np.searchsorted(one.frequency, common) for one in found]
-
-    def joined(attribute: Callable[[FrequencyResponse], NDArray]) -> NDArray:
-        return np.concatenate([attribute(one)[here] for one, here in zip(found, at, strict=True)], axis=1)
-
-    return FrequencyResponse(
-        common,
-        joined(lambda one: one.G),
-        joined(lambda one: one.radius),
-        joined(lambda one: one.noise),
-        joined(lambda one: one.coherence),
-        "local_polynomial",
-    )
+        turned = np.exp(-1j * np.outer(one.frequency, late))[:, None]
+        found.append((one.G * turned, one.radius, one.noise, one.coherence))
+        frequency = one.frequency
+    each = (np.concatenate(values, axis=1) for values in zip(*found, strict=True))
+    return FrequencyResponse(frequency, *each, "local_polynomial")
 
 
-def _leaves_less(one: FrequencyResponse, other: FrequencyResponse) -> bool:
-    """Return whether the first response leaves less unexplained."""
-    first, second = (np.mean(np.log(np.maximum(found.noise, 1e-300))) for found in (one, other))
-    return bool(first <= second)
-
-
-def _transforms(*signals: Array) -> tuple[NDArray, ...]:
-    """Return the lines of a record (N,), and the transforms (N, channels) of its signals there."""
-    samples = len(signals[0])
-    lines = 2.0 * np.pi * np.arange(samples) / samples
-    return lines, *(np.fft.fft(signal, axis=0) / np.sqrt(samples) for signal in signals)
-
-
-def _centres(samples: int) -> Array:
-    """Return lines of a record, at most as many as can be looked at, evenly on a logarithmic axis."""
-    last = (samples - 1) // 2
-    if last <= _MOST_FREQUENCIES:
-        return np.asarray(2.0 * np.pi * np.arange(1, last + 1) / samples)
-    lines = np.unique(np.geomspace(1, last, _MOST_FREQUENCIES).round())
-    return np.asarray(2.0 * np.pi * lines / samples)
-
-
-def _at(
-    w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int, terms: int
-) -> tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return G (p, r), its radius, noise and coherence (p,) at w; None if inputs are not separable.
-
-    Args:
-        terms: the number of terms of the polynomials.
-    """
+def _at(w: float, transformed: _Lines, window: int, inputs: int, terms: int) -> _Found | None:
+    """Return what polynomials of some terms say at w; None if inputs are not separable."""
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):
         last = (lines.size - 1) // 2
         first = int(np.clip(np.searchsorted(lines, w) - window // 2, 1, last - window + 1))
         near = slice(first, first + window)
-        away = (lines[near] - w) / (window * lines[1])
-        powers = away[:, None] ** np.arange(terms)
+        powers = ((lines[near] - w) / (window * lines[1]))[:, None] ** np.arange(terms)
         leakage = np.zeros((window, len(transformed), terms))
         leakage[:, number] = powers
         responses = X[near][:, None, :] * powers[:, :, None]
@@ -303,11 +274,6 @@ def _at(
 
 def _coherence(explained: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(explained / np.maximum(explained + noise, 1e-300))
-
-
-def _bent(apart: ComplexArray, radius: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(p, r): what a parabola may be off where G bends: as much as a line is off it, beyond the noise."""
-    return np.asarray(np.sqrt(np.maximum(np.abs(apart) ** 2 - radius**2, 0.0)))
 
 
 def _radius(variance: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:

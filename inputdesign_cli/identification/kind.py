@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -11,38 +11,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.start import Start, central_differences
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.model import Listed, Parameter
+from inputdesign_cli.plant.model import Listed
 
 Part = tuple[Array, Array]
 """u (N, r) and y (N, p) of one record."""
-
-Echo = Callable[[Array], Array]
-"""What past errors (N, p) add to the gradient of a parameter."""
-Echoes = Sequence[tuple[int, Echo]]
-"""Such, and the places of the parameters in theta."""
 
 # Of a parameter, or of one, for central differences.
 _STEP = 1e-6
 
 
 class Starts(NamedTuple):
-    """Where a search begins: points (n, k), the steps (n,) made to each, and how many points were tried."""
+    """Where a search begins: points (n, k), and how many points were tried."""
 
     points: Array
-    steps: NDArray[np.int64]
     tried: int
 
-    def with_points(self, points: Sequence[Array], given: Array | None) -> Starts:
-        """Return the starts with other parameters, after the `given` ones (k,), if any."""
-        listed = [given] if given is not None else []
-        steps = np.append(np.zeros(len(listed), dtype=np.int64), self.steps)
-        return Starts(np.array([*listed, *points]), steps, self.tried + len(listed))
+    def and_given(self, given: Array | None) -> Starts:
+        """Return the starts after the `given` one (k,), if any."""
+        if given is None:
+            return self
+        return Starts(np.concatenate([given[None], self.points.reshape(-1, given.size)]), self.tried + 1)
 
 
-@dataclass(frozen=True)
-class Extension:
+class Extension(NamedTuple):
     """An additional parameter of a structure.
 
     Attributes:
@@ -51,8 +44,6 @@ class Extension:
         kind: of the larger model; in place of `model`, it may be behind a hold.
         name: of the new parameter; `what` it is.
         nested: whether that structure has no further freedom than the one parameter.
-        through: made for the lengths of records, what past errors (N, p) add to the gradient; None if
-            they add nothing.
     """
 
     model: Listed
@@ -60,7 +51,6 @@ class Extension:
     name: str
     what: str
     nested: bool = True
-    through: Callable[[Sequence[int]], Echo | None] | None = None
 
 
 @dataclass(frozen=True)
@@ -104,10 +94,6 @@ class Kind(ABC):
         return ~self.explaining
 
     @abstractmethod
-    def own(self) -> Array:
-        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
-
-    @abstractmethod
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
 
@@ -126,15 +112,6 @@ class Kind(ABC):
     def start_step(self, theta: Array, index: int, samples: int) -> float:
         """Return by how much a parameter is moved to differentiate the starts."""
         return _STEP * max(abs(float(theta[index])), 1.0)
-
-    def start_slopes(
-        self, theta: Array, indices: Sequence[int], samples: int, late: int, *, free: bool
-    ) -> list[tuple[Start, ...]]:
-        """Return the derivatives of the starts with respect to each of these, by central differences."""
-        sizes = [self.start_step(theta, index, samples) for index in indices]
-        return central_differences(
-            lambda point: self.starts(point, samples, late, free=free), theta, indices, sizes
-        )
 
     def lateness(self, theta: Array) -> int:
         """Return the samples in which inputs from before a record act by other ways than the states."""
@@ -180,9 +157,24 @@ class Kind(ABC):
         """
         return ()
 
-    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Return what past errors add to gradients at theta (k,), in records of `lengths`; None: unknown."""
-        return ()
+    def echoes(self, theta: Array, samples: int) -> NDArray[np.float64]:
+        """Return how gradients respond to past errors (k, samples, p, p), by parameter, lag, output, error.
+
+        They are zero of parameters of the plant alone, and where the response does not fade: it is not the
+        noise model that holds such a plant.
+        """
+        found = np.zeros((theta.size, samples, self.outputs, self.outputs))
+        if not np.any(self.whitening):
+            return found
+        u = np.zeros((samples, self.model.inputs))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for j in range(self.outputs):
+                e = np.outer(np.arange(samples) == 0, np.arange(self.outputs) == j).astype(float)
+                y = sum(self.model.at(theta).simulate(u, e, 1.0))
+                found[..., j] = self.errors_and_gradient(theta, u, np.asarray(y))[1]
+            early, late = (np.abs(part) for part in np.array_split(found, 2, axis=1))
+            fades = np.max(late, axis=(1, 2, 3), initial=0.0) < np.max(early, axis=(1, 2, 3))
+        return np.where(fades[:, None, None, None], found, 0.0)
 
     def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
         """Return the response (N, p) to inputs, and to errors that the start explains: `begun`."""
@@ -192,15 +184,6 @@ class Kind(ABC):
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs are stable, so that they can be simulated."""
         return (True,) * self.outputs
-
-
-def shares(parameters: Sequence[Parameter], outputs: int) -> Array:
-    """Return `Kind.own` (p,) of parameters that act at listed outputs."""
-    taken = np.zeros(outputs)
-    for parameter in parameters:
-        rows = sorted({i for i, _ in parameter.places})
-        taken[rows] += 1.0 / len(rows)
-    return taken
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:

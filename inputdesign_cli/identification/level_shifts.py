@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import ScoreTest
-from inputdesign_cli.identification.problem import Point
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import Point, Records
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
 

@@ -97,24 +97,21 @@ def response_error(
         found: the response, from `kept` periods of `period` samples in all.
         odd: the power at odd lines without excitation, at these `harmonics`.
     """
-    added = _between(harmonics, odd.beyond, found.harmonics)
+
+    def between(known: NDArray[np.int_], values: NDArray[np.float64], at: NDArray[np.int_]) -> Array:
+        return np.stack([np.interp(np.log(at), np.log(known), column) for column in values.T], axis=1)
+
+    added = between(harmonics, odd.beyond, found.harmonics)
     of_inverse = kept * period * found.deviation**2 / found.noise[:, :, None]  # sum over blocks of |U^-1|^2
-    at_lines = added[:, :, None] * of_inverse
     # The power of the inputs behind each output, and of the added part, referred to the inputs.
     gain = np.sum(np.abs(found.G) ** 2, axis=2)
-    before = found.explained / gain
-    seen = _between(found.harmonics, gain, harmonics)
+    seen = between(found.harmonics, gain, harmonics)
     shares = np.maximum(
         (odd.beyond.sum(axis=0) + added.sum(axis=0)) / found.explained.sum(axis=0),
-        ((odd.beyond / seen).sum(axis=0) + (added / gain).sum(axis=0)) / before.sum(axis=0),
+        ((odd.beyond / seen).sum(axis=0) + (added / gain).sum(axis=0)) / (found.explained / gain).sum(axis=0),
     )
     changed = _OF_THE_SHARE * shares[None, :, None] * np.abs(found.G) ** 2
-    return np.asarray(np.sqrt(at_lines + changed))
-
-
-def _between(known: NDArray[np.int_], values: NDArray[np.float64], at: NDArray[np.int_]) -> Array:
-    """Return values (n, p) at harmonics `at`, interpolated from values (l, p) at `known` ones."""
-    return np.stack([np.interp(np.log(at), np.log(known), column) for column in values.T], axis=1)
+    return np.asarray(np.sqrt(added[:, :, None] * of_inverse + changed))
 
 
 @dataclass(frozen=True)
@@ -148,15 +145,22 @@ def cubes(
     Args:
         model: a rough G at the lines of `found` and at the silent ones, which the measured one is carried by.
         shape: (n, p) of the spectrum of the noise at the silent lines, up to a factor.
-        repeats: how many records of equal length with the same input follow each other.
+        repeats: see `Periods.parts`.
     """
-    U, Y = (_mean(signal, periods, repeats) for signal in (u, y))
-    lines = found.harmonics
-    of_input, of_output = _cubed(U, periods.period), _cubed(_only(Y, lines), periods.period)
-    G = _carried(lines, found.G, *model, silent)
-    at_silent = np.stack([*_through(G, of_input[silent]), of_output[silent]])
-    at_lines = np.stack([*_through(found.G, of_input[lines]), of_output[lines]])
-    factor, probability = _fitted(at_silent, _transforms(y, periods, repeats)[:, :, silent], shape)
+    lines, transforms = found.harmonics, periods.transforms(y, repeats)
+    # Mean transforms (harmonics, channels, blocks), with the level zero.
+    U, Y = (
+        np.moveaxis(signal.mean(axis=1), 0, -1) for signal in (periods.transforms(u, repeats), transforms)
+    )
+    excited = np.zeros_like(Y)
+    excited[lines] = Y[lines]
+    of_input, of_output = (_cubed(X, periods.period) for X in (U, excited))
+    at_silent, at_lines = (
+        # What the cube of each input does at the outputs (candidates, lines, p, blocks), then of the output.
+        np.stack([*np.einsum("npr,nrb->rnpb", G, of_input[at]), of_output[at]])
+        for G, at in ((_carried(lines, found.G, *model, silent), silent), (found.G, lines))
+    )
+    factor, probability = _fitted(at_silent, transforms[:, :, silent], shape)
     best = np.argmin(probability, axis=0)
     outputs = np.arange(best.size)
     added = np.moveaxis(at_lines[best, :, outputs], 0, 1) * factor[best, outputs, None]
@@ -167,34 +171,10 @@ def cubes(
     )
 
 
-def _transforms(signal: Array, periods: Periods, repeats: int) -> ComplexArray:
-    """Return the transforms of all records (blocks, periods, harmonics, channels)."""
-    return np.concatenate([periods.transforms(one) for one in np.split(signal, repeats)], axis=1)
-
-
-def _mean(signal: Array, periods: Periods, repeats: int) -> ComplexArray:
-    """Return mean transforms (harmonics, channels, blocks), with the level zero."""
-    mean = np.moveaxis(_transforms(signal, periods, repeats).mean(axis=1), 0, -1)
-    mean[0] = 0.0
-    return mean
-
-
-def _only(Y: ComplexArray, lines: NDArray[np.int_]) -> ComplexArray:
-    """Return Y at these lines, and zero at all others, which contain noise alone."""
-    kept = np.zeros_like(Y)
-    kept[lines] = Y[lines]
-    return kept
-
-
 def _cubed(X: ComplexArray, period: int) -> ComplexArray:
-    """Return the transforms of the cubes of signals, harmonics first."""
-    signal = np.fft.irfft(X * period, period, axis=0)
+    """Return the transforms of the cubes of signals about zero, harmonics first."""
+    signal = np.fft.irfft(np.concatenate([0.0 * X[:1], X[1:]]) * period, period, axis=0)
     return np.asarray(np.fft.rfft(signal**3, axis=0) / period)
-
-
-def _through(G: ComplexArray, cubed: ComplexArray) -> list[ComplexArray]:
-    """Return the effect of the cube of each of r inputs on the outputs (n, p, blocks)."""
-    return [G[:, :, j, None] * cubed[:, None, j] for j in range(cubed.shape[1])]
 
 
 def _carried(
@@ -209,8 +189,7 @@ def _carried(
     for i, j in np.ndindex(G.shape[1:]):
         usable = bool(np.all(np.abs(model[:, i, j]) > 1e-3 * np.abs(G[:, i, j])))
         ratio = G[:, i, j] / model[:, i, j] if usable else G[:, i, j]
-        between = np.interp(there, lines, ratio.real) + 1j * np.interp(there, lines, ratio.imag)
-        carried[:, i, j] = between * (model_there[:, i, j] if usable else 1.0)
+        carried[:, i, j] = np.interp(there, lines, ratio) * (model_there[:, i, j] if usable else 1.0)
     return carried
 
 

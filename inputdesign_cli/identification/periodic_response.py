@@ -45,17 +45,24 @@ class Periods:
         """Return the number of periods per block that count."""
         return self.each(samples) - self.skip
 
-    def transforms(self, signal: NDArray[np.float64]) -> ComplexArray:
+    def transforms(self, signal: NDArray[np.float64], repeats: int = 1) -> ComplexArray:
         """(.., blocks, kept, harmonics, channels) of signals (.., N, channels): of exp(jwt) its amplitude."""
-        return np.asarray(np.fft.rfft(self.parts(signal), axis=-2) / self.period)
+        return np.asarray(np.fft.rfft(self.parts(signal, repeats), axis=-2) / self.period)
 
     def means(self, signal: NDArray[np.float64], harmonics: NDArray[np.int_]) -> ComplexArray:
         """Return the means over the periods that count, (.., L, channels, blocks)."""
         found = np.fft.rfft(self.parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
         return np.asarray(np.moveaxis(found, -3, -1))
 
-    def parts(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(.., blocks, kept, period, channels): what counts of signals, cut into periods; the end fits."""
+    def parts(self, signal: NDArray[np.float64], repeats: int = 1) -> NDArray[np.float64]:
+        """(.., blocks, kept, period, channels): what counts of signals, cut into periods; the end fits.
+
+        Args:
+            repeats: how many records of equal length with the same input follow each other; of all of them
+                the periods that count stand one after the other.
+        """
+        if repeats > 1:
+            return np.concatenate([self.parts(one) for one in np.split(signal, repeats, axis=-2)], axis=-3)
         *runs, samples, channels = signal.shape
         each = self.each(samples)
         used = signal[..., samples - self.blocks * each * self.period :, :]
@@ -91,22 +98,17 @@ def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
 
 
 def differing(u: Array, periods: Periods, *, repeats: int = 1) -> float:
-    """The share of the power of inputs (N, r) that differs over periods, and over records in sequence."""
-    lines = np.stack([periods.transforms(one) for one in np.split(u, repeats)])[..., 1:, :]
-    # Over records and periods, which differ by noise alone.
-    other = float(np.sum(np.abs(lines - lines.mean(axis=(0, 2), keepdims=True)) ** 2))
+    """Return the share of the power of inputs (N, r) by which periods of all records differ."""
+    lines = periods.transforms(u, repeats)[:, :, 1:]
+    other = float(np.sum(np.abs(lines - lines.mean(axis=1, keepdims=True)) ** 2))
     return other / max(float(np.sum(np.abs(lines) ** 2)), 1e-300)
 
 
 def excited_lines(
     u: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
 ) -> NDArray[np.bool_]:
-    """(L,): whether inputs (N, r) have more at harmonics than rounding, or noise, leaves of the others.
-
-    Args:
-        repeats: how many records of equal length with the same input follow each other.
-    """
-    U = np.concatenate([periods.transforms(one) for one in np.split(u, repeats)], axis=1)
+    """(L,): whether inputs (N, r) have more at harmonics than rounding, or noise, leaves of the others."""
+    U = periods.transforms(u, repeats)
     mean = np.moveaxis(U.mean(axis=1), 0, -1)  # (harmonics, r, blocks)
     size = np.sqrt(np.mean(np.abs(mean[1:]) ** 2, axis=(0, 2)))
     if np.any(size <= _EXCITED**2 * np.abs(u).max(axis=0)):
@@ -130,19 +132,8 @@ def response_at(U: ComplexArray, Y: ComplexArray) -> ComplexArray:
 def periodic_response(
     u: Array, y: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
 ) -> PeriodicResponse | None:
-    """Return G from u (N, r) and y (N, p), with a block per input; None if inputs are not separable.
-
-    Two periods or more are needed.
-
-    Args:
-        repeats: how many records of equal length with the same input follow each other.
-    """
-    U, Y = (
-        np.concatenate(
-            [periods.transforms(one)[:, :, harmonics] for one in np.split(signal, repeats)], axis=1
-        )
-        for signal in (u, y)
-    )
+    """Return G from two or more periods of u (N, r) and y (N, p); None if inputs are not separable."""
+    U, Y = (periods.transforms(signal, repeats)[:, :, harmonics] for signal in (u, y))
     kept = U.shape[1]
     inputs, outputs = (np.moveaxis(part.mean(axis=1), 0, -1) for part in (U, Y))
     if not harmonics.size or np.any(np.linalg.cond(inputs) > 1.0 / _EXCITED):
@@ -186,7 +177,7 @@ def period_drift(
     Args:
         time: (N,), at which samples were taken, in any unit.
         noise: (p,), the spectrum of the noise towards frequency zero.
-        repeats: how many records of equal length follow each other.
+        repeats: see `Periods.parts`.
     """
     curves, degrees = [], []
     rare = 0.5 * _CERTAIN / (_MOST_DEGREE * repeats * y.shape[1])

@@ -1,19 +1,25 @@
-"""One output of a polynomial model: where its coefficients stand in theta, and its prediction errors.
+"""Prediction errors of polynomial models, output by output, and the estimates of many runs at once.
 
-epsilon = (D/C)(A y - sum_j (B_j/F_j) u_j) and psi = -d epsilon / d theta ([ljung-1999], Section 10.3), for
-many runs at once. Signals are (runs, N), and start from rest.
+epsilon = (D/C)(A y - sum_j (B_j/F_j) u_j) and psi = -d epsilon / d theta ([ljung-1999], Section 10.3).
+Signals are (runs, N), and start from rest.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg.blas
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
+from inputdesign_cli.identification.records import shares, weighing
+from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
 from inputdesign_cli.plant import PolynomialModel
+
+# Samples of as many runs stay in the cache.
+_NUMBERS_AT_ONCE = 16_000
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,11 @@ class Row:
         return self.d.polynomial(theta[None])[0], self.c.polynomial(theta[None])[0]
 
 
+def rows_of(model: PolynomialModel) -> tuple[Row, ...]:
+    """Return a row for every output."""
+    return tuple(Row.of(model, output) for output in range(model.outputs))
+
+
 def errors_and_sources(
     row: Row, theta: Array, u: NDArray[np.float64], y: Array
 ) -> tuple[Array, list[tuple[Coefficients, Array]]]:
@@ -132,3 +143,150 @@ def _divided(monic: Array, x: Array) -> Array:
         diagonals[:, :-lag, lag] = monic[:, lag, None]
     flat = scipy.linalg.blas.dtbsv(order, diagonals.reshape(-1, order + 1).T, x.ravel(), lower=1, diag=1)
     return np.asarray(flat).reshape(x.shape)
+
+
+@dataclass(frozen=True)
+class FromRest:
+    """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`.
+
+    Attributes:
+        rows: one an output.
+        u, y: (runs, r, N), (runs, p, N).
+        skipped: how many errors at the begin of each do not count.
+    """
+
+    rows: tuple[Row, ...]
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    skipped: int = 0
+
+    @classmethod
+    def of(cls, model: PolynomialModel, u: Array, y: Array, skipped: int = 0) -> FromRest:
+        """Return the problem of fitting a model to records u (runs, N, r), y (runs, N, p)."""
+        return cls(rows_of(model), *(np.ascontiguousarray(x.swapaxes(1, 2)) for x in (u, y)), skipped)
+
+    @property
+    def errors(self) -> int:
+        """Return the number of prediction errors of a run."""
+        return self.y[0].size
+
+    def kept(self, runs: NDArray[np.bool_]) -> FromRest:
+        """Return the problem with some of the runs only."""
+        return replace(self, u=self.u[runs], y=self.y[runs])
+
+    def stabilised(self, theta: Array) -> Array:
+        """Return theta (runs, k) with stable predictors."""
+        return stabilised(self.rows, theta)
+
+    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+        """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k); overflow costs infinity."""
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            sums = self.sums(theta)
+            cost, weights = weighing(sums.errors / self.y.shape[2], self.y.shape[2])
+            hessian, slope = sums.weighed(weights)
+        finite = np.isfinite(cost) & np.isfinite(hessian).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)
+        if not np.all(finite):
+            cost = np.where(finite, cost, np.inf)
+            hessian[~finite], slope[~finite] = np.eye(theta.shape[1]), 0.0
+        return cost, hessian, slope
+
+    def sums(self, theta: Array) -> Sums:
+        """Return the sums from which the cost and its derivatives at theta (runs, k) are computed."""
+        size = max(_NUMBERS_AT_ONCE // self.y[0].size, 1)
+        some = [slice(first, first + size) for first in range(0, len(theta), size)]
+        found = [self._products(theta[one], self.u[one], self.y[one]) for one in some]
+        columns = np.concatenate([one.columns for row in self.rows for one in row.all])
+        owner = np.repeat(np.arange(len(self.rows)), [row.size for row in self.rows])
+        each = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return Sums(owner, np.eye(theta.shape[1])[columns], *each)
+
+    def _products(self, theta: Array, u: Array, y: Array) -> tuple[NDArray[np.float64], ...]:
+        """Return e e^T, psi e^T and psi psi^T of few runs, see `Sums`."""
+        samples, runs = y.shape[2], len(theta)
+        errors, psi = np.empty(y.shape), np.zeros((runs, sum(row.size for row in self.rows), samples))
+        number = 0
+        for i, row in enumerate(self.rows):
+            errors[:, i], sources = errors_and_sources(row, theta, u, y[:, i])
+            of = {id(one): source for one, source in sources}
+            for one in row.all:
+                for lag in one.lags:
+                    psi[:, number, lag:] = of[id(one)][:, : samples - lag]
+                    number += 1
+        errors, psi = errors[:, :, self.skipped :], psi[:, :, self.skipped :]
+        turned = errors.swapaxes(1, 2)
+        return errors @ turned, psi @ turned, psi @ psi.swapaxes(1, 2)
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums of products of residuals and gradients over the samples, for each run.
+
+    Attributes:
+        owner: (m,), the output that each gradient is of; `spread` (m, k), its parameter.
+        errors, slopes, products: e e^T (runs, p, p), psi e^T (runs, m, p) and psi psi^T (runs, m, m).
+    """
+
+    owner: NDArray[np.int64]
+    spread: Array
+    errors: NDArray[np.float64]
+    slopes: NDArray[np.float64]
+    products: NDArray[np.float64]
+
+    @property
+    def own(self) -> Array:
+        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
+        outputs = self.errors.shape[1]
+        return shares(np.array([self.spread[self.owner == i].any(axis=0) for i in range(outputs)]).T)
+
+    def weighed(self, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
+        """Return psi^T W psi (runs, k, k) and psi^T W e (runs, k) for weights (runs, p, p)."""
+        products = self.products * weights[:, self.owner[:, None], self.owner[None, :]]
+        slopes = np.sum(self.slopes * weights[:, self.owner, :], axis=2)
+        return self.spread.T @ products @ self.spread, slopes @ self.spread
+
+
+def stabilised(rows: Sequence[Row], theta: Array) -> Array:
+    """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
+
+    Roots of F that are exactly one belong to integrators, and stay.
+    """
+    theta = theta.copy()
+    monic = {tuple(one.columns): one for row in rows for one in (row.c, row.d, *row.f) if one.lags}
+    for one in monic.values():
+        polynomials = one.polynomial(theta)
+        for run in np.flatnonzero(~is_stable(polynomials)):
+            own = polynomials[run]
+            moving = without_integrators(own) if one.letter == "f" else own
+            if not is_stable(moving[None])[0]:
+                theta[run, one.columns] = reflected(own)[1:]
+    return theta
+
+
+def is_arx(model: PolynomialModel) -> bool:
+    """Return whether least squares is the prediction-error estimate: C, D and F are 1."""
+    return all(parameter.letter in "ab" for parameter in model.parameters)
+
+
+def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
+    """Return estimates (runs, k) of an ARX model in one step, weighed by its covariance ([ljung-1999], 4.2).
+
+    Args:
+        model: the structure and the covariance are meant.
+        u, y: (runs, samples, r), (runs, samples, p); what came before them is not known.
+    """
+    longest = max(parameter.power for parameter in model.parameters)
+    nowhere, weights = np.zeros((len(y), model.theta.size)), np.linalg.inv(model.covariance)
+    sums = FromRest.of(model, u, y, skipped=longest).sums(nowhere)
+    normal, right = sums.weighed(np.broadcast_to(weights, (len(y), *weights.shape)))
+    return np.asarray(np.linalg.solve(normal, right[:, :, None])[:, :, 0], dtype=float)
+
+
+def estimated_polynomials(model: PolynomialModel, theta: Array) -> tuple[Array, Array]:
+    """Return A (runs, p, l) and B (runs, p, r, m) of ARX estimates (runs, k), ascending in q^-1."""
+    A = np.zeros((len(theta), model.outputs, max(a.size for a in model.A)))
+    B = np.zeros((len(theta), model.outputs, model.inputs, max(b.size for row in model.B for b in row)))
+    for i, row in enumerate(rows_of(model)):
+        A[:, i, : row.a.lags.stop] = row.a.polynomial(theta)
+        for j, b in zip(row.inputs, row.b, strict=True):
+            B[:, i, j, : b.lags.stop] = b.polynomial(theta)
+    return A, B

@@ -9,26 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array, Rows
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
-from inputdesign_cli.identification.kind import Echo, Echoes, Extension, Kind, Part, Starts, shares
-from inputdesign_cli.identification.noise_first import late_echo
-from inputdesign_cli.identification.polynomial_rows import Row, errors_and_sources
-from inputdesign_cli.identification.problem import weighing
-from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
-from inputdesign_cli.identification.start import Start, density, each_later, noise_before
-from inputdesign_cli.identification.starts import starting_points
+from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts
+from inputdesign_cli.identification.polynomial_rows import (
+    FromRest,
+    Row,
+    errors_and_sources,
+    rows_of,
+    stabilised,
+)
+from inputdesign_cli.identification.polynomial_starts import starting_points
+from inputdesign_cli.identification.start import Start, each_later
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
-
-_STEP = 1e-30
-# Samples of as many runs stay in the cache.
-_NUMBERS_AT_ONCE = 16_000
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class PolynomialKind(Kind):
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """Return a row for every output."""
-        return tuple(Row.of(self.model, output) for output in range(self.outputs))
+        return rows_of(self.model)
 
     @property
     def recent(self) -> int:
@@ -51,10 +50,6 @@ class PolynomialKind(Kind):
     def explaining(self) -> NDArray[np.bool_]:
         """Return the mask (k,) of the coefficients of B and F."""
         return np.array([parameter.letter in "bf" for parameter in self.model.parameters], dtype=bool)
-
-    def own(self) -> Array:
-        """Return the number of parameters of each output (p,)."""
-        return shares(self.model.parameters, self.outputs)
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p)."""
@@ -88,22 +83,6 @@ class PolynomialKind(Kind):
         letters = "cdf" if free else "cd"
         return np.flatnonzero([parameter.letter in letters for parameter in self.model.parameters])
 
-    def start_slopes(
-        self, theta: Array, indices: Sequence[int], samples: int, late: int, *, free: bool
-    ) -> list[tuple[Start, ...]]:
-        """By steps along the imaginary axis, which lose no digits to a difference ([squire-trapp-1998])."""
-        here, found = self.starts(theta, samples, late, free=free), []
-        still = [Start(*(np.zeros_like(block) for block in start)) for start in here]
-        for index in indices:
-            moved = theta + 1j * _STEP * (np.arange(theta.size) == index)
-            slopes = []
-            for row, none in zip(self.rows, still, strict=True):
-                acts = any(index in one.columns for one in row.all)
-                start = _start(row, moved, samples, free=free) if acts else none
-                slopes.append(Start(*(np.imag(block) / _STEP for block in start)))
-            found.append(tuple(slopes))
-        return found
-
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """Return signals (N, m) through D/C of each output (p, N, m)."""
         return np.array([filtered(*row.whitening(theta), signals, axis=0) for row in self.rows])
@@ -114,202 +93,61 @@ class PolynomialKind(Kind):
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """Each output estimated alone, then what outputs share weighed by how well each knows it."""
-        found = [self._starting_points(*part, given) for part in parts]
-        points = np.concatenate([p for p, _ in found])
-        return Starts(points, np.zeros(len(points), dtype=np.int64), max(tried for _, tried in found))
-
-    def _starting_points(self, u: Array, y: Array, given: Array | None) -> tuple[Array, int]:
-        """Return points (points, k) from one record, and how many starts an output alone has had."""
         listed = np.zeros((0, len(self.names))) if given is None else given[None]
-        alone = [
-            np.concatenate([listed, starting_points(row, len(self.names), u, own)])
-            for row, own in zip(self.rows, y.T, strict=True)
-        ]
-        tried = max(len(points) for points in alone)
-        if len(alone) == 1:
-            return alone[0], tried
-        return np.concatenate([listed, self._one_by_one(u, y, alone)[None]]), tried
+        points, tried = [], 0
+        for u, y in parts:
+            alone = [
+                np.concatenate([listed, starting_points(row, len(self.names), u, own)])
+                for row, own in zip(self.rows, y.T, strict=True)
+            ]
+            tried = max(tried, *(len(starts) for starts in alone))
+            single = len(alone) == 1
+            points += [*alone] if single else [listed, self._one_by_one(u, y, alone)[None]]
+        return Starts(np.concatenate(points), tried)
 
     def _one_by_one(self, u: Array, y: Array, starts: Sequence[Array]) -> Array:
         """Return theta (k,) from each output alone: the information of all, added up."""
         size = len(self.names)
         total, moment = np.zeros((size, size)), np.zeros(size)
         for row, own, points in zip(self.rows, y.T, starts, strict=True):
-            if not row.size:
-                continue
-            inputs, output = (np.repeat(x[None], len(points), axis=0) for x in (u.T, own[None]))
-            found = minimise(FromRest((row,), inputs, output), points)
-            best = best_run(found)
-            information = found.hessian[best] / max(found.cost[best], 1e-300)
-            total += information
-            moment += information @ found.theta[best]
+            if row.size:
+                inputs, output = (np.repeat(x[None], len(points), axis=0) for x in (u.T, own[None]))
+                found = minimise(FromRest((row,), inputs, output), points)
+                best = best_run(found)
+                information = found.hessian[best] / max(found.cost[best], 1e-300)
+                total += information
+                moment += information @ found.theta[best]
         scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
         scaled = np.linalg.lstsq(total / np.outer(scale, scale), moment / scale, rcond=None)[0]
         return np.asarray(scaled / scale)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
-        """Return the extensions by a further coefficient in any of the polynomials."""
+        """Return the extensions by a further coefficient in any of the polynomials, or a shorter delay."""
         found = []
         for larger, what in _larger(self.model.at(theta), feedback=feedback):
             (name,) = set(larger.names) - set(self.names)
-            found.append(
-                Extension(larger, PolynomialKind(larger), name, what, through=partial(_echo, larger, name))
-            )
+            found.append(Extension(larger, PolynomialKind(larger), name, what))
         return tuple(found)
-
-    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Return the echoes of the coefficients of A, C and D."""
-        model = self.model.at(theta)
-        found = ((k, _echo(model, name, lengths)) for k, name in enumerate(model.names))
-        return tuple((k, through) for k, through in found if through is not None)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which rows of G are stable."""
         return self.model.at(theta).stable_outputs
 
 
-@dataclass(frozen=True)
-class FromRest:
-    """The problem of fitting many records that begin at rest, noise as well; see `gauss_newton.Problem`.
-
-    Attributes:
-        rows: one an output.
-        u, y: (runs, r, N), (runs, p, N).
-    """
-
-    rows: tuple[Row, ...]
-    u: NDArray[np.float64]
-    y: NDArray[np.float64]
-
-    @property
-    def errors(self) -> int:
-        """Return the number of prediction errors of a run."""
-        return self.y[0].size
-
-    def kept(self, runs: NDArray[np.bool_]) -> FromRest:
-        """Return the problem with some of the runs only."""
-        return replace(self, u=self.u[runs], y=self.y[runs])
-
-    def stabilised(self, theta: Array) -> Array:
-        """Return theta (runs, k) with stable predictors."""
-        return stabilised(self.rows, theta)
-
-    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
-        """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k); overflow costs infinity."""
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            sums = self.sums(theta)
-            cost, weights = weighing(sums.errors / self.y.shape[2], self.y.shape[2])
-            hessian, slope = sums.weighed(weights)
-        finite = np.isfinite(cost) & np.isfinite(hessian).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)
-        if not np.all(finite):
-            cost = np.where(finite, cost, np.inf)
-            hessian[~finite], slope[~finite] = np.eye(theta.shape[1]), 0.0
-        return cost, hessian, slope
-
-    def sums(self, theta: Array) -> Sums:
-        """Return the sums from which the cost and its derivatives at theta (runs, k) are computed."""
-        size = max(_NUMBERS_AT_ONCE // self.y[0].size, 1)
-        some = [slice(first, first + size) for first in range(0, len(theta), size)]
-        found = [self._products(theta[one], self.u[one], self.y[one]) for one in some]
-        columns = np.concatenate([one.columns for row in self.rows for one in row.all])
-        owner = np.repeat(np.arange(len(self.rows)), [row.size for row in self.rows])
-        each = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        return Sums(owner, np.eye(theta.shape[1])[columns], *each)
-
-    def _products(self, theta: Array, u: Array, y: Array) -> tuple[NDArray[np.float64], ...]:
-        """Return e e^T, psi e^T and psi psi^T of few runs, see `Sums`."""
-        samples, runs = y.shape[2], len(theta)
-        errors, psi = np.empty(y.shape), np.zeros((runs, sum(row.size for row in self.rows), samples))
-        number = 0
-        for i, row in enumerate(self.rows):
-            errors[:, i], sources = errors_and_sources(row, theta, u, y[:, i])
-            of = {id(one): source for one, source in sources}
-            for one in row.all:
-                for lag in one.lags:
-                    psi[:, number, lag:] = of[id(one)][:, : samples - lag]
-                    number += 1
-        turned = errors.swapaxes(1, 2)
-        return errors @ turned, psi @ turned, psi @ psi.swapaxes(1, 2)
-
-
-@dataclass(frozen=True)
-class Sums:
-    """Sums of products of residuals and gradients over the samples, for each run.
-
-    Attributes:
-        owner: (m,), the output that each gradient is of; `spread` (m, k), its parameter.
-        errors, slopes, products: e e^T (runs, p, p), psi e^T (runs, m, p) and psi psi^T (runs, m, m).
-    """
-
-    owner: NDArray[np.int64]
-    spread: Array
-    errors: NDArray[np.float64]
-    slopes: NDArray[np.float64]
-    products: NDArray[np.float64]
-
-    def weighed(self, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
-        """Return psi^T W psi (runs, k, k) and psi^T W e (runs, k) for weights (runs, p, p)."""
-        products = self.products * weights[:, self.owner[:, None], self.owner[None, :]]
-        slopes = np.sum(self.slopes * weights[:, self.owner, :], axis=2)
-        return self.spread.T @ products @ self.spread, slopes @ self.spread
-
-
-def stabilised(rows: Sequence[Row], theta: Array) -> Array:
-    """Return theta (runs, k) with the roots of C, D and F mirrored into the unit circle if they leave it.
-
-    Roots of F that are exactly one belong to integrators, and stay.
-    """
-    theta = theta.copy()
-    monic = {tuple(one.columns): one for row in rows for one in (row.c, row.d, *row.f) if one.lags}
-    for one in monic.values():
-        polynomials = one.polynomial(theta)
-        for run in np.flatnonzero(~is_stable(polynomials)):
-            own = polynomials[run]
-            moving = without_integrators(own) if one.letter == "f" else own
-            if not is_stable(moving[None])[0]:
-                theta[run, one.columns] = reflected(own)[1:]
-    return theta
-
-
 def _start(row: Row, theta: Array, samples: int, *, free: bool) -> Start:
-    """Impulses, and levels, with what 1/F makes of them; each is filtered once, and delayed."""
-    D, C = row.whitening(theta)
-    impulse, level = np.eye(1, samples, dtype=theta.dtype)[0], np.ones(samples)
+    """Impulses, and levels, with what 1/F makes of them."""
+    impulse, level = np.eye(1, samples)[0], np.ones(samples)
     if free:
-        most = max(
-            [row.a.lags.stop - 1, *(b.lags.stop - f.lags.stop for b, f in zip(row.b, row.f, strict=True))]
-        )
-        parts = [(level, 1), (impulse, most)]
+        older = [b.lags.stop - f.lags.stop for b, f in zip(row.b, row.f, strict=True)]
+        parts = [(level, 1), (impulse, max([row.a.lags.stop - 1, *older]))]
         for f in row.f:
             if f.lags:
                 F = f.polynomial(theta[None])[0]
                 parts += [(filtered([1.0], F, impulse), len(f.lags)), (filtered([1.0], F, level), 1)]
     else:
         parts = [(impulse, len(row.a.lags) if row.c.lags else 0)]
-    disturbance = np.concatenate([each_later(one, count) for one, count in parts])
-    if C.size == D.size == 1:
-        return Start.white(disturbance)
-    through = np.concatenate([each_later(filtered(D, C, one), count) for one, count in parts])
-    zeros = density(C) if row.c.lags else np.zeros(())
-    return Start(through, disturbance, noise_before(C, D, samples), zeros)
-
-
-def _echo(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo | None:
-    """What past errors add to the gradient of a coefficient of A, C or D; None for others.
-
-    epsilon = (D/C)(A y - ..): -d epsilon / d theta is epsilon(t - k) through 1/C for a c_k, through -1/D for
-    a d_k and, by the noise in y, through -1/A for an a_k. Where that grows nothing is known of it: what holds
-    the plant is not 1/A.
-    """
-    rows = {"a": (larger.A, -1.0), "c": (larger.C, 1.0), "d": (larger.D, -1.0)}
-    parameter = next(one for one in larger.parameters if one.name == name)
-    if parameter.letter not in rows:
-        return None
-    polynomials, sign = rows[parameter.letter]
-    below = {i: (larger.row(polynomials, i), sign) for i, _ in parameter.places}
-    if any(np.any(np.abs(np.roots(polynomial)) >= 1.0) for polynomial, _ in below.values()):
-        return None
-    return late_echo(below, parameter.power, lengths)
+    D, C = row.whitening(theta)
+    return Start.white(np.concatenate([each_later(one, count) for one, count in parts])).through(C, D)
 
 
 def _larger(model: PolynomialModel, *, feedback: bool) -> Iterator[tuple[PolynomialModel, str]]:
@@ -324,18 +162,17 @@ def _larger(model: PolynomialModel, *, feedback: bool) -> Iterator[tuple[Polynom
         if model.row(model.A, i).size == 1 or F.size > 1:
             yield replace(model, F=with_entry(model.F, i, j, np.append(F, 0.0))), "pole in F"
         if model.first[i][j] > int(feedback):
-            earlier = np.array(model.first) - (np.arange(model.outputs)[:, None] == i) * (
-                np.arange(model.inputs) == j
-            )
-            delays = tuple(map(tuple, earlier.tolist()))
-            yield replace(model, delays=delays), "coefficient in B before the others"
-    for i, A in enumerate(model.A):
-        if A.size > 1:
-            yield replace(model, A=_longer(model.A, i)), "pole in A"
-    for i in range(len(model.C)):
-        yield replace(model, C=_longer(model.C, i)), "coefficient in C"
-    for i in range(len(model.D)):
-        yield replace(model, D=_longer(model.D, i)), "coefficient in D"
+            earlier = np.array(model.first)
+            earlier[i, j] -= 1
+            sooner = replace(model, delays=tuple(map(tuple, earlier.tolist())))
+            yield sooner, "coefficient in B before the others"
+    for letter, rows in (("A", model.A), ("C", model.C), ("D", model.D)):
+        for i, row in enumerate(rows):
+            longer = {letter: (*rows[:i], np.append(row, 0.0), *rows[i + 1 :])}
+            if letter != "A":
+                yield replace(model, **longer), f"coefficient in {letter}"
+            elif row.size > 1:
+                yield replace(model, **longer), "pole in A"
 
 
 def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
@@ -343,7 +180,3 @@ def with_entry(rows: Rows, i: int, j: int, entry: Array) -> Rows:
     return tuple(
         tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
     )
-
-
-def _longer(rows: tuple[Array, ...], i: int) -> tuple[Array, ...]:
-    return tuple(np.append(p, 0.0) if o == i else p for o, p in enumerate(rows))

@@ -1,8 +1,16 @@
-"""One or several experiments on one system, of which a single model is estimated.
+"""Records of one system, of which a single model is estimated, and what is minimised.
 
-The parts share theta. Each begins with the plant at rest, or, where the start is `free`, in a state of its
-own about a level of its own. What these and the noise before it can cause is linear in unknowns, which are
-eliminated from errors and gradient for every theta (variable projection, [golub-pereyra-1973]).
+The records share theta. Each begins with the plant at rest, or, where the start is `free`, in a state of its
+own about a level of its own; see `start.py` for what these and the noise before it can explain.
+
+With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), the sum of squares for one output. It falls with the
+likelihood of Gaussian noise of unknown covariance ([ljung-1999], (7.87)-(7.96) and Section 15.2). Minus half
+its gradient is sum psi(t) W e(t), half its Hessian sum psi W psi^T up to what vanishes at the minimum, with
+W = cost / (p N) S^-1. Known weights are kept.
+
+Of the n = N p - m errors that m free unknowns leave, n log cost is -2 log likelihood. Integrating over the
+starts adds a determinant to that, and an earlier estimate at a distance q, -2 log of its density, adds q:
+they multiply the cost by exp(q / n); with known weights they are added.
 """
 
 from __future__ import annotations
@@ -16,11 +24,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.free_starts import FreeStarts
 from inputdesign_cli.identification.kind import Kind, Part
-from inputdesign_cli.identification.start import Start, central_differences
+from inputdesign_cli.identification.start import FreeStarts, Start
 
 _MOST_STARTED = 3
+# Errors of this power relative to the output are rounding. It is added to S, so that an output without
+# noise does not hide the others.
+_EXACT = 1e-20
 
 
 @dataclass(frozen=True)
@@ -30,52 +40,48 @@ class Linearised:
     What noise before the records is likely to have been counts as M more errors of each output.
 
     Attributes:
-        errors: (N, p), what unknown starts explain taken off.
-        psi: (k, N, p) = -d errors / d theta, the starts following.
-        past: (M, p), errors before the records, and `past_psi` (k, M, p).
+        all_errors: (N + M, p), what unknown starts explain taken off; `samples`, N.
+        all_psi: (k, N + M, p) = -d errors / d theta, the starts following.
         begun: (N, p), what levels and states at the start explain.
         directions: ((N + M) p, m) orthonormal, the errors in white units that unknown starts can explain.
-        unknowns: how many of these are levels and states, of which nothing is known.
-        determinant: what integrating over the starts adds to -2 log likelihood; `slope` (k,), half its
-            gradient; `curvature` (k, k), about half its Hessian; `of_noise`, the part that belongs to noise
-            before the records.
+        slope, curvature: (k,), half the gradient of `determinant`, and (k, k), about half its Hessian.
+        unknowns: how many unknowns are levels and states, of which nothing is known.
+        determinant: what integrating over the starts adds to -2 log likelihood; `of_noise`, the part that
+            belongs to noise before the records.
     """
 
-    errors: Array
-    psi: NDArray[np.float64]
-    past: Array
-    past_psi: NDArray[np.float64]
+    all_errors: Array
+    all_psi: NDArray[np.float64]
+    samples: int
     begun: Array
     directions: Array
-    unknowns: int
-    determinant: float
     slope: Array
     curvature: Array
-    of_noise: float
+    unknowns: int = 0
+    determinant: float = 0.0
+    of_noise: float = 0.0
 
     @classmethod
     def at_rest(cls, errors: Array, psi: NDArray[np.float64]) -> Linearised:
         """Return the errors and gradient without unknown starts."""
-        k, p = len(psi), errors.shape[1]
-        begun, slope, curvature = np.zeros_like(errors), np.zeros(k), np.zeros((k, k))
-        past, directions = np.zeros((0, p)), np.zeros((errors.size, 0))
-        nothing = np.zeros((k, 0, p))
-        return cls(errors, psi, past, nothing, begun, directions, 0, 0.0, slope, curvature, 0.0)
+        k, directions = len(psi), np.zeros((errors.size, 0))
+        nothing = np.zeros_like(errors)
+        return cls(errors, psi, len(errors), nothing, directions, np.zeros(k), np.zeros((k, k)))
+
+    @property
+    def errors(self) -> Array:
+        """Return the prediction errors (N, p) of the records."""
+        return self.all_errors[: self.samples]
+
+    @property
+    def psi(self) -> NDArray[np.float64]:
+        """Return their gradient (k, N, p)."""
+        return self.all_psi[:, : self.samples]
 
     @property
     def freedom(self) -> int:
         """Return the number of errors that levels and states leave."""
         return self.errors.size - self.unknowns
-
-    @property
-    def all_errors(self) -> Array:
-        """Return the prediction errors (N + M, p) of all samples."""
-        return np.concatenate([self.errors, self.past])
-
-    @property
-    def all_psi(self) -> NDArray[np.float64]:
-        """(k, N + M, p)."""
-        return np.concatenate([self.psi, self.past_psi], axis=1)
 
 
 @dataclass(frozen=True)
@@ -109,10 +115,6 @@ class Records:
         """Return the parameters that move dead times: there the cost has kinks."""
         return np.flatnonzero(self.kind.model.dead_times)
 
-    def crossings(self, theta: Array) -> Array:
-        """Return the crossings (m, 2, k) of sampling instants, see `Kind`."""
-        return self.kind.crossings(theta, self._longest)
-
     @cached_property
     def u(self) -> Array:
         """Return the inputs (N, r)."""
@@ -138,6 +140,16 @@ class Records:
         """Return the samples of each part."""
         return tuple(len(y) for _, y in self.parts)
 
+    @cached_property
+    def longest(self) -> int:
+        """Return the samples of the longest record: the past acts on all alike, on shorter ones for fewer."""
+        return max(self.lengths)
+
+    @cached_property
+    def rounding(self) -> Array:
+        """Return a covariance (p, p) of errors so small that they are rounding."""
+        return _EXACT * np.diag(np.mean(self.y**2, axis=0))
+
     def from_rest(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) and their gradient (k, N, p) if each record began at rest."""
         found = [self.kind.errors_and_gradient(theta, *part) for part in self.parts]
@@ -146,51 +158,42 @@ class Records:
     def at(self, theta: Array) -> Linearised:
         """Return prediction errors and their gradient, the unknown starts eliminated."""
         errors, psi = self.from_rest(theta)
-        at_rest = Linearised.at_rest(errors, psi)
-        if not all(np.all(np.isfinite(x)) for x in (errors, psi)):
-            return at_rest
-        starts = FreeStarts(self.lengths, self._starts(theta))
-        if not (starts.any and starts.finite):
-            return at_rest
-        coefficients, root, directions = starts.eliminated(errors, self.weights)
-        slopes = np.zeros((theta.size, starts.parts))
-        moving = self._moving
-        for k, change in zip(moving, self._start_slopes(theta, moving), strict=True):
-            psi[k] += starts.combined(coefficients, starts=change)
-            slopes[k] = 0.5 * starts.slopes(change)
-        past = np.zeros((starts.past, errors.shape[1]))
-        psi = np.concatenate([psi, np.zeros((len(psi), *past.shape))], axis=1)
+        finite = bool(np.all(np.isfinite(errors)) and np.all(np.isfinite(psi)))
+        if not (finite and (free := FreeStarts(self.lengths, self._starts(theta))).usable):
+            return Linearised.at_rest(errors, psi)
+        coefficients, root, directions = free.eliminated(errors, self.weights)
+        slopes = np.zeros((theta.size, len(self.lengths) * len(free.starts) + len(free.starts)))
+        for k in self._moving:
+            change = self._start_slope(theta, k)
+            psi[k] += free.combined(coefficients, change)
+            slopes[k] = 0.5 * free.slopes(change)
+        psi = np.concatenate([psi, np.zeros((len(psi), free.past, errors.shape[1]))], axis=1)
         flat = (psi @ root.T).reshape(len(psi), -1)
         flat = flat - (flat @ directions) @ directions.T
-        psi = flat.reshape(psi.shape) @ np.linalg.inv(root).T
+        left = errors - free.combined(coefficients, free.starts)
         return Linearised(
-            errors - starts.combined(coefficients),
-            psi[:, : self.samples],
-            starts.errors_of_past(coefficients),
-            psi[:, self.samples :],
-            starts.combined(coefficients, noise=False),
+            np.concatenate([left, free.errors_of_past(coefficients)]),
+            flat.reshape(psi.shape) @ np.linalg.inv(root).T,
+            len(errors),
+            free.combined(coefficients, free.starts, noise=False),
             directions,
-            starts.unknowns,
-            starts.determinant,
             slopes.sum(axis=1),
             slopes @ slopes.T,
-            starts.of_noise,
+            free.unknowns,
+            free.determinant,
+            free.of_noise,
         )
 
     def gradient(self, theta: Array, index: int) -> Array:
         """Return minus the derivative (N, p) of the errors by a parameter; past noise stays as estimated."""
         errors, every = self.from_rest(theta)
         starts, psi = FreeStarts(self.lengths, self._starts(theta)), every[index]
-        if index not in self._moving or not (starts.past and starts.finite):
+        if index not in self._moving or not (starts.past and starts.usable):
             return psi
         coefficients, _, _ = starts.eliminated(errors, self.weights)
-        (change,) = self._start_slopes(theta, [index])
-        return psi + starts.combined(coefficients, starts=change, free=False)
-
-    @property
-    def _longest(self) -> int:
-        """Return the samples of the longest record: the past acts on all alike, on shorter ones for fewer."""
-        return max(self.lengths)
+        for own, start in zip(coefficients, starts.starts, strict=True):
+            own[:, : len(start.free)] = 0.0
+        return psi + starts.combined(coefficients, self._start_slope(theta, index))
 
     @property
     def _moving(self) -> list[int]:
@@ -198,18 +201,26 @@ class Records:
         return self.kind.in_starts(self.late, free=self.free).tolist()
 
     def _starts(self, theta: Array) -> tuple[Start, ...]:
-        starts = self.kind.starts(theta, self._longest, self.late, free=self.free)
+        starts = self.kind.starts(theta, self.longest, self.late, free=self.free)
         if not (self.ramp and self.free):
             return starts
-        line = np.linspace(-1.0, 1.0, self._longest)[:, None]
-        through = self.kind.whitened(theta, line)
-        return tuple(start.and_free(own.T, line.T) for start, own in zip(starts, through, strict=True))
+        line = np.linspace(-1.0, 1.0, self.longest)[:, None]
+        return tuple(
+            start._replace(
+                free=np.concatenate([start.free, own.T]),
+                disturbance=np.concatenate([start.disturbance, line.T]),
+            )
+            for start, own in zip(starts, self.kind.whitened(theta, line), strict=True)
+        )
 
-    def _start_slopes(self, theta: Array, indices: Sequence[int]) -> list[tuple[Start, ...]]:
-        if self.ramp and self.free:
-            steps = [self.kind.start_step(theta, index, self._longest) for index in indices]
-            return central_differences(self._starts, theta, indices, steps)
-        return self.kind.start_slopes(theta, indices, self._longest, self.late, free=self.free)
+    def _start_slope(self, theta: Array, index: int) -> tuple[Start, ...]:
+        """Return the derivative of the starts by a parameter, by central differences."""
+        size = self.kind.start_step(theta, index, self.longest)
+        step = size * np.eye(theta.size)[index]
+        ends = zip(self._starts(theta + step), self._starts(theta - step), strict=True)
+        return tuple(
+            Start(*(np.subtract(a, b) / (2.0 * size) for a, b in zip(*pair, strict=True))) for pair in ends
+        )
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """(p, N, m), see `Kind`."""
@@ -218,7 +229,7 @@ class Records:
 
     def stabilised(self, theta: Array) -> Array:
         """Return theta with a stable predictor."""
-        return self.kind.stabilised(theta, self._longest)
+        return self.kind.stabilised(theta, self.longest)
 
 
 def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
@@ -247,3 +258,134 @@ def longest(parts: Sequence[Part]) -> list[Part]:
 def centred(parts: Sequence[Part]) -> list[Part]:
     """Return the records without their means."""
     return [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Errors, gradient, weights W (p, p) and cost of records at theta (k,).
+
+    Attributes:
+        known: (k, k), half the Hessian of the terms of an earlier estimate and of integrating over unknown
+            starts; `towards` (k,), minus half their gradient.
+    """
+
+    theta: Array
+    near: Linearised
+    weights: Array
+    cost: float
+    known: Array
+    towards: Array
+
+    @property
+    def errors(self) -> Array:
+        """Return the prediction errors (N, p)."""
+        return self.near.errors
+
+    @property
+    def psi(self) -> NDArray[np.float64]:
+        """Return psi, minus the slopes of the prediction errors, (k, N, p)."""
+        return self.near.psi
+
+    @property
+    def slope(self) -> Array:
+        """Return minus half the gradient (k,) of the cost."""
+        near = self.near
+        return np.asarray(self._weighed(near.all_psi) @ near.all_errors.ravel() + self.towards)
+
+    @property
+    def hessian(self) -> Array:
+        """Return half the Hessian (k, k) of the cost, to first order."""
+        every = self.near.all_psi
+        return np.asarray(self._weighed(every) @ every.reshape(len(every), -1).T + self.known)
+
+    @property
+    def of_errors(self) -> Point:
+        """Return the point without the terms that do not come from the errors."""
+        return replace(self, known=np.zeros_like(self.known), towards=np.zeros_like(self.towards))
+
+    def _weighed(self, psi: NDArray[np.float64]) -> Array:
+        return (psi @ self.weights).reshape(len(psi), -1)
+
+
+def evaluate(records: Records, theta: Array) -> Point:
+    """Return the cost of records; infinite where it overflows, zero where all errors are rounding."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        near = records.at(theta)
+        S = near.all_errors.T @ near.all_errors / records.samples
+    none, nowhere = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
+    if not all(np.all(np.isfinite(x)) for x in (S, near.psi, near.determinant, near.slope)):
+        nothing = Linearised.at_rest(np.zeros(near.errors.shape), np.zeros(near.psi.shape))
+        return Point(theta, nothing, np.eye(len(S)), np.inf, none, nowhere)
+    if np.all(np.diag(S) <= np.diag(records.rounding)):
+        return Point(theta, near, np.eye(len(S)), 0.0, none, nowhere)
+    q, towards, known, earlier = near.determinant, -near.slope, near.curvature, records.earlier
+    if earlier is not None:
+        q, towards = q + earlier.q(theta), towards - earlier.slope(theta)
+        known = known + earlier.information
+    if records.weights is not None:
+        cost = records.samples * float(np.sum(records.weights * S))
+        return Point(theta, near, records.weights, cost + q, known, towards)
+    costs, every = weighing((S + records.rounding)[None], records.samples)
+    with np.errstate(over="ignore"):
+        factor = float(np.exp(q / near.freedom))
+    cost = factor * float(costs[0])
+    if not np.isfinite(cost):
+        return Point(theta, near, every[0], np.inf, none, nowhere)
+    share = cost / near.freedom
+    return Point(theta, near, factor * every[0], cost, share * known, share * towards)
+
+
+@dataclass(frozen=True)
+class RecordProblem:
+    """The problem of fitting records of one structure, one a run; see `gauss_newton.Problem`."""
+
+    records: tuple[Records, ...]
+
+    @property
+    def errors(self) -> int:
+        """Return the number of output errors of a run."""
+        return self.records[0].y.size
+
+    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+        """Return cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k)."""
+        points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
+        hessian = np.array([point.hessian for point in points])
+        slope = np.array([point.slope for point in points])
+        return np.array([point.cost for point in points]), hessian, slope
+
+    def stabilised(self, theta: Array) -> Array:
+        """Return theta (runs, k) with stable poles."""
+        return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
+
+    def kept(self, runs: NDArray[np.bool_]) -> RecordProblem:
+        """Return the same problem with some of its runs only."""
+        return RecordProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))
+
+
+def shares(acting: NDArray[np.bool_]) -> Array:
+    """Return the number of parameters of each output (p,); one `acting` (k, p) at n outputs counts as 1/n."""
+    return np.asarray(np.sum(acting / np.maximum(np.sum(acting, axis=1, keepdims=True), 1), axis=0))
+
+
+def weighing(S: NDArray[np.float64], samples: int) -> tuple[Array, NDArray[np.float64]]:
+    """Return cost (runs,) and weights W (runs, p, p) of errors of the covariances S (runs, p, p)."""
+    inverse, logarithm = inverses(S)
+    root = np.exp(logarithm / S.shape[1])
+    return samples * root, (root / S.shape[1])[:, None, None] * inverse
+
+
+def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:
+    """Return the inverses of covariances (runs, p, p) and the logarithms of their determinants (runs,).
+
+    Through correlations, since outputs may differ by orders of magnitude; a singular correlation is raised
+    to rounding, and one that has overflowed has an infinite determinant.
+    """
+    usable = np.atleast_1d(np.isfinite(covariances).all(axis=(1, 2)))
+    known = np.where(usable[:, None, None], covariances, np.eye(covariances.shape[1]))
+    rms = np.sqrt(np.maximum(np.einsum("rii->ri", known), 1e-300))
+    scale = rms[:, :, None] * rms[:, None, :]
+    values, vectors = np.linalg.eigh(known / scale)
+    values = np.maximum(values, np.finfo(float).eps)
+    logarithm = np.sum(np.log(values), axis=1) + 2.0 * np.sum(np.log(rms), axis=1)
+    inverse = (vectors / values[:, None, :]) @ vectors.swapaxes(1, 2) / scale
+    return inverse, np.where(usable, logarithm, np.inf)

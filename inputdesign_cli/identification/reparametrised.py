@@ -7,17 +7,16 @@ matrix. In the limit of many samples that is an efficient estimate already.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import Echo, Echoes, Extension, Kind, Part, Starts
-from inputdesign_cli.identification.problem import Point, evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts
+from inputdesign_cli.identification.records import Point, Records, evaluate
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import Reparametrised
 
@@ -55,11 +54,6 @@ class ReparametrisedKind(Kind):
     def _moved(self) -> NDArray[np.bool_]:
         """Return which parameter moves which coefficient (K, k)."""
         return self.model.parametrisation.moves
-
-    def own(self) -> Array:
-        """Return as many parameters as there are, shared by the outputs as the coefficients are, (p,)."""
-        of_all = self.coefficients.own()
-        return of_all * (len(self.names) / max(float(np.sum(of_all)), 1.0))
 
     def _at(self, theta: Array) -> Array:
         """Return the coefficients (K,)."""
@@ -132,7 +126,8 @@ class ReparametrisedKind(Kind):
         """Return the starts of all coefficients, brought back to the parameters, and the `given` one."""
         kind = self.coefficients.holding(~np.any(self._moved, axis=1))
         found, about = kind.starting_points(parts, None), Records(self.coefficients, tuple(parts))
-        return found.with_points([self.brought_back(evaluate(about, theta)) for theta in found.points], given)
+        points = [self.brought_back(evaluate(about, theta)) for theta in found.points]
+        return Starts(np.array(points), found.tried).and_given(given)
 
     def brought_back(self, point: Point) -> Array:
         """Return the parameters (k,) whose coefficients are nearest to a point, weighed by its Hessian."""
@@ -162,16 +157,7 @@ class ReparametrisedKind(Kind):
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """Return the extensions of the coefficients."""
         found = self.coefficients.extensions(self._at(theta), feedback=feedback)
-        return tuple(replace(extension, nested=False) for extension in found)
-
-    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """Return the echoes of the coefficients, by the chain rule."""
-        jacobian = self.model.parametrisation.at(theta).jacobian
-        of_all = self.coefficients.echoes(self._at(theta), lengths)
-        if of_all is None:
-            return None
-        moved = np.flatnonzero(np.any(self._moved[[index for index, _ in of_all]], axis=0)).tolist()
-        return tuple((j, _weighed([(jacobian[index, j], one) for index, one in of_all])) for j in moved)
+        return tuple(extension._replace(nested=False) for extension in found)
 
     def caused(self, theta: Array, u: Array, y: Array, errors: Array, begun: Array) -> Array:
         """Return what inputs and the start cause at the coefficients."""
@@ -180,8 +166,3 @@ class ReparametrisedKind(Kind):
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return which outputs can be simulated at the coefficients."""
         return self.coefficients.simulates(self._at(theta))
-
-
-def _weighed(parts: Sequence[tuple[float, Callable[[Array], Array]]]) -> Echo:
-    """Return the sum of echoes by their weights."""
-    return lambda errors: sum((w * through(errors) for w, through in parts if w), 0.0 * errors)

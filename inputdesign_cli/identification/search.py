@@ -1,8 +1,14 @@
-"""From starting points to the likeliest parameters, and whether the records begin at rest."""
+"""From starting points to the likeliest parameters, other minima, and whether the records begin at rest.
+
+A dead time that was excited at a few frequencies is known only up to whole periods. Near-equal minima then
+stand far apart, and the covariance describes one of them alone. Where a dead time passes a sampling instant,
+the likelihood has a kink. It may have a minimum between any two instants, as likely as the best and within a
+few standard deviations of it. No single minimum shows how far the parameters are known.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,23 +16,32 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.gauss_newton import MOST_STEPS, best_run, minimise
-from inputdesign_cli.identification.minima import Rival, beyond_instants, minima_beside, rivals
-from inputdesign_cli.identification.problem import Point, RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records, centred
+from inputdesign_cli.identification.gauss_newton import MOST_STEPS, Minimum, best_run, minimise
+from inputdesign_cli.identification.records import Point, RecordProblem, Records, centred, evaluate
 
-# A record that begins at rest is taken for one that does not with this probability.
-_MISTAKEN = 0.01
-# A step that promises to take off nearly all promises too much.
-_MOST_PROMISED = 0.999
-# Above this probability nothing is searched for.
-_UNLIKELY = 0.2
+# What another minimum may have more in -2 log likelihood: a thousandth of the likelihood of the best.
+_NEARLY = 2.0 * float(np.log(1000.0))
+# Another minimum: so far apart in squared standard deviations, and by what the slope of one does not explain.
+_APART, _UNEXPLAINED = 25.0, 4.0
+# Instants that are farther, in standard deviations, part the estimate from nothing that is likely.
+_REACH = 3.0
+# Begun within a deviation, a search settles in a few steps, or is stopped by the kink that it has passed.
+_STEPS, _ROUNDS = 15, 4
+# Squared standard deviations between minima that are not one.
+_SAME = 0.1
+_RIDGE = 1e-9
 # Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
 _SETTLED = 1e-8
 _ASIDE = 0.01
 _MOST_HELD_STEPS = 60
 # What ten steps of a quick search must take off -2 log likelihood.
 _IDLE = 0.1
+# A record that begins at rest is taken for one that does not with this probability.
+_MISTAKEN = 0.01
+# A step that promises to take off nearly all promises too much.
+_MOST_PROMISED = 0.999
+# Above this probability nothing is searched for.
+_UNLIKELY = 0.2
 # Samples by which a dead time may grow while a search begun freely goes on.
 _SPARE = 2
 # How often they are counted anew; more than one unknown start for so many samples are many.
@@ -39,13 +54,21 @@ _LARGEST = 50.0
 
 
 @dataclass(frozen=True)
+class Rival:
+    """Parameters theta (k,) at another minimum, `excess` more in -2 log likelihood than the estimate."""
+
+    theta: Array
+    excess: float
+
+
+@dataclass(frozen=True)
 class Search:
     """Where the search from the best of `starts` points ended.
 
     Attributes:
         first: (parts, p), the first residuals if each record began at rest about zero, noise as well.
-        rivals: other minima that explain the records nearly as well.
-        beside: those beyond sampling instants, near ones too, with what they have more in -2 log likelihood.
+        rivals: other minima that explain the records nearly as well, far from the best.
+        beside: those beyond sampling instants near it, with what they have more in -2 log likelihood.
         rest_refuted: whether the records say that they do not begin at rest about zero.
     """
 
@@ -60,31 +83,112 @@ class Search:
     rest_refuted: bool = False
 
 
-def search(
-    records: Records, points: Array, *, starts: int, before: Array | int = 0, quick: int | None = None
-) -> Search:
+def search(records: Records, points: Array, *, starts: int, quick: int | None = None) -> Search:
     """Return the likeliest minimum that Gauss-Newton steps find from `points` (n, k).
 
     Args:
         starts: how many points were looked at.
-        before: (n,) steps that have been made from each.
         quick: the most steps from each, fewer if these gain nothing that matters. Kinks may stop the search,
             and no other minima are returned.
     """
     idle = _IDLE if quick else 0.0
     found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS, idle=idle)
-    if not quick:
-        found = beyond_instants(records, found)
-        before = np.append(np.broadcast_to(before, len(points)), np.zeros(len(found.cost) - len(points)))
+    found = found if quick else _beyond_instants(records, found)
     best = best_run(found)
-    steps = int(found.steps[best] + np.broadcast_to(before, len(found.cost))[best])
+    steps, first = int(found.steps[best]), _first(records, found.theta[best])
     point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])
-    if not converged and not quick and np.isfinite(point.cost):
+    if quick:
+        return Search(records, point, converged, steps, starts, first, (), ())
+    if not converged and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
-    others = () if quick else rivals(point, found)
-    near = () if quick else minima_beside(records, point, found)
-    return Search(records, point, converged, steps, starts, _first(records, point.theta), others, near)
+        first = _first(records, point.theta)
+    others = rivals(point, found), _minima_beside(records, point, found)
+    return Search(records, point, converged, steps, starts, first, *others)
+
+
+def _first(records: Records, theta: Array) -> Array:
+    return np.array([records.kind.errors_and_gradient(theta, *part)[0][0] for part in records.parts])
+
+
+def _likely(point: Point, found: Minimum) -> Iterator[tuple[int, Array, float]]:
+    """Yield runs that ended nearly as likely as the best `point`, and what they have more, the best first."""
+    for run in np.argsort(found.cost) if point.cost > 0.0 else ():
+        cost = float(found.cost[run])
+        excess = point.near.freedom * float(np.log(cost / point.cost)) if np.isfinite(cost) else np.inf
+        if excess > _NEARLY:
+            return
+        yield int(run), np.asarray(found.theta[run], dtype=float), excess
+
+
+def rivals(point: Point, found: Minimum) -> tuple[Rival, ...]:
+    """Where other starts ended, the likeliest first: far from the best `point`, and nearly as likely."""
+    minima = [Rival(point.theta, 0.0)]
+    for _, theta, excess in _likely(point, found):
+        if not any(_is_near(point, theta - other.theta, excess - other.excess) for other in minima):
+            minima.append(Rival(theta, max(excess, 0.0)))
+    return tuple(minima[1:])
+
+
+def _distance(point: Point, step: Array) -> float:
+    """Return the square of a `step` (k,) in standard deviations of the parameters at a point."""
+    return point.near.freedom / point.cost * float(step @ point.hessian @ step)
+
+
+def _is_near(point: Point, step: Array, excess: float) -> bool:
+    """Return whether a step leads to the same minimum, or to one within five deviations."""
+    return _distance(point, step) <= max(_APART, _UNEXPLAINED * excess)
+
+
+def _minima_beside(records: Records, point: Point, found: Minimum) -> tuple[tuple[Point, float], ...]:
+    """Return minima near the best `point` and about as likely, each with its excess in -2 log likelihood.
+
+    Only models with dead times have them: kinks separate them from the best one.
+    """
+    kept: list[tuple[Point, float]] = []
+    for run, theta, excess in _likely(point, found) if records.dead_times.size else ():
+        apart = min(_distance(point, theta - other.theta) for other in (point, *(one for one, _ in kept)))
+        if found.converged[run] and apart > _SAME and _is_near(point, theta - point.theta, excess):
+            kept.append((evaluate(records, theta), max(excess, 0.0)))
+    return tuple(kept)
+
+
+def _beyond_instants(records: Records, found: Minimum) -> Minimum:
+    """Return `found` with minima beyond the sampling instants next to dead times, until none is better."""
+    for _ in range(_ROUNDS):
+        best = best_run(found)
+        point = evaluate(records, found.theta[best])
+        points = _beyond(records, point) if np.isfinite(point.cost) and point.cost > 0.0 else ()
+        if not len(points):
+            break
+        others = minimise(RecordProblem((records,) * len(points)), points, most=_STEPS)
+        better = ~others.converged & (others.cost < point.cost)
+        if np.any(better):
+            begun = others.theta[better]
+            others = others.and_of(minimise(RecordProblem((records,) * len(begun)), begun))
+        found = found.and_of(others, others.converged)
+        if best_run(found) == best:
+            break
+    return found
+
+
+def _beyond(records: Records, point: Point) -> Array:
+    """(n, k): where to begin beyond instants within reach, the other parameters following the dead time."""
+    crossings = records.kind.crossings(point.theta, records.longest)
+    if not len(crossings):
+        return np.zeros((0, point.theta.size))
+    scale = np.sqrt(np.maximum(np.diag(point.hessian), 1e-300))
+    covariance = np.linalg.pinv(point.hessian / np.outer(scale, scale), rcond=_RIDGE, hermitian=True)
+    covariance *= point.cost / point.near.freedom / np.outer(scale, scale)
+    found = []
+    for to_instant, to_midst in crossings:
+        index = int(np.argmax(np.abs(to_midst)))
+        deviation = float(np.sqrt(max(covariance[index, index], 0.0)))
+        if deviation > 0.0 and abs(to_instant[index]) < _REACH * deviation:
+            beyond = np.clip((to_midst - to_instant)[index], -deviation, deviation)
+            step = covariance[index] / covariance[index, index] * (to_instant[index] + beyond)
+            found.append(records.stabilised(point.theta + step))
+    return np.array(found).reshape(-1, point.theta.size)
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
@@ -95,62 +199,43 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
     Parameters that block the way are held, one after the other; only dead times, if there are some. The rest
     settles. Then each held one is moved to both sides, where the cost must be higher.
     """
-    size = point.theta.size
-    held = np.zeros(size, dtype=bool)
-    blocking = records.dead_times.tolist() or range(size)
+    every = np.eye(point.theta.size, dtype=bool)
+    blocking = records.dead_times.tolist() or range(point.theta.size)
+    held = np.zeros(point.theta.size, dtype=bool)
+
+    def moved(step: Array) -> Point:
+        return evaluate(records, records.stabilised(point.theta + step))
+
     for _ in range(_MOST_HELD_STEPS):
-        step, gain = _newton(point, held)
-        if gain * point.errors.size > _SETTLED * point.cost:
-            trial = _moved(records, point, step)
+        step = _newton(point, held)
+        if abs(step @ point.slope) * point.errors.size > _SETTLED * point.cost:
+            trial = moved(step)
             if trial.cost >= point.cost:
-                more = [held | _unit(size, j) for j in blocking if not held[j]]
+                more = [held | every[j] for j in blocking if not held[j]]
                 if not more:
                     return None
-                tried = [_moved(records, point, _newton(point, blocking)[0]) for blocking in more]
+                tried = [moved(_newton(point, one)) for one in more]
                 best = int(np.argmin([other.cost for other in tried]))
                 held, trial = more[best], tried[best]
             point = trial if trial.cost < point.cost else point
             continue
-        lower = _beside(records, point, held)
+        size = _ASIDE * np.sqrt(point.cost / point.errors.size / np.maximum(np.diag(point.hessian), 1e-300))
+        beside = (moved(sign * size * every[j]) for j in np.flatnonzero(held) for sign in (1.0, -1.0))
+        lower = next((other for other in beside if other.cost < point.cost), None)
         if lower is None:
             return point if np.any(held) else None
         held, point = np.zeros_like(held), lower
     return None
 
 
-def _newton(point: Point, held: NDArray[np.bool_]) -> tuple[Array, float]:
-    """Return the step (k,) of Gauss and Newton that leaves some parameters, and the gain that it promises."""
+def _newton(point: Point, held: NDArray[np.bool_]) -> Array:
+    """Return the step (k,) of Gauss and Newton that leaves some parameters."""
     free = np.flatnonzero(~held)
     scale = np.sqrt(np.maximum(np.diag(point.hessian)[free], 1e-300))
     step = np.zeros(held.size)
-    slope = point.slope[free] / scale
     matrix = point.hessian[np.ix_(free, free)] / np.outer(scale, scale)
-    step[free] = np.linalg.lstsq(matrix, slope, rcond=1e-12)[0] / scale
-    return step, float(abs(step @ point.slope))
-
-
-def _moved(records: Records, point: Point, step: Array) -> Point:
-    return evaluate(records, records.stabilised(point.theta + step))
-
-
-def _beside(records: Records, point: Point, held: NDArray[np.bool_]) -> Point | None:
-    """Return a point of lower cost where a held parameter is a little more or less; None if there is none."""
-    variance = point.cost / point.errors.size
-    for j in map(int, np.flatnonzero(held)):
-        size = _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300))
-        for sign in (1.0, -1.0):
-            trial = _moved(records, point, sign * size * _unit(held.size, j))
-            if trial.cost < point.cost:
-                return trial
-    return None
-
-
-def _unit(size: int, index: int) -> NDArray[np.bool_]:
-    return np.arange(size) == index
-
-
-def _first(records: Records, theta: Array) -> Array:
-    return np.array([records.kind.errors_and_gradient(theta, *part)[0][0] for part in records.parts])
+    step[free] = np.linalg.lstsq(matrix, point.slope[free] / scale, rcond=1e-12)[0] / scale
+    return step
 
 
 def _deviance(records: Records, point: Point) -> float:
@@ -232,7 +317,7 @@ def from_rest_or_free(
         # The dead time may come out another than was thought when the unknown inputs were counted.
         while abs((now := later(found.point.theta)) - late) > _SPARE:
             # Unknown inputs may explain half of a record, whatever the model.
-            swamped = 2 * now * records.u.shape[1] > max(records.lengths)
+            swamped = 2 * now * records.u.shape[1] > records.longest
             if now in tried or len(tried) > _MOST_COUNTS or swamped:
                 found = tried[min(tried)]  # the fewest unknown inputs explain the least by chance
                 break
@@ -251,8 +336,6 @@ def from_rest_or_free(
     if records.dead_times.size and near.near.unknowns * _MANY > records.y.size:
         # A wrong level or a spike may feign a dead time, and the inputs before it explain whatever they like.
         return judge.unless_by_chance(begun_free(None, later(about)))
-    return (
-        at_rest
-        if judge.hopeless(free, near)
-        else judge.unless_by_chance(begun_free(at_rest.point.theta, late))
-    )
+    if judge.hopeless(free, near):
+        return at_rest
+    return judge.unless_by_chance(begun_free(at_rest.point.theta, late))

@@ -1,16 +1,25 @@
-"""Describe the unknown past of a record: its level, the states of the plant, the noise before it.
+"""Describe the unknown past of records, and take off what it can explain of prediction errors.
 
-Level and states are unknown numbers. The noise before a record is as random as the noise in it. For
-stationary noise C/D e, its later effect has a covariance that C and D determine ([ljung-1999], Section 10.5,
-on initial conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihood).
+Level and states at the start are unknown numbers. The noise before a record is as random as the noise in it:
+the later effect of stationary noise C/D e has a covariance that C and D determine ([ljung-1999], Section
+10.5; [brockwell-davis-1991], Chapter 8). Both are eliminated for every theta (variable projection,
+[golub-pereyra-1973]).
+
+The likelihood is the restricted one, [harville-1977]: unknowns are integrated over, which adds a determinant.
+Without it a noise model with a zero on the unit circle, which forgets no start, would explain short records
+too well. Responses to free unknowns before the inverse of the noise model are made orthonormal first, so that
+the measure does not depend on the parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
@@ -19,6 +28,11 @@ from inputdesign_cli.plant.filtering import filtered
 # Roots on the circle, which may be known, are taken for some so far inside: noise would have no stationary
 # start, and its zeros no density.
 _INSIDE = 1e-5
+# Directions of the unknown starts below this size, columns scaled, are linearly dependent.
+_DEPENDENT = 1e-7
+_MOST_ROUNDS = 30
+# Normal equations of outputs whose errors are alike beyond this lose too many digits.
+_ALIKE = 1e-6
 
 
 class Start(NamedTuple):
@@ -41,43 +55,11 @@ class Start(NamedTuple):
         """Return the start under white noise, which has no past."""
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
-    @property
-    def is_white(self) -> bool:
-        """Return whether the start is known to be under white noise."""
-        return self.free is self.disturbance and not len(self.noise)
-
-    def and_free(self, free: NDArray[np.float64], disturbance: NDArray[np.float64]) -> Start:
-        """Return the start with further free unknowns, (m, N) each."""
-        return self._replace(
-            free=np.concatenate([self.free, free]),
-            disturbance=np.concatenate([self.disturbance, disturbance]),
-        )
-
-    def cropped(self, samples: int) -> Start:
-        """Return the start of a shorter record."""
-        if self.is_white:
-            return Start.white(self.free[:, :samples])
-        free, disturbance, noise = (block[:, :samples] for block in self[:3])
-        return Start(free, disturbance, noise, self.zeros)
-
-    @property
-    def finite(self) -> bool:
-        """Return whether all numbers are finite."""
-        return all(bool(np.all(np.isfinite(block))) for block in self)
-
-
-def central_differences(
-    starts: Callable[[Array], Sequence[Start]], theta: Array, indices: Sequence[int], sizes: Sequence[float]
-) -> list[tuple[Start, ...]]:
-    """Return the derivatives of the `starts` of parameters (k,) by some of these, moved by these `sizes`."""
-    found = []
-    for index, size in zip(indices, sizes, strict=True):
-        step = size * np.eye(theta.size)[index]
-        ends = zip(starts(theta + step), starts(theta - step), strict=True)
-        found.append(
-            tuple(Start(*((a - b) / (2.0 * size) for a, b in zip(*pair, strict=True))) for pair in ends)
-        )
-    return found
+    def through(self, C: Array, D: Array) -> Start:
+        """Return the start of errors that D/C filters further; `disturbance` is known without noise."""
+        free, noise = (filtered(D, C, block) for block in (self.free, self.noise))
+        past = np.concatenate([noise, noise_before(C, D, free.shape[1])])
+        return Start(free, self.disturbance, past, self.zeros + (density(C) if C.size > 1 else 0.0))
 
 
 def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
@@ -85,54 +67,45 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
 
     With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
     first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values
-    are made of independent ones by the predictors of every order. Real and complex coefficients alike.
+    are made of independent ones by the predictors of every order.
     """
     n = max(C.size, D.size) - 1
     if n == 0:
         return np.zeros((0, samples))
     i, j = np.indices((n, n))
-    (above, c), (below, d) = _padded(C, n), _padded(D, n)
+    # p_k for k of 0 to 2 n, and for k of -n to n; zero outside of the coefficients.
+    (c, above), (d, below) = (
+        [np.pad(p, (before, 2 * n + 1 - before - p.size)) for before in (0, n)] for p in (C, D)
+    )
     past = c[1 + i + j] @ below[n + j - i] - d[1 + i + j] @ above[n + j - i]
     r = past @ _autoregression(d[: n + 1])[::-1]
-    return np.asarray(r.T @ each_later(filtered([1.0], C, np.eye(1, samples, dtype=r.dtype)[0]), n))
+    return np.asarray(r.T @ each_later(filtered([1.0], C, np.eye(1, samples)[0]), n))
 
 
 def each_later(response: Array, count: int) -> NDArray:
     """Return a response (N,) begun at once, and one sample later than the row before, (count, N)."""
-    padded = np.concatenate([np.zeros(max(count - 1, 0), dtype=response.dtype), response])
+    padded = np.concatenate([np.zeros(max(count - 1, 0)), response])
     return np.lib.stride_tricks.sliding_window_view(padded, response.size)[:count][::-1]
 
 
-def _padded(p: Array, n: int) -> tuple[Array, Array]:
-    """p_k, zero outside of its coefficients, for k of -n to n, and for k of 0 to 2 n."""
-    before, after = np.zeros(2 * n + 1, dtype=p.dtype), np.zeros(2 * n + 1, dtype=p.dtype)
-    before[n : n + p.size], after[: p.size] = p, p
-    return before, after
-
-
-def density(C: Array) -> NDArray[np.float64]:
-    """-2 log of a density of the zeros of C, up to a constant: 2 log of the variance of e / C.
+def density(C: Array) -> float:
+    """Return -2 log of a density of the zeros of C, up to a constant: 2 log of the variance of e / C.
 
     It vanishes on the unit circle and is all but flat elsewhere, 1 - c_1^2 for one zero. The likelihood has
     no slope across the circle, and in short records it is often largest there: noise seems to vanish at a
-    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that come out
-    zero alike. A zero z moves by about 2 z / N.
+    frequency, and the model to be exact ([sargan-bhargava-1983]; [chung-2013] treat variances that come out
+    zero alike). A zero z moves by about 2 z / N.
     """
-    return np.asarray(2.0 * np.log(_step_down(_inside(C))[1][0]))
+    return 2.0 * float(np.log(_step_down(C)[1][0]))
 
 
 def _autoregression(d: Array) -> NDArray:
     """(n, n): n values in a row of e / D, oldest first, made of independent ones of the variance of e."""
-    predictors, variances = _step_down(_inside(d))
-    n = d.size - 1
-    onto = np.eye(n, dtype=d.dtype)
+    predictors, variances = _step_down(d)
+    onto = np.eye(d.size - 1)
     for order, predictor in enumerate(predictors):
         onto[order, :order] = predictor[:0:-1]
     return np.asarray(np.linalg.solve(onto, np.diag(np.sqrt(variances))))
-
-
-def _inside(d: Array) -> Array:
-    return d * (1.0 - _INSIDE) ** np.arange(d.size)
 
 
 def _step_down(d: Array) -> tuple[list[Array], NDArray]:
@@ -140,11 +113,222 @@ def _step_down(d: Array) -> tuple[list[Array], NDArray]:
 
     By the recursion of [brockwell-davis-1991], Section 5.2, from the predictor of order n, which is D.
     """
-    predictor, variance = d, np.ones((), dtype=d.dtype)
-    found = []
+    predictor, variance, found = d * (1.0 - _INSIDE) ** np.arange(d.size), 1.0, []
     while predictor.size > 1:
         last = predictor[-1]
         left = 1.0 - last**2
         predictor, variance = ((predictor - last * predictor[::-1]) / left)[:-1], variance / left
         found.append((predictor, variance))
     return [p for p, _ in found[::-1]], np.array([v for _, v in found[::-1]])
+
+
+class Elimination(NamedTuple):
+    """What the starts are likely to be, of records of N samples and M independent unknowns of past noise.
+
+    Attributes:
+        coefficients: output by output of its unknowns in each record, (records, m + n), free ones first.
+        root: R (p, p), R^T R being the weights of the errors up to a factor.
+        directions: ((N + M) p, K) orthonormal, the errors in units of R that the starts can explain.
+    """
+
+    coefficients: list[Array]
+    root: Array
+    directions: Array
+
+
+class _Basis(NamedTuple):
+    """Orthonormal directions (N + n, K) of all errors that one start of N samples can explain.
+
+    Attributes:
+        coefficients: (m + n, K), of its unknowns for each direction; `free`, how many are not of past noise.
+        determinant: log det Z^T Z, Z being the responses to orthonormal disturbances and to past noise;
+            `gradient`, half of its gradient in the blocks of a start; `of_noise`, the one of past noise.
+    """
+
+    directions: Array
+    coefficients: Array
+    free: int
+    determinant: float
+    gradient: Start
+    of_noise: float
+
+    @classmethod
+    def of(cls, start: Start, samples: int) -> _Basis:
+        """Return the directions of a start in a record, without linearly dependent free unknowns."""
+        free, disturbance, noise = (block[:, :samples] for block in start[:3])
+        norm = np.linalg.norm(disturbance, axis=1)
+        scale = np.where(norm > 0.0, norm, np.inf)  # a start that no output shows is left at zero
+        span, s, V = np.linalg.svd(disturbance.T / scale, full_matrices=False)
+        kept = s > _DEPENDENT * np.max(s, initial=0.0)
+        by, past = (V[kept].T / s[kept]) / scale[:, None], len(noise)
+        known = by.shape[1]
+        Z = np.block([[free.T @ by, noise.T], [np.zeros((past, known)), np.eye(past)]])
+        Q, R = np.linalg.qr(Z)
+        inverse = np.linalg.inv(R)
+        responses = (Q @ inverse.T)[:samples].T
+        return cls(
+            Q,
+            scipy.linalg.block_diag(by, np.eye(past)) @ inverse,
+            known,
+            2.0 * float(np.sum(np.log(np.abs(np.diag(R))))),
+            Start(by @ responses[:known], -by @ span[:, kept].T, responses[known:], np.zeros(())),
+            float(np.linalg.slogdet(np.eye(past) + noise @ noise.T)[1]),
+        )
+
+    def slope(self, start: Start) -> float:
+        """Return the derivative of the determinant; `start` is the derivative of the start."""
+        pairs = zip(self.gradient[:3], start[:3], strict=True)
+        return 2.0 * sum(float(np.sum(own * block[:, : own.shape[1]])) for own, block in pairs)
+
+
+@dataclass(frozen=True)
+class FreeStarts:
+    """The starts of records of these `lengths`; `starts` has the longest record's, output by output.
+
+    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
+    as large as an error each, they are errors of their own.
+    """
+
+    lengths: tuple[int, ...]
+    starts: Sequence[Start]
+
+    @property
+    def usable(self) -> bool:
+        """Return whether anything is unknown, and all numbers are finite."""
+        unknown = any(len(start.free) + len(start.noise) for start in self.starts)
+        return unknown and all(bool(np.all(np.isfinite(x))) for start in self.starts for x in start)
+
+    @property
+    def past(self) -> int:
+        """M: of every record the most unknowns of past noise that an output has."""
+        return len(self.lengths) * self._past
+
+    @property
+    def unknowns(self) -> int:
+        """Return the number m of free unknowns, without linearly dependent ones."""
+        return sum(basis.free for _, _, basis in self._blocks)
+
+    @property
+    def determinant(self) -> float:
+        """log det Z^T Z, which integrating over all unknowns adds to -2 log likelihood, and `Start.zeros`.
+
+        Records share the noise model and its zeros.
+        """
+        zeros = sum(float(start.zeros) for start in self.starts)
+        return zeros + sum(basis.determinant for _, _, basis in self._blocks)
+
+    @property
+    def of_noise(self) -> float:
+        """Return the part of the determinant due to past noise; its unknowns have a density of their own."""
+        return sum(basis.of_noise for _, _, basis in self._blocks)
+
+    def slopes(self, starts: Sequence[Start]) -> Array:
+        """Return the derivatives of the terms of the determinant from the derivatives of the starts."""
+        own = {key: basis.slope(starts[key[1]]) for key, basis in self._bases.items()}
+        zeros = [float(start.zeros) for start in starts]
+        return np.array([*zeros, *(own[n, i] for n in self.lengths for i in range(len(starts)))])
+
+    def combined(
+        self, coefficients: Sequence[Array], starts: Sequence[Start], *, noise: bool = True
+    ) -> Array:
+        """Return the responses (N, p) by the coefficients of all unknowns, or of the free ones.
+
+        Args:
+            starts: these, or their derivatives.
+        """
+        within = np.arange(max(self.lengths)) < np.array(self.lengths)[:, None]
+        found = []
+        for own, start in zip(coefficients, starts, strict=True):
+            every = np.concatenate([start.free, start.noise if noise else start.noise[:0]])
+            found.append((own[:, : len(every)] @ every)[within])
+        return np.stack(found, axis=1)
+
+    def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
+        """Return the unknowns of past noise as errors, of outputs that have fewer zero, (M, p)."""
+        found = np.zeros((len(self.lengths), self._past, len(self.starts)))
+        for i, (own, start) in enumerate(zip(coefficients, self.starts, strict=True)):
+            found[:, : len(start.noise), i] = -own[:, len(start.free) :]
+        return found.reshape(-1, len(self.starts))
+
+    def eliminated(self, errors: Array, weights: Array | None) -> Elimination:
+        """The likeliest starts of errors (N, p), weighed by W (p, p); None: as the covariance left asks."""
+        errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
+        plain, of = self._plain
+
+        def projected(weighed: Array) -> Array:
+            return np.asarray((plain.T @ weighed)[np.arange(of.size), of])
+
+        def spread(step: Array) -> Array:
+            return np.asarray(plain @ (step[:, None] * np.eye(errors.shape[1])[of]))
+
+        # Output by output first: levels alone would make all errors look alike.
+        shares, previous, directions = projected(errors), np.inf, plain
+        left = errors - spread(shares)
+        root = _root(left, weights)
+        if len(root) > 1:
+            overlap = plain.T @ plain
+            for _ in range(_MOST_ROUNDS):
+                root = _root(left, weights)
+                unit = np.linalg.norm(root, axis=0)
+                scaled = root / unit
+                gram = (scaled.T @ scaled)[np.ix_(of, of)] * overlap
+                step = np.linalg.solve(gram, projected(left @ root.T @ scaled)) / unit[of]
+                shares, left = shares + step, left - spread(step)
+                size = float(np.sum((left @ root.T) ** 2))
+                if weights is not None or abs(size - previous) <= 1e-14 * size:
+                    break
+                previous = size
+            directions = _orthogonal((plain[:, None] * scaled[:, of]).reshape(-1, of.size), gram)
+        coefficients = [np.zeros((len(self.lengths), len(x.free) + len(x.noise))) for x in self.starts]
+        ends = np.cumsum([basis.directions.shape[1] for _, _, basis in self._blocks])[:-1]
+        for (record, i, basis), own in zip(self._blocks, np.split(shares, ends), strict=True):
+            coefficients[i][record] = basis.coefficients @ own
+        return Elimination(coefficients, root, directions)
+
+    @property
+    def _past(self) -> int:
+        return max(len(start.noise) for start in self.starts)
+
+    @cached_property
+    def _bases(self) -> dict[tuple[int, int], _Basis]:
+        """Return the basis for each length of record and each output."""
+        every = [(length, i) for length in sorted(set(self.lengths)) for i in range(len(self.starts))]
+        return {(length, i): _Basis.of(self.starts[i], length) for length, i in every}
+
+    @cached_property
+    def _blocks(self) -> list[tuple[int, int, _Basis]]:
+        """Return record, output and basis of every start."""
+        outputs = range(len(self.starts))
+        return [(k, i, self._bases[n, i]) for k, n in enumerate(self.lengths) for i in outputs]
+
+    @property
+    def _plain(self) -> tuple[Array, NDArray[np.int64]]:
+        """Return the directions (N + M, K) of all starts, and the output of each (K,)."""
+        of = np.concatenate([np.full(b.directions.shape[1], i) for _, i, b in self._blocks])
+        samples, column = sum(self.lengths), 0
+        found = np.zeros((samples + self.past, of.size))
+        begins = np.cumsum([0, *self.lengths])
+        for record, _, basis in self._blocks:
+            length, (rows, wide) = self.lengths[record], basis.directions.shape
+            own, past = slice(column, column + wide), samples + record * self._past
+            found[begins[record] : begins[record] + length, own] = basis.directions[:length]
+            found[past : past + rows - length, own] = basis.directions[length:]
+            column += wide
+        return found, of
+
+
+def _orthogonal(columns: Array, gram: Array) -> Array:
+    """Return an orthonormal basis of columns (n, m) of unit length, `gram` being their products."""
+    if np.linalg.eigvalsh(gram)[0] < _ALIKE:
+        return np.asarray(np.linalg.qr(columns)[0])
+    return np.asarray(columns @ np.linalg.inv(np.linalg.cholesky(gram)).T)
+
+
+def _root(errors: Array, weights: Array | None) -> Array:
+    """R (p, p) with R^T R = W, up to a factor; W None: the inverse of the covariance of errors (N, p)."""
+    if weights is not None:
+        return np.asarray(np.linalg.cholesky(weights).T)
+    rms = np.sqrt(np.maximum(np.mean(errors**2, axis=0), 1e-300))
+    correlation = errors.T @ errors / len(errors) / np.outer(rms, rms)
+    lower = np.linalg.cholesky(correlation + 1e-13 * np.eye(len(rms)))
+    return np.asarray(np.linalg.inv(lower) / rms)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import Echoes, Kind, Part, Starts, late_samples
+from inputdesign_cli.identification.kind import Kind, Part, Starts, late_samples
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import StateSpaceModel
@@ -37,10 +37,6 @@ class StateSpaceKind(Kind):
             [letter == "K" or (coloured and letter in "AC") for letter, _, _ in self.model.entries],
             dtype=bool,
         )
-
-    def own(self) -> Array:
-        """(p,): outputs share the parameters."""
-        return np.full(self.outputs, len(self.names) / self.outputs)
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
@@ -164,12 +160,7 @@ class StateSpaceKind(Kind):
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """Return the nominal parameters, and the `given` ones."""
-        points = np.array([self.model.theta, *([] if given is None else [given])])
-        return Starts(points, np.zeros(len(points), dtype=np.int64), len(points))
-
-    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
-        """None without a gain K; not known with one."""
-        return None if np.any(self.model.matrices.K) else ()
+        return Starts(self.model.theta[None], 1).and_given(given)
 
     def simulates(self, theta: Array) -> Sequence[bool]:
         """Return whether the plant is stable or integrates."""

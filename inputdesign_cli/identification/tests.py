@@ -13,8 +13,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, future_tests, robust_white, score_tests
 from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
 from inputdesign_cli.identification.level_shifts import LevelShift, chance_of_shifts, level_shifts
-from inputdesign_cli.identification.problem import Point
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import Point, Records
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
 from inputdesign_cli.identification.white import White
 from inputdesign_cli.levels import level
@@ -123,7 +122,7 @@ def tests_of(
     errors, u = point.errors[left], records.u[left]
     white = White.of(records, point)
     shift, shifts, less = level_shifts(records, point, white)
-    varying = [one.column for one in alternatives if not one.of_structure]
+    varying = [one.column for one in alternatives if one.fault not in ("plant", "noise")]
     robust = robust_white(records, point, white, less=less, feedback=feedback, more=varying)
     if robust is not None:
         shift, shifts, less = level_shifts(records, point, robust)
@@ -159,10 +158,8 @@ def _not_explained(records: Records) -> tuple[NDArray[np.bool_], tuple[int, ...]
 def of_one_system(point: Point, noise: Array, experiments: Sequence[int]) -> tuple[float, ...]:
     """Return the probability that each experiment differs from the others as much, if all are of one system.
 
-    It is the score test of parameters that differ ([engle-1984]). At the joint estimate the scores g_i of the
-    experiments add up to zero. One step from there, the estimate of experiment i is H_i^-1 g_i away and that
-    of all others -H_o^-1 g_i, with the variances H_i^-1 and H_o^-1: so g_i^T (H_i^-1 + H_o^-1) g_i is
-    chi-squared with as many degrees of freedom as both determine parameters.
+    It is the score test of parameters of its own ([engle-1984]): regressors are the gradients, in this
+    experiment alone. It has as many degrees of freedom as both it and the others determine parameters.
 
     Args:
         point: the joint estimate.
@@ -171,31 +168,18 @@ def of_one_system(point: Point, noise: Array, experiments: Sequence[int]) -> tup
     """
     if len(experiments) < 2:
         return ()
-    root = np.linalg.cholesky(np.linalg.inv(noise)).T
-    at = np.cumsum(experiments)[:-1]
-    rows = [psi @ root.T for psi in np.split(point.psi, at, axis=1)]
-    errors = [e @ root.T for e in np.split(point.errors, at)]
+    root, own = np.linalg.cholesky(np.linalg.inv(noise)).T, np.repeat(range(len(experiments)), experiments)
+    errors, psi = point.errors @ root.T, point.psi @ root.T
     # Of each by its own noise, which need not be that of the others.
-    scale = [np.sqrt(max(float(np.mean(e**2)), 1e-300)) for e in errors]
-    flat = [(psi / s).reshape(len(psi), -1) for psi, s in zip(rows, scale, strict=True)]
-    scores = [psi @ (e / s).ravel() for psi, e, s in zip(flat, errors, scale, strict=True)]
-    return tuple(_probability(flat, scores, i) for i in range(len(experiments)))
-
-
-def _probability(flat: Sequence[Array], scores: Sequence[Array], chosen: int) -> float:
-    """That of one experiment against all others, in coordinates where both together have unit information."""
-    joint = np.concatenate(flat, axis=1)
-    left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
-    kept = sizes > _OF_ONE_SIDE * sizes[0]
-    turn = (left[:, kept] / sizes[kept]).T
-    own = turn @ flat[chosen]
-    shares, axes = np.linalg.eigh(own @ own.T)
-    both = (shares > _OF_ONE_SIDE) & (shares < 1.0 - _OF_ONE_SIDE)
-    if not np.any(both):
-        return 1.0
-    shares, axes = shares[both], axes[:, both]
-    other = np.sum([score for i, score in enumerate(scores) if i != chosen], axis=0)
-    mine, theirs = (axes.T @ (turn @ score) for score in (scores[chosen], other))
-    apart = mine / shares - theirs / (1.0 - shares)
-    statistic = float(np.sum(apart**2 / (1.0 / shares + 1.0 / (1.0 - shares))))
-    return float(scipy.special.chdtrc(len(shares), statistic))
+    power = [max(float(np.mean(errors[own == i] ** 2)), 1e-300) for i in range(len(experiments))]
+    scale = np.sqrt(power)[own][:, None]
+    every, sizes, _ = np.linalg.svd((psi / scale).reshape(len(psi), -1).T, full_matrices=False)
+    every, left = every[:, sizes > _OF_ONE_SIDE * sizes[0]], (errors / scale).ravel()
+    found = []
+    for i in range(len(experiments)):
+        alone = np.where(np.repeat(own == i, len(root))[:, None], every, 0.0)
+        directions, shares, _ = np.linalg.svd(alone - every @ (every.T @ alone), full_matrices=False)
+        kept = shares**2 > _OF_ONE_SIDE
+        statistic = float(np.sum((directions[:, kept].T @ left) ** 2))
+        found.append(float(scipy.special.chdtrc(np.sum(kept), statistic)) if np.any(kept) else 1.0)
+    return tuple(found)

@@ -1,23 +1,4 @@
-"""Estimate transfer matrices in s from sampled records, with white noise of an unknown covariance.
-
-From each start simplified refined instrumental variables (SRIVC) iterate first, for all entries at once, then
-Gauss and Newton with damping on the same equations ([young-jakeman-1980]; [garnier-wang-2008], Chapter 4; for
-entries with denominators of their own [garnier-2007]).
-
-Multiplied by a_ij / a_ij(previous) the output error of an entry is linear in its new a_ij and b_ij: a
-regression on outputs and inputs filtered by s^k / a_ij(previous). What the other entries cause is taken off
-the output first (back-fitting), and the noise in the regressors is kept out by instruments, the same
-regressors made of the auxiliary model's output. These instruments are the gradient psi of the model's
-output. All entries are updated in one weighted regression,
-
-    theta+ = theta + (sum psi S^-1 phi^T)^-1 sum psi S^-1 e,    S = (1/N) sum e e^T .
-
-It stands still where sum psi S^-1 e = 0, and nowhere else: at the stationary points of det S, where the steps
-of Gauss and Newton end, too. The regressors phi differ from psi by noise that is uncorrelated with psi, so
-that a step is asymptotically one of Gauss and Newton. From poor starts it reaches further, because it solves
-equations that are linear in theta instead of descending; as nothing makes it descend, the search that follows
-has the last word.
-"""
+"""Estimate transfer matrices in s from sampled records, with white noise of an unknown covariance."""
 
 from __future__ import annotations
 
@@ -30,11 +11,10 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.watching import Counted, tell
-from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts, late_samples, shares
-from inputdesign_cli.identification.minima import spread_out
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.kind import Extension, Kind, Part, Starts, late_samples
 from inputdesign_cli.identification.polynomials import with_entry
-from inputdesign_cli.identification.problem import Point, evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import RecordProblem, Records
 from inputdesign_cli.identification.start import Start
 from inputdesign_cli.identification.transfer_starts import starting_points
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
@@ -42,12 +22,9 @@ from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
 from inputdesign_cli.plant.model import DELAY
 
-# Of the starts made from the data, as many are followed to the end: the likeliest after the instruments that
-# are not beside each other.
-_FOLLOWED = 3
-# Of the instruments: steps without a better point. The search that follows settles what is left; squared, in
-# standard deviations.
-_MOST_ITERATIONS, _PATIENCE, _LEFT = 20, 4, 1e-2
+# Of the starts made from the data, as many are followed to the end: the likeliest after so many steps, fewer
+# if ten of these gain less -2 log likelihood, that are not within so many squared standard deviations.
+_FOLLOWED, _QUICK, _IDLE, _APART = 4, 12, 0.1, 25.0
 # A mode that loses less than this over the whole record is not distinguishable from one on the limit.
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
@@ -73,10 +50,6 @@ class TransferKind(Kind):
     def continuous(self) -> bool:
         """Return whether frequencies of the model are in rad per time unit: not behind a hold."""
         return not self.between.hold
-
-    def own(self) -> Array:
-        """Return the number of parameters of each output (p,); one that n outputs share counts as 1/n."""
-        return shares(self.model.parameters, self.outputs)
 
     def errors_and_gradient(self, theta: Array, u: Array, y: Array) -> tuple[Array, NDArray[np.float64]]:
         """Return y - G(theta) u (N, p), and the gradient psi (k, N, p) of G(theta) u."""
@@ -128,27 +101,6 @@ class TransferKind(Kind):
         """Return the time between the steps of held inputs; others make no kinks."""
         return self.between.sample_time if self.between.hold else None
 
-    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
-        """Return s^k / a through the errors of the output, for the coefficient a_k of an entry, (k, N, p).
-
-        That is what regressors made of measured outputs have beyond those made of the model's. The errors are
-        interpolated within their band, and no dead time is between them. Entries of an output with a common
-        denominator share it.
-        """
-        model = self.model.at(theta)
-        found = np.zeros((theta.size, *errors.shape))
-        through: dict[tuple[int, int], NDArray[np.float64]] = {}
-        for index, parameter in enumerate(model.parameters):
-            if parameter.letter != "a":
-                continue
-            for i, j in {place[0]: place for place in parameter.places}.values():
-                entry = replace(self._entry(model, i, j), delay=None)
-                if (i, j) not in through:
-                    through[i, j] = self.between.responses(entry, errors[:, i], hold=False)
-                power = np.eye(entry.order)[parameter.power]
-                found[index, :, i] = through[i, j] @ entry.row(power, 1)
-        return found
-
     def stabilised(self, theta: Array, samples: int) -> Array:
         """Return theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
 
@@ -170,25 +122,29 @@ class TransferKind(Kind):
         return out
 
     def starting_points(self, parts: Sequence[Part], given: Array | None) -> Starts:
-        """The likeliest after refined instrumental variables, from rest, and those from the `given` one."""
+        """The likeliest after a few steps from rest of those made from the parts, and the `given` one."""
         about = Records(self, tuple(parts))
-        begun = [
-            self.stabilised(theta, len(y))
-            for u, y in parts
-            for theta in starting_points(self.model, self.between, self.held, u, y)
-        ]
+        above = np.array([parameter.letter == "b" for parameter in self.model.parameters])
         made = []
-        for number, theta in enumerate(begun):
-            tell(Counted("starting points tried", number, len(begun)))
-            made.append(refine(about, self, evaluate(about, theta)))
-        refined = [made[number] for number in spread_out([point for point, _ in made], _FOLLOWED)]
-        if given is not None:
-            refined.append(refine(about, self, evaluate(about, about.stabilised(np.array(given)))))
-        return Starts(
-            np.array([point.theta for point, _ in refined]),
-            np.array([steps for _, steps in refined], dtype=np.int64),
-            len(made) + (given is not None),
-        )
+        for u, y in parts:
+            for theta in starting_points(self.model, self.between, self.held, u, y):
+                begun = self.stabilised(theta, len(y))
+                # The errors are linear in the numerators, which are zero so far.
+                errors, psi = self.errors_and_gradient(begun, u, y)
+                columns = psi[above].reshape(-1, y.size).T
+                scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+                begun[above] = np.linalg.lstsq(columns / scale, errors.ravel(), rcond=1e-10)[0] / scale
+                made.append(begun)
+        begun = np.array(made)
+        tell(Counted("starting points tried", 0, len(begun)))
+        found = minimise(RecordProblem((about,) * len(begun)), begun, most=_QUICK, idle=_IDLE)
+        chosen: list[Array] = []
+        for run in np.argsort(found.cost, kind="stable"):
+            unit = found.hessian[run] * about.y.size / max(found.cost[run], 1e-300)
+            away = (found.theta[run] - theta for theta in chosen)
+            if np.isfinite(found.cost[run]) and all(step @ unit @ step > _APART for step in away):
+                chosen.append(found.theta[run])
+        return Starts(np.array(chosen[:_FOLLOWED]).reshape(-1, begun.shape[1]), len(begun)).and_given(given)
 
     def holding(self, known: NDArray[np.bool_]) -> TransferKind:
         """Return the kind with starting points that keep known dead times."""
@@ -234,24 +190,6 @@ def _begun(denominator: tuple[float, ...], step: float, samples: int, late: int)
     entering = np.concatenate([impulses, np.ones((int(entry.order > 0), samples))])
     poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
     return filtered([1.0], poles, entering)
-
-
-def refine(records: Records, kind: TransferKind, start: Point) -> tuple[Point, int]:
-    """Return the likeliest point of the iteration from `start`, and how many steps were made."""
-    best, point, since, steps = start, start, 0, 0
-    ends = np.cumsum(records.lengths)[:-1]
-    while steps < _MOST_ITERATIONS and np.isfinite(point.cost):
-        noise = [kind.noise_in_regressors(point.theta, errors) for errors in np.split(point.errors, ends)]
-        regressors = point.psi - np.concatenate(noise, axis=1)
-        scale = np.sqrt(np.maximum(np.diag(point.hessian), 1e-300))
-        matrix = point.against(regressors) / np.outer(scale, scale)
-        step = np.linalg.lstsq(matrix, point.slope / scale, rcond=1e-12)[0] / scale
-        point = evaluate(records, records.stabilised(point.theta + step))
-        best, since = (point, 0) if point.cost < best.cost else (best, since + 1)
-        steps += 1
-        if since == _PATIENCE or step @ point.hessian @ step * point.errors.size < _LEFT * point.cost:
-            break
-    return best, steps
 
 
 def _larger(model: ContinuousModel, *, feedback: bool) -> Iterator[tuple[ContinuousModel, str]]:

@@ -1,7 +1,12 @@
-"""Express an estimate in the units of its own noise, and split signals into explained and other parts."""
+"""Express an estimate in the units of its own noise, and split signals into explained and other parts.
+
+Tests of a model compare residuals with their own noise. Where the stated model of that noise is refuted, slow
+noise looks like a drift, or like a plant that is not linear: so the noise is estimated first.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,10 +15,10 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.identification.kind import Echo, Echoes
-from inputdesign_cli.identification.noise_first import Whitening
-from inputdesign_cli.identification.problem import Point
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.polynomial_starts import noise_polynomials
+from inputdesign_cli.identification.records import Point, Records, shifted
+from inputdesign_cli.identification.stability import reflected
+from inputdesign_cli.plant.filtering import filtered
 
 DEPENDENT = 1e-6
 """Signals of norm one of which less is left depend on the others."""
@@ -21,6 +26,89 @@ DEPENDENT = 1e-6
 _WELL_KNOWN = 1e-3
 # A parameter is at its limit if it cannot move half of this number of standard deviations.
 _ASIDE = 0.01
+# Orders of C and D that are tried for the noise of residuals.
+_ORDERS = ((0, 1), (1, 0), (1, 1), (0, 2), (2, 2))
+# Coefficients of the filter that whitens residuals: samples needed for each, and the most that are tried.
+_SAMPLES_A_COEFFICIENT, _MOST = 20, 12
+
+Noise = tuple[Array, Array]
+"""C and D, monic."""
+
+
+def noises_of_residuals(errors: Array, lengths: Sequence[int]) -> list[list[Noise]]:
+    """Return C and D of every output's residuals (N, p): first as BIC prefers, then of the largest order.
+
+    Args:
+        lengths: of the records that follow each other; the longest determines the polynomials.
+    """
+    at = int(np.argmax(lengths))
+    begin = sum(lengths[:at])
+    tried = [[_fitted(v, c, d) for c, d in _ORDERS] for v in errors[begin : begin + lengths[at]].T]
+    best = [int(np.argmin([value for value, _ in one])) for one in tried]
+    chosen = [[own[k][1] for own, k in zip(tried, best, strict=True)], [own[-1][1] for own in tried]]
+    return chosen[: 1 if all(k == len(_ORDERS) - 1 for k in best) else 2]
+
+
+def _fitted(v: Array, c: int, d: int) -> tuple[float, Noise]:
+    """Return BIC of noise (n,) of these orders, and its C and D."""
+    C, D = (reflected(np.append(1.0, p)) for p in noise_polynomials(v, c, d))
+    left = filtered(D, C, v)
+    return float(v.size * np.log(np.mean(left**2)) + (c + d) * np.log(v.size)), (C, D)
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """Monic filters, one an output, that make residuals of records white; their inverses are stable."""
+
+    filters: tuple[Array, ...]
+    lengths: tuple[int, ...]
+
+    @classmethod
+    def of(cls, errors: Array, lengths: tuple[int, ...]) -> Whitening:
+        """Return the filters for residuals (N, p): autoregressions, of the orders that BIC prefers."""
+        return cls(tuple(_autoregression(v, lengths) for v in errors.T), lengths)
+
+    def through(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return signals (.., N + M, p) filtered record by record; the M errors before them stay.
+
+        The first samples of a record, whose past is not known, are zero.
+        """
+        found, begin = np.array(signals), 0
+        for length in self.lengths:
+            own = slice(begin, begin + length)
+            for i, filter in enumerate(self.filters):
+                found[..., own, i] = filtered(filter, [1.0], signals[..., own, i])
+                found[..., begin : begin + min(filter.size - 1, length), i] = 0.0
+            begin += length
+        return found
+
+    def slopes(self, errors: Array) -> NDArray[np.float64]:
+        """Return minus the derivative of filtered residuals by every coefficient, (m, N, p)."""
+        at = [(i, lag) for i, filter in enumerate(self.filters) for lag in range(1, filter.size)]
+        found = np.zeros((len(at), *errors.shape))
+        for k, (i, lag) in enumerate(at):
+            found[k, :, i] = -shifted(errors[:, i], lag, self.lengths)
+        return found
+
+    def echoes(self) -> NDArray[np.float64]:
+        """Return how these respond to past errors that are white, (m, lags, p, p); see `Kind.echoes`."""
+        samples, p = max(self.lengths), len(self.filters)
+        alone, impulse = replace(self, lengths=(samples,)), np.eye(1, samples)[0]
+        coloured = np.stack([filtered([1.0], filter, impulse) for filter in self.filters], axis=1)
+        return alone.slopes(coloured)[:, :, :, None] * np.eye(p)
+
+
+def _autoregression(v: Array, lengths: Sequence[int]) -> Array:
+    """Return the monic polynomial of the order that BIC prefers, by least squares over all records."""
+    most = max(min(_MOST, v.size // _SAMPLES_A_COEFFICIENT), 1)
+    past = np.stack([shifted(v, lag, lengths) for lag in range(1, most + 1)], axis=1)
+    # Squares of orders that nest, from one triangle.
+    triangle = np.linalg.qr(np.column_stack([past, v]))[1]
+    left = np.cumsum(triangle[::-1, -1] ** 2)[::-1]
+    orders = np.arange(most + 1)
+    order = int(np.argmin(v.size * np.log(left[: most + 1]) + orders * np.log(v.size)))
+    ahead = scipy.linalg.solve_triangular(triangle[:order, :order], triangle[:order, -1])
+    return reflected(np.append(1.0, -ahead))
 
 
 @dataclass(frozen=True)
@@ -29,25 +117,23 @@ class White:
 
     Attributes:
         root: R (p, p), which makes residuals white.
-        samples: N of them; errors of noise before the records, M of every output, follow.
+        lengths: of the records, N samples; errors of noise before them, M of every output, follow.
         residuals: ((N + M) p,).
         variance: of the noise, in these units: residuals lack what unknown starts explain.
         starts: ((N + M) p, m), orthonormal, what m unknown starts explain.
         explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
-        means: (k,), of the scores of the parameters, see `echoes`.
-        known: what past errors add to the gradients of parameters of the noise, if that is known.
+        echoes: (k, lags, p, p), see `Kind.echoes`, in the units of residuals.
         whitening: filters of residuals that are not white; their coefficients come after the k parameters.
     """
 
     root: Array
-    samples: int
+    lengths: tuple[int, ...]
     residuals: Array
     variance: float
     starts: Array
     explained: Array
     basis: Array
-    means: Array
-    known: Echoes | None
+    echoes: NDArray[np.float64]
     whitening: Whitening | None = None
 
     @classmethod
@@ -58,41 +144,31 @@ class White:
             whitening: filters that make residuals white whose noise model is wrong. Their coefficients are
                 estimated along; of the parameters of that noise model nothing is known then.
         """
-        near, echoes = point.near, records.kind.echoes(point.theta, records.lengths)
+        near, starts = point.near, point.near.directions
         errors, psi = near.all_errors, np.where(_held(records, point)[:, None, None], 0.0, near.all_psi)
-        starts = near.directions
-        if whitening is not None:
-            root = _root(errors, len(near.errors))
+        root = _root(errors, near.samples)
+        if whitening is None:
+            echoes = records.kind.echoes(point.theta, records.longest)
+        else:
             free = starts.T.reshape(-1, *errors.shape) @ np.linalg.inv(root).T
-            own = np.pad(whitening.slopes(near.errors), ((0, 0), (0, len(near.past)), (0, 0)))
+            own = np.pad(whitening.slopes(near.errors), ((0, 0), (0, len(errors) - near.samples), (0, 0)))
             errors, free, psi = (whitening.through(x) for x in (errors, free, psi))
-            psi = np.concatenate([psi, own])
-        root = _root(errors, len(near.errors))
-        if whitening is not None:
+            echoes = whitening.echoes()
+            echoes = np.concatenate([np.zeros((len(psi), *echoes.shape[1:])), echoes])
+            psi, root = np.concatenate([psi, own]), _root(errors, near.samples)
             starts = _orthonormal(_scaled((free @ root.T).reshape(len(free), errors.size).T))
-            echoes = [(point.theta.size + k, echo) for k, echo in enumerate(whitening.echoes())]
         explained = np.column_stack([starts, (psi @ root.T).reshape(len(psi), -1).T])
-        none = np.zeros(len(psi))
-        found = cls(
+        return cls(
             root,
-            len(near.errors),
+            records.lengths,
             (errors @ root.T).ravel(),
             near.errors.size / max(near.freedom, 1),
             starts,
             explained,
             _orthonormal(_scaled(explained)),
-            none,
-            echoes,
+            root @ echoes @ np.linalg.inv(root),
             whitening,
         )
-        for index, through in echoes or ():
-            none[index] = found.echoes(through)
-        return found
-
-    @property
-    def foreseen(self) -> bool:
-        """Return whether the means of scores of residuals are known; otherwise they are taken for zero."""
-        return self.whitening is None and self.known is not None
 
     def columns(self, signals: NDArray[np.float64]) -> Array:
         """((N + M) p, m): signals (m, N, p) in units of the residuals, zero before the records."""
@@ -102,16 +178,26 @@ class White:
         found[: signals[0].size] = (signals @ self.root.T).reshape(len(signals), -1).T
         return found
 
-    def echoes(self, through: Echo) -> float:
-        """Return the mean of the score of a signal that is made of the residuals themselves.
+    def mean(self, echoes: NDArray[np.float64]) -> Array:
+        """Return the means (m,) of the scores of signals that are made of the residuals themselves.
 
         Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
-        the mean -tr(Q^T T Q), for T, which looks back in time, has no trace.
+        the mean -tr(Q^T T Q), for T, which looks back in time, has no trace. Under whitening it is zero.
 
         Args:
-            through: T, of errors (N, p).
+            echoes: T (m, lags, p, p), in the units of residuals.
         """
-        return -self.variance * self._trace(through, self.starts)
+        known = self.whitening is None and self.starts.shape[1]
+        return -self.variance * _traces(echoes, self._of_starts) if known else np.zeros(len(echoes))
+
+    @cached_property
+    def _of_starts(self) -> NDArray[np.float64]:
+        return self._correlations(self.starts)
+
+    @cached_property
+    def means(self) -> Array:
+        """Return the means (k,) of the scores of the parameters."""
+        return -self.variance * _traces(self.echoes, self._of_starts)
 
     def probability(self, statistic: float, directions: Array) -> float:
         """That of a sum of squares as large along f directions ((N + M) p, f), orthonormal, if all is noise.
@@ -122,12 +208,10 @@ class White:
         with f and 2 / v degrees of freedom. White directions have v = 0, a narrow band where the noise has a
         zero or a pole next to the unit circle has 0.1 and more.
         """
-        freedom = directions.shape[1]
-        slopes = np.zeros(self.means.size)
-        for index, through in self.known or ():
-            slopes[index] = 2.0 * self._trace(through, directions) / freedom
-        deviations = slopes @ self._spread
-        v = self.variance * float(deviations @ deviations)
+        freedom, v = directions.shape[1], 0.0
+        if np.any(self.echoes):
+            slopes = 2.0 * _traces(self.echoes, self._correlations(directions)) / freedom
+            v = self.variance * float(np.sum((slopes @ self._spread) ** 2))
         if v <= _WELL_KNOWN:
             return float(scipy.special.chdtrc(freedom, statistic))
         return float(scipy.special.fdtrc(freedom, 2.0 / v, statistic / freedom))
@@ -137,15 +221,17 @@ class White:
         """(k, (N + M) p): by it and the residuals' variance parameters are spread, starts being unknown."""
         scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
         inverse = np.linalg.pinv(self.explained / scale, rcond=1e-12) / scale[:, None]
-        return np.asarray(inverse[len(inverse) - self.means.size :])
+        return np.asarray(inverse[len(inverse) - len(self.echoes) :])
 
-    def _trace(self, through: Echo, directions: Array) -> float:
-        """tr(D^T T D) of directions ((N + M) p, n), for T of errors (N, p)."""
-        outputs, back = len(self.root), np.linalg.inv(self.root).T
-        found = 0.0
-        for direction in directions[: self.samples * outputs].T:
-            own = direction.reshape(-1, outputs)
-            found += float(np.sum((through(own @ back) @ self.root.T) * own))
+    def _correlations(self, directions: Array) -> NDArray[np.float64]:
+        """Return sum over t and directions of D(t) D(t - lag)^T within the records, (lags, p, p)."""
+        outputs, ends = len(self.root), np.cumsum(self.lengths)
+        signals = directions[: ends[-1] * outputs].reshape(ends[-1], outputs, -1 if directions.size else 0)
+        found = np.zeros((max(self.lengths), outputs, outputs))
+        for own in np.split(signals, ends[:-1]):
+            lines = np.fft.rfft(own[:, :, np.any(own, axis=(0, 1))], 2 * len(own), axis=0)
+            power = np.einsum("wim,wjm->wij", lines, lines.conj())
+            found[: len(own)] += np.fft.irfft(power, 2 * len(own), axis=0)[: len(own)]
         return found
 
     def mean_left(self, columns: Array, means: Array) -> Array:
@@ -159,8 +245,8 @@ class White:
     @property
     def errors(self) -> Array:
         """Return the residuals in their own units, (N, p)."""
-        outputs = len(self.root)
-        return self.residuals[: self.samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
+        samples, outputs = sum(self.lengths), len(self.root)
+        return self.residuals[: samples * outputs].reshape(-1, outputs) @ np.linalg.inv(self.root).T
 
     def without(self, columns: Array) -> White:
         """Return the estimate where columns ((N + M) p, m) of free sizes explain residuals like starts."""
@@ -181,6 +267,11 @@ class White:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
 
+def _traces(echoes: NDArray[np.float64], correlations: NDArray[np.float64]) -> Array:
+    """tr(D^T T D) of directions with these correlations (lags, p, p), for T (m, lags, p, p)."""
+    return np.asarray(np.tensordot(echoes, correlations[: echoes.shape[1]], axes=3))
+
+
 def _held(records: Records, point: Point) -> NDArray[np.bool_]:
     """Return the mask (k,) of dead times that the samples push against a bound.
 
@@ -190,12 +281,9 @@ def _held(records: Records, point: Point) -> NDArray[np.bool_]:
     held = np.zeros(point.theta.size, dtype=bool)
     variance = point.cost / point.errors.size
     for j in records.dead_times:
-        step = np.zeros(held.size)
-        step[j] = (
-            _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300)) * np.sign(point.slope[j])
-        )
-        moved = records.stabilised(point.theta + step)[j] - point.theta[j]
-        held[j] = abs(moved) < 0.5 * abs(step[j])
+        size = _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300))
+        step = size * np.sign(point.slope[j]) * (np.arange(held.size) == j)
+        held[j] = abs((records.stabilised(point.theta + step) - point.theta)[j]) < 0.5 * size
     return held
 
 

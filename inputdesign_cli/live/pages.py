@@ -22,7 +22,14 @@ Stamp = tuple[tuple[int, int, int] | None, ...]
 
 def stamp(paths: Sequence[Path]) -> Stamp:
     """Return times, sizes and numbers of inodes of files, which change with their content."""
-    return tuple(map(_of, paths))
+    found: list[tuple[int, int, int] | None] = []
+    for path in paths:
+        try:
+            of = os.stat(path)
+            found.append((of.st_mtime_ns, of.st_size, of.st_ino))
+        except OSError:
+            found.append(None)
+    return tuple(found)
 
 
 def wait_for_change(paths: Sequence[Path], before: Stamp) -> Stamp:
@@ -40,14 +47,6 @@ def wait_for_change(paths: Sequence[Path], before: Stamp) -> Stamp:
 def _later(paths: Sequence[Path]) -> Stamp:
     time.sleep(_EVERY)
     return stamp(paths)
-
-
-def _of(path: Path) -> tuple[int, int, int] | None:
-    try:
-        found = os.stat(path)
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size, found.st_ino
 
 
 @dataclass(frozen=True)
@@ -82,18 +81,7 @@ class Followed:
     @property
     def page(self) -> str:
         """The page as it is now."""
-        return filled(
-            "watch.html",
-            {
-                "title": f"{self.name}: {self.state}",
-                "name": self.name,
-                "state": self.state,
-                "told": self.told,
-                "errors": self.errors,
-                "designs": self.designs,
-                "awaits": self.awaits,
-            },
-        )
+        return filled("watch.html", {"title": f"{self.name}: {self.state}", **vars(self)})
 
 
 def followed_page(report: str) -> str:

@@ -21,7 +21,7 @@ from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
 from inputdesign_cli.design.loop_error.laws import complement
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
-from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
+from inputdesign_cli.identification.polynomial_rows import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.filtering import filtered

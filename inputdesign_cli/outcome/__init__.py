@@ -1,67 +1,38 @@
 """What a question returns: typed results, and their form as JSON."""
 
-from inputdesign_cli.outcome.campaign import Campaign
-from inputdesign_cli.outcome.codec import OutcomeError, read_plain, write_plain
+from inputdesign_cli.outcome.campaign import Campaign as Campaign
+from inputdesign_cli.outcome.codec import (
+    OutcomeError as OutcomeError,
+    plain as plain,
+    read_plain as read_plain,
+)
 from inputdesign_cli.outcome.design import (
-    Baseline,
-    ClosedLoopError,
-    Information,
-    LimitUse,
-    Loop,
-    MeanSquaredError,
-    ModelError,
-    Moments,
-    Objective,
-    Powers,
-    RequirementMet,
-    Sensitivity,
-    Signal,
-    Solver,
-    Spectrum,
-    White,
+    Baseline as Baseline,
+    ClosedLoopError as ClosedLoopError,
+    Information as Information,
+    LimitUse as LimitUse,
+    Loop as Loop,
+    MeanSquaredError as MeanSquaredError,
+    ModelError as ModelError,
+    Moments as Moments,
+    Objective as Objective,
+    Powers as Powers,
+    RequirementMet as RequirementMet,
+    Sensitivity as Sensitivity,
+    Signal as Signal,
+    Solver as Solver,
+    Spectrum as Spectrum,
+    White as White,
 )
 from inputdesign_cli.outcome.estimate import (
-    Assessment,
-    Exploration,
-    Identification,
-    Neglected,
-    Nominal,
-    Validation,
+    Assessment as Assessment,
+    Exploration as Exploration,
+    Identification as Identification,
+    MeasuredLines as MeasuredLines,
+    Neglected as Neglected,
+    Nominal as Nominal,
+    Validation as Validation,
 )
-from inputdesign_cli.outcome.outcome import Outcome
-from inputdesign_cli.outcome.response import MeasuredLines
-from inputdesign_cli.outcome.robust import Robust
-from inputdesign_cli.outcome.simulation import Simulation
-
-__all__ = [
-    "Assessment",
-    "Baseline",
-    "Campaign",
-    "ClosedLoopError",
-    "Exploration",
-    "Identification",
-    "Information",
-    "LimitUse",
-    "Loop",
-    "MeanSquaredError",
-    "MeasuredLines",
-    "ModelError",
-    "Moments",
-    "Neglected",
-    "Nominal",
-    "Objective",
-    "Outcome",
-    "OutcomeError",
-    "Powers",
-    "RequirementMet",
-    "Robust",
-    "Sensitivity",
-    "Signal",
-    "Simulation",
-    "Solver",
-    "Spectrum",
-    "Validation",
-    "White",
-    "read_plain",
-    "write_plain",
-]
+from inputdesign_cli.outcome.outcome import Outcome as Outcome
+from inputdesign_cli.outcome.robust import Robust as Robust
+from inputdesign_cli.outcome.simulation import Simulation as Simulation

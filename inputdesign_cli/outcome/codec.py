@@ -1,4 +1,4 @@
-"""Typed results as plain data, and back: the names of fields are the keys of `result.json`.
+"""Typed results as plain data and as JSON, and back: the names of fields are the keys of `result.json`.
 
 A field that is None is left out, unless it is declared with `NULL`. A field that is declared by `others`
 holds all keys without a field of their own. Arrays are nested lists, complex numbers {re, im}.
@@ -7,17 +7,18 @@ holds all keys without a field of their own. Arrays are nested lists, complex nu
 from __future__ import annotations
 
 import dataclasses
+import json
+import math
+import sys
 import types
 from collections.abc import Mapping
 from enum import Enum
 from functools import cache
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 T = TypeVar("T")
-_OTHERS = {"others": True}
-_SEQUENCES = (tuple, list)
 
 
 class OutcomeError(ValueError):
@@ -30,35 +31,53 @@ NULL = {"null": True}
 
 def others() -> Any:
     """Declare the field for all keys that have no field of their own."""
-    return dataclasses.field(default_factory=dict, metadata=_OTHERS)
+    return dataclasses.field(default_factory=dict, metadata={"others": True})
 
 
-def write_plain(value: object) -> Any:
-    """Return a result as mappings, lists and numbers; arrays are left for the writer of JSON."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        plain: dict[str, object] = {}
-        for field in dataclasses.fields(value):
-            content = vars(value)[field.name]
-            if "others" in field.metadata:
-                plain |= {key: write_plain(item) for key, item in content.items()}
-            elif content is not None or "null" in field.metadata:
-                plain[field.name] = write_plain(content)
-        return plain
-    if isinstance(value, Enum):
-        return value.value
+def plain(value: object, where: str = "result") -> Any:
+    """Return a result in JSON's own types; `where` names it in errors.
+
+    Raises:
+        ValueError: a NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
+        TypeError: a value or a key that has no place in JSON.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = _entries(value)
+    if value is None or isinstance(value, str | bool | int):
+        return value.value if isinstance(value, Enum) else value
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{where} is {value}: a result must be finite")
+        return value
+    if isinstance(value, complex):
+        value = {"re": value.real, "im": value.imag}
     if isinstance(value, Mapping):
-        return {key: write_plain(item) for key, item in value.items()}
-    if isinstance(value, _SEQUENCES):
-        return [write_plain(item) for item in value]
-    if isinstance(value, np.ndarray) and np.iscomplexobj(value):
-        return _complex(value)
-    return value
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"{where} has the key {key!r}: keys must be text")
+        return {key: plain(item, f"{where}.{key}") for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
+    raise TypeError(f"{where} is of type {type(value).__name__}, which JSON cannot hold")
 
 
-def _complex(values: np.ndarray) -> Any:
-    if values.ndim == 0:
-        return {"re": float(values.real), "im": float(values.imag)}
-    return [_complex(part) for part in values]
+def _entries(result: Any) -> dict[str, object]:
+    """Return the fields of a result that are written, by their keys."""
+    found: dict[str, object] = {}
+    for field in dataclasses.fields(result):
+        content = vars(result)[field.name]
+        if "others" in field.metadata:
+            found |= content
+        elif content is not None or "null" in field.metadata:
+            found[field.name] = content
+    return found
+
+
+def json_text(value: object) -> str:
+    """Return anything that `plain` accepts as JSON text with a final newline."""
+    return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def read_plain(kind: type[T], data: object, where: str = "") -> T:
@@ -71,39 +90,45 @@ def read_plain(kind: type[T], data: object, where: str = "") -> T:
     return result
 
 
+def _read(kind: Any, data: Any, where: str) -> Any:
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind is Any or kind is object:
+        return data
+    if origin is np.ndarray:
+        return _array(arguments[1], data, where)
+    if isinstance(data, np.ndarray | np.generic):
+        data = data.tolist()
+    if origin in (Union, types.UnionType):
+        return _first_that_fits(arguments, data, where)
+    if origin is tuple:
+        items = _expected(data, list | tuple, where)
+        kinds = arguments[:1] * len(items) if arguments[1:] == (Ellipsis,) else arguments
+        if len(kinds) != len(items):
+            raise OutcomeError(f'"{where}" has {len(items)} entries, not {len(kinds)}')
+        return tuple(_read(of, items[i], f"{where}[{i}]") for i, of in enumerate(kinds))
+    if origin is Mapping:
+        key, of = arguments
+        entries = _expected(data, Mapping, where).items()
+        return {key(name): _read(of, item, _below(where, name)) for name, item in entries}
+    if origin is Literal or issubclass(kind, Enum):
+        known = arguments or tuple(kind)
+        if data not in known:
+            raise OutcomeError(f'"{where}" is {data!r}, not one of {", ".join(map(str, known))}')
+        return data if origin is Literal else kind(data)
+    if dataclasses.is_dataclass(kind):
+        return _object(kind, _expected(data, Mapping, where), where)
+    if kind is float and type(data) is int and abs(data) <= sys.float_info.max:
+        return float(data)
+    return _expected(data, kind, where)
+
+
 @cache
 def _fields(kind: type) -> tuple[tuple[dataclasses.Field, Any], ...]:
     hints = get_type_hints(kind)
     return tuple((field, hints[field.name]) for field in dataclasses.fields(kind))
 
 
-def _read(kind: Any, data: Any, where: str) -> Any:
-    origin, arguments = get_origin(kind), get_args(kind)
-    if kind is Any or kind is object:
-        return data
-    if origin is Annotated:
-        return _read(arguments[0], data, where)
-    if origin in (Union, types.UnionType):
-        return _read_union(arguments, data, where)
-    if origin is np.ndarray:
-        return _read_array(arguments, data, where)
-    if origin is tuple:
-        return _read_tuple(arguments, data, where)
-    if origin is Literal:
-        return _one_of(arguments, data, where)
-    if origin is not None:  # a mapping
-        key, of = arguments
-        return {
-            float(name) if key is float else name: _read(of, item, _below(where, name))
-            for name, item in _mapping(data, where).items()
-        }
-    return _read_object(kind, data, where) if dataclasses.is_dataclass(kind) else _scalar(kind, data, where)
-
-
-def _read_object(kind: Any, data: Any, where: str) -> Any:
-    if isinstance(data, kind):
-        return data
-    content = _mapping(data, where)
+def _object(kind: Any, content: Mapping[str, Any], where: str) -> Any:
     known = {field.name for field, _ in _fields(kind)}
     given: dict[str, Any] = {}
     for field, hint in _fields(kind):
@@ -114,83 +139,44 @@ def _read_object(kind: Any, data: Any, where: str) -> Any:
     try:
         return kind(**given)
     except TypeError as error:
-        raise OutcomeError(f"{_named(where)} is not complete: {error}") from error
+        raise OutcomeError(f'"{where or "result"}" is not complete: {error}') from error
 
 
-def _read_union(kinds: tuple[Any, ...], data: Any, where: str) -> Any:
-    if data is None and type(None) in kinds:
+def _first_that_fits(kinds: tuple[Any, ...], data: Any, where: str) -> Any:
+    if data is None and types.NoneType in kinds:
         return None
-    first: OutcomeError | None = None
+    errors = []
     for kind in kinds:
-        if kind is type(None):
-            continue
-        try:
-            return _read(kind, data, where)
-        except OutcomeError as error:
-            first = first or error
-    raise first or OutcomeError(f"{_named(where)} is null")
+        if kind is not types.NoneType:
+            try:
+                return _read(kind, data, where)
+            except OutcomeError as error:
+                errors.append(error)
+    raise errors[0]
 
 
-def _read_tuple(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
-    if isinstance(data, np.ndarray):
-        data = data.tolist()
-    if not isinstance(data, _SEQUENCES):
-        raise OutcomeError(f"{_named(where)} is no list")
-    kinds = arguments[:1] * len(data) if arguments[1:] == (Ellipsis,) else arguments
-    if len(kinds) != len(data):
-        raise OutcomeError(f"{_named(where)} has {len(data)} entries, not {len(kinds)}")
-    return tuple(
-        _read(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, data, strict=True))
-    )
-
-
-def _read_array(arguments: tuple[Any, ...], data: Any, where: str) -> Any:
-    of_complex = get_args(arguments[1])[:1] == (np.complex128,)
+def _array(dtype: Any, data: Any, where: str) -> Any:
     try:
-        plain = np.asarray(_with_complex(data)) if of_complex else data
-        return np.asarray(plain, dtype=complex if np.iscomplexobj(plain) else float)
+        found = np.asarray(_with_complex(data) if get_args(dtype)[:1] == (np.complex128,) else data)
+        return found.astype(complex if np.iscomplexobj(found) else float)
     except (TypeError, ValueError, KeyError, OverflowError) as error:
-        raise OutcomeError(f"{_named(where)} is no array of numbers") from error
+        raise OutcomeError(f'"{where}" is no array of numbers') from error
 
 
 def _with_complex(data: Any) -> Any:
     """Return numbers with each {re, im} as one; both may be lists."""
     if isinstance(data, Mapping):
         return np.asarray(data["re"], dtype=float) + 1j * np.asarray(data["im"], dtype=float)
-    return [_with_complex(item) for item in data] if isinstance(data, _SEQUENCES) else data
-
-
-def _named(where: str) -> str:
-    return f'"{where}"' if where else "the result"
+    return [_with_complex(item) for item in data] if isinstance(data, list | tuple) else data
 
 
 def _below(where: str, name: str) -> str:
     return f"{where}.{name}" if where else name
 
 
-def _mapping(data: Any, where: str) -> Mapping[str, Any]:
-    if not isinstance(data, Mapping):
-        raise OutcomeError(f"{_named(where)} is no object")
-    return data
-
-
-def _one_of(values: tuple[Any, ...], data: Any, where: str) -> Any:
-    if data not in values:
-        raise OutcomeError(f"{_named(where)} is {data!r}, not one of {', '.join(map(str, values))}")
-    return data
-
-
-def _scalar(kind: Any, data: Any, where: str) -> Any:
-    if isinstance(data, np.generic | np.ndarray) and np.ndim(data) == 0:
-        data = data.item()
-    if kind is float and isinstance(data, int | float) and not isinstance(data, bool):
-        try:
-            return float(data)
-        except OverflowError as error:
-            message = f"{_named(where)} is too large for a number in double precision"
-            raise OutcomeError(message) from error
-    if issubclass(kind, Enum):
-        return _one_of(tuple(kind), kind(data) if data in tuple(kind) else data, where)
+def _expected(data: Any, kind: Any, where: str) -> Any:
+    """Return data of this type; a truth value is no number."""
     if not isinstance(data, kind) or (kind is int and isinstance(data, bool)):
-        raise OutcomeError(f"{_named(where)} is of type {type(data).__name__}, not {kind.__name__}")
+        name = "object" if kind is Mapping else getattr(kind, "__name__", "list")
+        raise OutcomeError(f'"{where or "result"}" is of type {type(data).__name__}, not {name}')
     return data

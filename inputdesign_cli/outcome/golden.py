@@ -36,8 +36,7 @@ from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import parse_key
 from inputdesign_cli.specification.yaml.reader import read
 
-# What specs hold and golden files do not.
-_OF_SPECS = {"plant", "noise", "experiment", "accuracy"}
+_OF_SPECS = {"plant", "noise", "experiment", "accuracy"}  # keys of a spec, not of a golden file
 _PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
 
 
@@ -77,11 +76,6 @@ class Quantity(Section):
     def name(self) -> str:
         """The label, or the path in its place."""
         return self.label or self.path
-
-    @property
-    def steps(self) -> tuple[str | int, ...]:
-        """The path taken apart: keys as text, indices as numbers."""
-        return parse_key(self.path)
 
 
 class GoldenRun(Section):
@@ -168,18 +162,15 @@ class Row:
         return self.deviation is not None and abs(self.deviation) <= self.quantity.tolerance
 
     def as_dict(self) -> dict[str, Any]:
-        """The row in JSON's types."""
+        """Return the row in JSON's types."""
         return {
             "golden": self.golden,
             "run": self.run,
             "quantity": self.quantity.name,
-            "path": self.quantity.path,
+            **self.quantity.model_dump(include={"path", "expected", "why", "source"}),
             "computed": self.computed,
-            "expected": self.quantity.expected,
             "deviation": self.deviation,
             "tolerance": self.quantity.tolerance,
-            "why": self.quantity.why,
-            "source": self.quantity.source,
             "passed": self.passed,
             "note": self.note,
         }
@@ -202,11 +193,11 @@ def _look_up(result: Result | IdesignError | None, quantity: Quantity) -> tuple[
     if isinstance(result, IdesignError):
         return None, str(result)
     value: Any = result
-    for step in quantity.steps:
-        try:
+    try:
+        for step in parse_key(quantity.path):
             value = value[step]
-        except (KeyError, IndexError, TypeError):
-            return None, f"the result has no {quantity.path}"
+    except (LookupError, TypeError):
+        return None, f"the result has no {quantity.path}"
     try:
         return float(value), ""
     except (TypeError, ValueError):

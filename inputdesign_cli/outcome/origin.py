@@ -32,7 +32,7 @@ class Origin:
     judges: bool = False
 
     def seen_from(self, target: Path) -> list[str]:
-        """The paths of a spec (`-` if it came from standard input) and of data relative to `target`."""
+        """Return the paths of a spec (`-` from standard input) and of data relative to `target`."""
         return [
             STANDARD_STREAM
             if str(file) == STANDARD_STREAM
@@ -41,22 +41,23 @@ class Origin:
         ]
 
     def entry(self, target: Path, written: str) -> dict[str, object]:
-        """What `result.json` says of it.
-
-        Args:
-            written: the `spec.yaml` of the run.
-        """
+        """Return what `result.json` says of it; `written` is the `spec.yaml` of the run."""
         asked = {"asked_sha256": digest(self.asked)} if self.asked and self.asked != written else {}
         return {"made_from": self.seen_from(target), **asked}
 
 
+def encoded(text: str) -> bytes:
+    """Return a text as it is written to a file."""
+    return text.encode(errors="backslashreplace")
+
+
 def digest(text: str) -> str:
-    """The SHA-256 of a text as it is written to a file."""
-    return hashlib.sha256(text.encode(errors="backslashreplace")).hexdigest()
+    """Return the SHA-256 of a text as it is written to a file."""
+    return hashlib.sha256(encoded(text)).hexdigest()
 
 
 def check_directory(directory: Path) -> Path:
-    """The directory of a run with links followed; there may be none yet.
+    """Return the directory of a run with links followed; there may be none yet.
 
     Raises:
         OutputError: `output-not-a-directory`.
@@ -88,10 +89,8 @@ def check_place(directory: Path, origin: Origin, spec: str) -> None:
             f"{directory} cannot be written: {there}: {why}",
             hint="choose another place, or change the permissions",
         )
-    owned = owned_files(target)
-    certain = [name for name in (SPEC, RESULT) if name not in owned and os.path.lexists(target / name)]
-    foreign = [name for name in certain if name == RESULT or not _holds(target / name, spec)]
-    if foreign:
+    foreign = [n for n in (SPEC, RESULT) if n not in owned_files(target) and os.path.lexists(target / n)]
+    if RESULT in foreign or (foreign and _content(target / SPEC) != encoded(spec)):
         raise not_a_run(foreign, directory)
     if not origin.overwrite:
         check_origin(origin, spec, target, shown=directory)
@@ -106,7 +105,7 @@ def has_other_values(directory: Path, spec: str) -> bool:
 
 
 def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
-    """No file is given whose information the spec of a top-up has as its prior.
+    """Refuse a file whose information the spec of a top-up has as its prior.
 
     Raises:
         DataError: `data-repeated`.
@@ -129,25 +128,17 @@ def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
 
 
 def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
-    """The error about files of the user's that would be written over."""
+    """Return the error about files of the user's that would be written over."""
     message = f"{directory} already has {', '.join(foreign)}, written by something other than an earlier run"
     hint = "choose another directory with -o, or move these files away"
     return OutputError.because("output-not-a-run", message, hint)
 
 
-def _changed(path: Path, known: object) -> bool:
-    """Whether a file is there that is not the one of this SHA-256; False where none is known."""
+def _content(path: Path) -> bytes | None:
     try:
-        return known is not None and hashlib.sha256(read_regular(path)).hexdigest() != known
+        return read_regular(path)
     except OSError:
-        return False
-
-
-def _holds(path: Path, text: str) -> bool:
-    try:
-        return read_regular(path) == text.encode(errors="backslashreplace")
-    except OSError:
-        return False
+        return None
 
 
 def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> None:
@@ -163,10 +154,12 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
         OutputError: `output-other-run`; `output-spec-changed` and `output-signal-changed`, the user has
             worked on `spec.yaml` or `signal.csv` there; `campaign-exists`, its records would be lost.
     """
+    written, signal = _content(target / SPEC), _content(target / SIGNAL)
     try:
         result = load_result(target)
-        written = read_regular(target / SPEC)
-    except (DataError, OSError):
+    except DataError:
+        return
+    if written is None:
         return
     campaign = result.get("campaign")
     records = campaign.get("records") if isinstance(campaign, dict) else None
@@ -176,27 +169,29 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
             f"{shown} holds a campaign with {len(records)} record{'' if len(records) == 1 else 's'}",
             "go on with it by idesign next, choose another directory with -o, or give it up with --overwrite",
         )
-    hint = "choose another directory with -o, or replace the run with --overwrite"
-    same = written == spec.encode(errors="backslashreplace")
+    same = written == encoded(spec)
     if not same and hashlib.sha256(written).hexdigest() != result.get("spec_sha256"):
-        message = f"{shown / SPEC} has been changed since its run was written, and would be lost"
-        hint = "solve that file, choose another directory with -o, or give up the changes with --overwrite"
-        raise OutputError.because("output-spec-changed", message, hint)
-    if _changed(target / SIGNAL, result.get("signal_sha256")):
-        raise OutputError.because(
-            "output-signal-changed",
-            f"{shown / SIGNAL} has been changed since its run was written, and would be lost",
-            "move it away if it is a record, choose another directory with -o, or give it up by --overwrite",
-        )
+        raise _lost("output-spec-changed", shown / SPEC, "solve that file")
+    known_signal = result.get("signal_sha256")
+    if known_signal and signal is not None and hashlib.sha256(signal).hexdigest() != known_signal:
+        raise _lost("output-signal-changed", shown / SIGNAL, "move it away if it is a record")
     ours, theirs = origin.seen_from(target), result.get("made_from")
     known = theirs if isinstance(theirs, list) else []
     if known[:1] != [SPEC] and origin.asked:  # or else spec.yaml is the user's own text
         same |= digest(origin.asked) == result.get("asked_sha256", result.get("spec_sha256"))
     same_file = ours[:1] == known[:1] and ours[:1] not in ([], [STANDARD_STREAM])
+    of = ""
     if known[1:] != ours[1:] or not (same or same_file or ours[:1] == [SPEC]):
-        of = f" of {', '.join(map(str, known))} (as seen from there)" if known else " of something else"
-        message = f"{shown} holds the run{of}, and would lose it"
-        raise OutputError.because("output-other-run", message, hint)
-    if "assessment" in result and not origin.judges:
-        message = f"{shown} holds the verdict of assess on these data, and would lose it"
-        raise OutputError.because("output-other-run", message, hint)
+        of = f"run of {', '.join(map(str, known))} (as seen from there)" if known else "run of something else"
+    elif "assessment" in result and not origin.judges:
+        of = "verdict of assess on these data"
+    if of:
+        hint = "choose another directory with -o, or replace the run with --overwrite"
+        raise OutputError.because("output-other-run", f"{shown} holds the {of}, and would lose it", hint)
+
+
+def _lost(code: str, file: Path, instead: str) -> OutputError:
+    """Return the error about a file that the user has worked on."""
+    message = f"{file} has been changed since its run was written, and would be lost"
+    hint = f"{instead}, choose another directory with -o, or give up the changes with --overwrite"
+    return OutputError.because(code, message, hint)

@@ -26,8 +26,13 @@ from inputdesign_cli.outcome.design import (
     Solver,
     Spectrum,
 )
-from inputdesign_cli.outcome.estimate import Assessment, Exploration, Identification, Validation
-from inputdesign_cli.outcome.response import MeasuredLines
+from inputdesign_cli.outcome.estimate import (
+    Assessment,
+    Exploration,
+    Identification,
+    MeasuredLines,
+    Validation,
+)
 from inputdesign_cli.outcome.robust import Robust
 from inputdesign_cli.outcome.simulation import Simulation
 

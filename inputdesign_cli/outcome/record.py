@@ -6,7 +6,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
@@ -28,6 +28,7 @@ _LIBRARIES = ("numpy", "scipy", "cvxpy", "clarabel")
 _LONGEST_NAME = 255  # bytes, of a file system
 # How each page that `idesign report` writes begins: one of the user's own is not removed.
 PAGE_MARK = b'<meta name="generator" content="idesign '
+_DAMAGES = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 
 
 def load_result(directory: Path) -> dict[str, Any]:
@@ -55,7 +56,7 @@ def load_result(directory: Path) -> dict[str, Any]:
 
 
 def listed_files(directory: Path) -> list[str]:
-    """The names of the files of the run in `directory`, `result.json` first; none if there is no run."""
+    """Return the names of the files of the run in `directory`, `result.json` first; none without a run."""
     try:
         return list(dict.fromkeys([RESULT, *load_result(directory).get("files", ())]))
     except DataError:
@@ -91,15 +92,7 @@ def readable(file: Path) -> Iterator[None]:
     """Turn errors about a record that somebody else wrote or damaged into `run-unreadable`."""
     try:
         yield
-    except (
-        ArithmeticError,
-        AttributeError,
-        LookupError,
-        OSError,
-        RecursionError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except _DAMAGES as error:
         raise unreadable(file, f"its entries are not what idesign writes ({error})") from error
 
 
@@ -120,23 +113,12 @@ def is_plain(name: object) -> bool:
         return False
 
 
-def environment() -> dict[str, str | None]:
-    """Versions of Python, of this package and of the numerical libraries, and the platform.
-
-    The libraries are looked up in the installation's metadata, not imported; one that is not
-    installed is None.
-    """
+@cache
+def environment() -> Mapping[str, str]:
+    """Return versions of Python, of this package and of the numerical libraries, and the platform."""
     return {
         "python": platform.python_version(),
         "platform": platform.platform(),
         "idesign": __version__,
-        **{name: _version(name) for name in _LIBRARIES},
+        **{name: metadata.version(name) for name in _LIBRARIES},
     }
-
-
-@cache
-def _version(name: str) -> str | None:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return None

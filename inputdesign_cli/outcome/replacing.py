@@ -1,29 +1,30 @@
 """Replace one run by another: whole whenever the writer is killed, and put right by the next call.
 
-Everything happens in a folder of work: inside the directory of the run, or next to it if the directory is yet
-to be made. It holds `new`, the files of the new run; `old`, the files of the run that leaves, while files are
-moved; and a lock, which ends with its process.
+Everything happens in a folder of work inside the directory of the run, under a lock that ends with its
+process. The folder holds `new`, the files of the new run, and `old`, the files of the run that leaves, while
+files are moved. The directory may be a mounted volume: a file moves in one step only within one.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
-import time
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from inputdesign_cli.errors import OutputError
-from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, listed_files
 
+_WORK, _LOCK = ".run.partial", ".run.lock"
 _PATIENCE = 10.0  # seconds that another writer is waited for
+_POLL = 0.02  # seconds between two tries
 
 
 @contextmanager
 def workplace(target: Path) -> Iterator[Path]:
-    """A folder of work for `target`, held for this process alone, with an empty `new` in it.
+    """Make a folder of work in `target`, held for this process alone, with an empty `new` in it.
 
     What a killed process left is put right first; whatever happens, nothing of the work remains.
 
@@ -31,48 +32,29 @@ def workplace(target: Path) -> Iterator[Path]:
         OutputError: `output-busy`, another process writes into `target`.
         OSError: the folder cannot be made.
     """
-    with ExitStack() as held:
-        work = _begun(target, held)
-        try:
+    made = not target.exists()
+    target.mkdir(parents=True, exist_ok=True)
+    try:
+        with _alone(target) as work:
+            work.mkdir()
             (work / "new").mkdir()
             yield work
-        finally:
-            for place in _places(target):
-                _clear(place, target)
-
-
-def _begun(target: Path, held: ExitStack) -> Path:
-    """A new folder of work whose lock is held; others may be after it at the same time."""
-    inside, beside = _places(target)
-    due = time.monotonic() + _PATIENCE
-    while True:
-        heal(target)
-        # Inside a directory that exists: it may be a file system of its own (a mounted volume), and a file
-        # can be moved in one step only within one.
-        work = inside if target.exists() else beside
-        try:
-            work.mkdir()
-            held.enter_context(_locked(work))
-            return work
-        except (FileExistsError, FileNotFoundError):
-            # Neither a link nor a file of that name goes away by waiting.
-            if time.monotonic() > due or (os.path.lexists(work) and not _is_folder(work)):
-                raise
+    finally:
+        if made:
+            with suppress(OSError):  # it is not empty
+                target.rmdir()
 
 
 def heal(target: Path) -> None:
-    """Put right what a killed process left in or beside `target`: it has the run before, or the next one.
+    """Put right what a killed process left in `target`: it has the run before, or the next one.
 
     Raises:
         OutputError: `output-busy`.
         OSError: a file cannot be moved.
     """
-    for work in _places(target):
-        # Whoever else sees to it may be faster.
-        with suppress(FileNotFoundError), ExitStack() as held:
-            if _is_folder(work):
-                held.enter_context(_locked(work))
-                _clear(work, target)
+    if os.path.lexists(target / _LOCK):
+        with _alone(target):
+            pass
 
 
 def put_in_place(names: list[str], owned: Collection[str], work: Path, target: Path) -> None:
@@ -99,8 +81,47 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-def _places(target: Path) -> tuple[Path, Path]:
-    return target / ".run.partial", target.parent / f".{target.name}.partial"
+@contextmanager
+def locked(path: Path, patience: float = 0.0) -> Iterator[bool]:
+    """Hold the lock file `path`, which is made; False if another holder kept it for `patience` seconds.
+
+    Raises:
+        OSError: the file cannot be made.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(path)
+    held = True
+    try:
+        lock.acquire(timeout=patience, poll_interval=_POLL)
+    except Timeout:
+        held = False
+    except OSError as error:
+        if error.errno not in (errno.ENOLCK, errno.ENOTSUP):  # a file system without locks
+            raise
+    try:
+        yield held
+    finally:
+        lock.release()
+
+
+@contextmanager
+def _alone(target: Path) -> Iterator[Path]:
+    """Hold the lock of a directory; the folder of work is gone before and after."""
+    work = target / _WORK
+    with locked(target / _LOCK, _PATIENCE) as held:
+        if not held:
+            message = f"another process is writing into {target}"
+            raise OutputError.because(
+                "output-busy", message, "wait for it, or choose another directory with -o"
+            )
+        try:
+            _clear(work, target)
+            yield work
+        finally:
+            _clear(work, target)
+            with suppress(OSError):
+                (target / _LOCK).unlink()
 
 
 def _is_folder(path: Path) -> bool:
@@ -109,7 +130,7 @@ def _is_folder(path: Path) -> bool:
 
 
 def _clear(work: Path, target: Path) -> None:
-    """Remove a folder of work; files that were being moved go back where they came from."""
+    """Remove the folder of work; files that were being moved go back where they came from."""
     new, old = work / "new", work / "old"
     if not _is_folder(work):
         return
@@ -126,23 +147,3 @@ def _move(names: Iterable[str], source: Path, destination: Path) -> None:
     for name in names:
         if os.path.lexists(source / name):
             (source / name).rename(destination / name)
-
-
-@contextmanager
-def _locked(work: Path) -> Iterator[None]:
-    """Hold the lock of a folder of work.
-
-    Raises:
-        FileNotFoundError: its owner has removed it in the meantime.
-        OutputError: `output-busy`.
-    """
-    try:
-        with locked(work / "lock", _PATIENCE) as held:
-            if not held:
-                message = f"another process is writing into {work.parent}"
-                hint = "wait for it, or choose another directory with -o"
-                raise OutputError.because("output-busy", message, hint)
-            yield
-    finally:  # Windows keeps a folder that has an open file in it
-        with suppress(OSError):
-            work.rmdir()

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.outcome import Information, ModelError, Objective, Outcome, write_plain
+from inputdesign_cli.outcome import Information, ModelError, Objective, Outcome, plain
 from inputdesign_cli.outcome.curves import Curves, SpectrumCurves
 
 Array = NDArray[np.float64]
@@ -46,8 +46,8 @@ class Results:
     @cached_property
     def result(self) -> Result:
         """The outcome as plain data: the content of result.json."""
-        plain: Result = write_plain(self.outcome)
-        return plain
+        found: Result = plain(self.outcome)
+        return found
 
     @property
     def cost(self) -> float | None:

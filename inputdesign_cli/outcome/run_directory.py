@@ -17,8 +17,9 @@ from typing import Any
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain
+from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.curves_file import curves_json
-from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, not_a_run
+from inputdesign_cli.outcome.origin import Origin, check_directory, check_origin, digest, encoded, not_a_run
 from inputdesign_cli.outcome.record import (
     FIGURES,
     RESULT,
@@ -31,24 +32,17 @@ from inputdesign_cli.outcome.record import (
 )
 from inputdesign_cli.outcome.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.text_formats import csv_text, json_text, plain
+from inputdesign_cli.outcome.text_formats import csv_text
 
 
 def finished_result(results: Results) -> dict[str, Any]:
-    """The content of `result.json` in JSON's own types, with `environment` and `spec_sha256` filled in.
-
-    `spec_sha256` is the digest of `spec.yaml` as it is written.
+    """Return the content of `result.json` with `environment` and the digest of `spec.yaml` filled in.
 
     Raises:
-        ValueError, TypeError: The result holds a NaN, an infinity or a type that JSON lacks: a mistake of the
-            program.
+        ValueError, TypeError: the result holds a NaN, an infinity or a type that JSON lacks.
     """
-    result: dict[str, Any] = plain(results.result)
-    if not result.get("environment"):
-        result["environment"] = environment()
-    if not result.get("spec_sha256"):
-        result["spec_sha256"] = digest(results.resolved_spec)
-    return result
+    filled = {"environment": environment(), "spec_sha256": digest(results.resolved_spec)}
+    return {**results.result, **filled}
 
 
 def write_run(
@@ -60,10 +54,9 @@ def write_run(
 ) -> list[Path]:
     """Write a run directory and return the paths of its files, `result.json` last.
 
-    An earlier run in `directory` is replaced, including files that the new run no longer has,
-    and the page about it. Files that are not of a run are left alone. Whatever fails or kills the
-    writer, `directory` holds afterwards what it held before or the new run, at the latest after the next
-    call.
+    An earlier run in `directory` is replaced, including files that the new run no longer has, and the page
+    about it. Files that are not of a run are left alone. Whatever fails or kills the writer, `directory`
+    holds what it held before or the new run, at the latest after the next call.
 
     Args:
         results: what a verb of the package returned.
@@ -79,30 +72,21 @@ def write_run(
     result = finished_result(results)
     with output_errors(directory):
         target = check_directory(directory)
-        target.parent.mkdir(parents=True, exist_ok=True)
         if origin is not None:
             result |= origin.entry(target, results.resolved_spec)
         with workplace(target) as work:
             if origin is not None and not origin.overwrite:
                 check_origin(origin, results.resolved_spec, target, shown=directory)
             names = _write_files(results, result, work / "new", figures)
-            if work.parent == target:
-                owned = owned_files(target)
-                _keep_foreign(names, owned, work, target, shown=directory)
-                put_in_place(names, owned, work, target)
-            else:
-                (work / "new").rename(target)
-                sync(target.parent)
+            owned = owned_files(target)
+            _keep_foreign(names, owned, work, target, shown=directory)
+            put_in_place(names, owned, work, target)
     return [directory / name for name in names]
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a single text file, UTF-8.
-
-    Raises:
-        OutputError: `output-not-writable`, `output-full`.
-    """
-    write_bytes(path, _encoded(text))
+    """Write a single text file, UTF-8; it raises as `write_bytes` does."""
+    write_bytes(path, encoded(text))
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -176,12 +160,12 @@ def _write_files(
 ) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
     tables = {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
-    texts = {name: _encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
+    texts = {name: encoded(text) for name, text in ({SPEC: results.resolved_spec} | tables).items()}
     contents = {**texts, **results.files, **figures}
     if results.curves:
         contents[FIGURES] = curves_json(results.curves)
     told = {"signal_sha256": digest(tables[SIGNAL])} if SIGNAL in tables else {}
-    contents[RESULT] = _encoded(json_text({**result, **told, "files": list(contents)}))
+    contents[RESULT] = encoded(json_text({**result, **told, "files": list(contents)}))
     for name, content in contents.items():
         (folder / name).write_bytes(content)
     for name in contents:
@@ -190,24 +174,15 @@ def _write_files(
     return list(contents)
 
 
-def _encoded(text: str) -> bytes:
-    return text.encode(errors="backslashreplace")
-
-
 def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, *, shown: Path) -> None:
     """Refuse to write over files that are of no run, unless that changes nothing."""
 
     def differs(name: str) -> bool:
-        return not filecmp.cmp(work / "new" / name, target / name, shallow=False)
+        there = target / name
+        return not (there.is_file() and filecmp.cmp(work / "new" / name, there, shallow=False))
 
-    foreign = [
-        name
-        for name in names
-        if name not in owned
-        and os.path.lexists(target / name)
-        and (not (target / name).is_file() or differs(name))
-    ]
-    if foreign:
+    there = [name for name in names if name not in owned and os.path.lexists(target / name)]
+    if foreign := [name for name in there if differs(name)]:
         raise not_a_run(foreign, shown)
 
 

@@ -1,9 +1,12 @@
-"""Shares and probabilities as people read them."""
+"""Shares, probabilities and rounded numbers as people read them."""
 
 from __future__ import annotations
 
+import numpy as np
+
 _LARGE = 1000.0  # per cent, which three digits would write with an exponent
 _LEAST = 1e-300
+_EXACT = 1e-12  # a value this near to its digits has them
 
 
 def per_cent(share: float, digits: int = 3) -> str:
@@ -15,3 +18,21 @@ def per_cent(share: float, digits: int = 3) -> str:
 def chance(probability: float) -> str:
     """A probability for a sentence, also one that is below the smallest number."""
     return f"{probability:.1e}" if probability >= _LEAST else f"below {_LEAST:.0e}"
+
+
+def rounded_up(value: float, digits: int = 6) -> str:
+    """Round up to this number of digits, so that the printed value suffices."""
+    return _rounded(value, digits, 1.0)
+
+
+def rounded_down(value: float, digits: int) -> str:
+    """Round down to this number of digits."""
+    return _rounded(value, digits, -1.0)
+
+
+def _rounded(value: float, digits: int, side: float) -> str:
+    if value == 0.0:
+        return "0"
+    unit = 10.0 ** (digits - 1 - int(np.floor(np.log10(abs(value)))))
+    whole = side * np.ceil(side * value * unit - abs(value) * unit * _EXACT)
+    return f"{whole / unit:.{digits}g}"

@@ -85,18 +85,12 @@ class Searched:
 
 
 @dataclass(frozen=True)
-class TriedInput:
+class TriedInput(OnDesignModel):
     """What one input gave in the runs; each kind of question fills its own fields.
 
     `within_*` are fractions of runs whose error stays within a bound at all frequencies, with 95 % limits.
     """
 
-    within_r_adm: float | None = None
-    within_r_adm_limits: Limits | None = None
-    within_promised_r_u: float | None = None
-    within_promised_r_u_limits: Limits | None = None
-    within_r_u: float | None = None
-    within_r_u_limits: Limits | None = None
     within_r_adm_true: float | None = None
     within_r_adm_true_limits: Limits | None = None
     within_r_adm_estimate: float | None = None

@@ -1,55 +1,18 @@
-"""Results as JSON and tables as CSV: exact to the last bit, and strict about what may stand in them."""
+"""Tables as CSV: exact to the last bit, and strict about what may stand in them."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
-import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import orjson
 
 from inputdesign_cli.outcome.results import Array, Table
 from inputdesign_cli.regular_file import read_regular
-
-
-def plain(value: object, where: str = "result") -> Any:
-    """`value` in JSON's own types: arrays as nested lists, complex numbers as {"re", "im"}, tuples as lists.
-
-    Keys keep their order. `where` names the value in the diagnostic.
-
-    Raises:
-        ValueError: A NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
-        TypeError: A value or a key that has no place in JSON.
-    """
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if value is None or isinstance(value, str | bool | int):
-        return value
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise ValueError(f"{where} is {value}: a result must be finite")
-        return value
-    if isinstance(value, complex):
-        return {"re": plain(value.real, f"{where}.re"), "im": plain(value.imag, f"{where}.im")}
-    if isinstance(value, Mapping):
-        for key in value:
-            if not isinstance(key, str):
-                raise TypeError(f"{where} has the key {key!r}: keys must be text")
-        return {key: plain(item, f"{where}.{key}") for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
-    raise TypeError(f"{where} is of type {type(value).__name__}, which JSON cannot hold")
-
-
-def json_text(value: object) -> str:
-    """`value` (anything that `plain` accepts) as JSON text with a final newline."""
-    return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def csv_text(table: Table) -> str:

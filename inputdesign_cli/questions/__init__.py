@@ -10,27 +10,30 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import yaml
 
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
+from inputdesign_cli.outcome.results import Result, Results
 from inputdesign_cli.questions.arithmetic import finite, most_extreme, sound_arithmetic
-from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification import Spec, load_spec, parse_spec
 
 if TYPE_CHECKING:
     import control
 
     from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.explore import Family
+    from inputdesign_cli.outcome.golden import Golden, GoldenRun
     from inputdesign_cli.questions.assessment.assess import Assessment
     from inputdesign_cli.questions.campaign.rounds import Decision, Part, Past
     from inputdesign_cli.questions.exploration.explore import Exploration
     from inputdesign_cli.records import Preparation
 
 Files = str | Path | Sequence[str | Path]
+Verb = Literal["solve", "analyse", "simulate"]
+"""What makes results of a spec, by the names that commands, sweeps and golden files use."""
 
 
 def solve(spec: Spec) -> Results:
@@ -74,6 +77,26 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
     return _in_time(spec, lambda: build_task(spec).simulate(executor))
 
 
+def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Results:
+    """Return what `idesign VERB` computes; it raises as the verb does."""
+    if verb == "simulate":
+        return simulate(spec, executor=executor)
+    return solve(spec) if verb == "solve" else analyse(spec)
+
+
+def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:
+    """Return the result of one run of a golden file, or the error that says why there is no design.
+
+    Raises:
+        SpecError, DataError: the spec that the golden file names is not good: nothing can be compared.
+    """
+    spec = load_spec(golden.spec_of(run), list(run.overrides))
+    try:
+        return run_verb(run.command, spec).result
+    except (InfeasibleError, InaccurateError) as error:
+        return error
+
+
 def identify(
     spec: Spec,
     data: Files,
@@ -103,15 +126,13 @@ def identify(
     from inputdesign_cli.questions.frequency_response.build import build_measurement
     from inputdesign_cli.questions.frequency_response.measure import measure
 
-    known = _prepared(preparation, operating_point, remove_means)
-
-    def found() -> Results:
-        if frequency_response:
-            return measure(build_measurement(spec), _paths(data), known)
-        return identify_records(build_identification(spec), _paths(data), known)
-
+    known, files = _prepared(preparation, operating_point, remove_means), _paths(data)
     with _placed(spec):
-        return finite(found(), most_extreme(spec.content))
+        if frequency_response:
+            found = measure(build_measurement(spec), files, known)
+        else:
+            found = identify_records(build_identification(spec), files, known)
+        return finite(found, most_extreme(spec.content))
 
 
 def assess(
@@ -142,7 +163,7 @@ def assess(
 
 
 def next_round(spec: Spec, past: Past) -> Decision:
-    """What comes next in a campaign after what has been done: the next part, or the end.
+    """Return what comes next in a campaign after what has been done: the next part, or the end.
 
     Raises:
         SpecError: the spec has no campaign, or one that this version cannot do.
@@ -159,11 +180,7 @@ def next_round(spec: Spec, past: Past) -> Decision:
 
 
 def recorded_part(spec: Spec, path: Path, preparation: Preparation) -> Part:
-    """A record of a part of a campaign, as it is kept.
-
-    Raises:
-        DataError: the file cannot be used.
-    """
+    """Return a record of a part of a campaign, as it is kept; `DataError` if it cannot be used."""
     from inputdesign_cli.questions.campaign.build import build_rounds
     from inputdesign_cli.questions.campaign.rounds import read_part
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.text_formats import plain
 
 # Numbers of a spec within this many powers of ten of one are not to blame.
 _USUAL = 6.0
@@ -49,7 +48,7 @@ def finite(results: Results, extreme: tuple[str, float]) -> Results:
         InaccurateError: `beyond-precision`.
     """
     try:
-        plain(results.result)
+        _ = results.result
     except ValueError as error:
         raise _beyond(extreme, str(error)) from error
     for name, table in results.tables.items():

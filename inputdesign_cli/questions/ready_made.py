@@ -26,27 +26,16 @@ _USUAL = 1000
 
 @dataclass(frozen=True)
 class ReadyMade:
-    """The signal that is asked for.
-
-    Attributes:
-        kind: the name of a kind of signal.
-        bits: of the register of a prbs; None: enough for the samples without repetition.
-        number: lines of a multisine, levels of steps.
-        band: in rad per time unit; None: all frequencies.
-        samples: None: one period, or 1000.
-        levels: least and largest value of each input.
-        hold: samples for which each value stands.
-        periods: equal ones.
-    """
+    """The signal that is asked for."""
 
     kind: str
-    bits: int | None = None
-    number: int | None = None
-    band: tuple[float, float] | None = None
-    samples: int | None = None
-    levels: tuple[tuple[float, float], ...] = ((-1.0, 1.0),)
-    hold: int = 1
-    periods: int = 1
+    bits: int | None = None  # of the register of a prbs; None: enough for the samples without repetition
+    number: int | None = None  # lines of a multisine, levels of steps
+    band: tuple[float, float] | None = None  # in rad per time unit; None: all frequencies
+    samples: int | None = None  # None: one period, or 1000
+    levels: tuple[tuple[float, float], ...] = ((-1.0, 1.0),)  # least and largest value of each input
+    hold: int = 1  # samples for which each value stands
+    periods: int = 1  # equal ones
     odd: bool = False
     seed: int = 0
     sample_time: float = 1.0
@@ -155,21 +144,13 @@ def _check_apart(u: Array, asked: ReadyMade) -> None:
 
 def _check_turns(asked: ReadyMade, samples: int) -> None:
     """Raise `SpecError` (`bad-period`) where a chirp would not turn once, and so not cover its range."""
-    lo, hi = _band(asked)
-    turn = math.ceil(4.0 * math.pi / (lo + hi))
+    turn = math.ceil(4.0 * math.pi / sum(_band(asked)))
     if samples >= turn:
         return
-    most = SIZES["samples of a ready-made signal"].most
-    hint = f"write --samples {turn} or more"
-    if turn > most:
-        least = 4.0 * math.pi / most / asked.sample_time
-        ends = f"{least:.3g} rad/{asked.time_unit}"
-        hint = f"write a band whose ends sum to {ends} or more, or a longer --sample-time"
     raise bad_spec(
         "bad-period",
-        f"over {samples} samples the chirp makes less than one turn, so that it neither covers its range nor "
-        "excites its band",
-        hint=hint,
+        f"over {samples} samples the chirp makes less than one turn, so that it does not excite its band",
+        hint=f"write --samples {turn} or more, a wider band or a longer --sample-time",
     )
 
 

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import io
 import struct
-import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.records.preparation import Preparation
-from inputdesign_cli.records.sheet import Sheet, unreadable
-from inputdesign_cli.records.text import is_number, sheet_of, written_out
+from inputdesign_cli.records.sheet import Source
 
 MOST_UNPACKED = 2**30
-_MOST_DENSE = 10_000_000
-_NUMPY = "write it with numpy.savez(file, u=.., y=..)"
 _MATLAB = (
     "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  then: "
     "save('data.mat', '-struct', 's', '-v7')"
@@ -33,42 +26,11 @@ _PLAIN, _ARRAY, _COMPRESSED = {*range(1, 8), 9, 12, 13, 16, 17, 18}, 14, 15
 _DEEPEST = 30
 
 
-def check_unpacked(path: Path, key: str, raw: bytes) -> None:
-    """Raise `DataError` (`data-unreadable`) for an archive that unpacks to too much."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-    except Exception:  # its reader says what is wrong with a broken one
-        return
-    if size > MOST_UNPACKED:
-        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
-
-
-def read_npz(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
-    """Return the arrays of an .npz file by their names, or only the one that is `named`.
+def arrays_of_mat(source: Source, raw: bytes) -> dict[str, Any]:
+    """Return the variables of a .mat file.
 
     Raises:
         DataError: `data-unreadable`.
-    """
-    check_unpacked(path, key, raw)
-    arrays: dict[str, Any] = {}
-    try:
-        with np.load(io.BytesIO(raw), allow_pickle=False) as found:
-            for name in found.files:
-                try:
-                    arrays[name] = found[name]
-                except ValueError:  # objects of Python are never unpickled
-                    arrays[name] = np.array([None])
-    except Exception:  # a broken archive makes its reader raise anything
-        raise unreadable(path, key, "is no .npz file of numbers", _NUMPY) from None
-    return _sheet(path, key, arrays, named, given, _NUMPY)
-
-
-def read_mat(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
-    """Return the arrays of a .mat file, or the signals of an iddata that was saved as a struct.
-
-    Raises:
-        DataError: `data-unreadable`; of an object that only MATLAB reads, with the lines that convert it.
     """
     import warnings
 
@@ -82,12 +44,10 @@ def read_mat(path: Path, key: str, raw: bytes, named: str, given: Preparation) -
             found = scipy.io.loadmat(io.BytesIO(raw), simplify_cells=True)
     except NotImplementedError:
         hint = "in MATLAB: save('data.mat', 'u', 'y', '-v7')"
-        raise unreadable(path, key, "is a .mat file of version 7.3", hint) from None
+        raise source.unreadable("is a .mat file of version 7.3", hint) from None
     except Exception:  # a broken file makes its reader raise anything
-        raise unreadable(path, key, "is no .mat file that can be read", "save it in MATLAB anew") from None
-    return _sheet(
-        path, key, {name: x for name, x in found.items() if name[:2] != "__"}, named, given, _MATLAB
-    )
+        raise source.unreadable("is no .mat file that can be read", "save it in MATLAB anew") from None
+    return {name: value for name, value in found.items() if name[:2] != "__"}
 
 
 def _check_elements(data: bytes, order: str, most: int, depth: int = 0) -> int:
@@ -114,62 +74,56 @@ def _check_elements(data: bytes, order: str, most: int, depth: int = 0) -> int:
     return most
 
 
-def _sheet(
-    path: Path, key: str, values: Mapping[str, Any], named: str, given: Preparation, hint: str
-) -> Sheet:
-    """The columns in named values, or in the one that is `named`; fields of structs have their own names."""
+def columns_of_arrays(
+    source: Source, values: Mapping[str, Any], named: str
+) -> tuple[list[str], list[NDArray], float | None, str | None]:
+    """Return names and columns of variables or of the `named` one, their sample time and unit, if stated.
+
+    Fields of structs have their own names.
+
+    Raises:
+        DataError: `data-unreadable`; of an object that only MATLAB reads, with the lines that convert it.
+    """
     if named and named not in values:
-        raise unreadable(path, key, "has no such variable", f"it holds {', '.join(values)}")
+        raise source.unreadable("has no such variable", f"it holds {', '.join(values)}")
     arrays: dict[str, tuple[str, NDArray]] = {}
-    left_out: dict[str, str] = {}
-    steps: list[float] = []
-    units: list[str] = []
+    left_out, steps, units = list[str](), set[float](), list[str]()
     for owner, value in values.items():
         for name, array in _flat(owner, value) if named in ("", owner) else ():
             wrong = _wrong(array)
             if wrong == "text" and array.size == 1 and name.lower() in _TIME_UNITS:
                 units.append(str(array.item()))
             elif array.size == 1 and name.lower() in _SAMPLE_TIMES:
-                text = str(array.item())
-                steps.append(float(text) if array.dtype.kind in "fiuSU" and is_number(text) else np.nan)
+                steps.add(float(array.item()) if array.dtype.kind in "fiu" else np.nan)
             elif wrong or array.size == 1:
-                left_out[name] = wrong or "a single number"
+                left_out.append(f"{name} holds {wrong or 'a single number'}")
             elif name in arrays and not np.array_equal(arrays[name][1], array):
                 what = f"holds {arrays[name][0]} and {owner}, each with a {name} of its own"
-                file = path.name.partition("#")[0]
-                raise unreadable(path, key, what, f"name one: '{file}#{arrays[name][0]}' or '{file}#{owner}'")
+                file = source.path.name.partition("#")[0]
+                raise source.unreadable(what, f"name one: '{file}#{arrays[name][0]}' or '{file}#{owner}'")
             else:
                 arrays[name] = owner, array
-    if len({*steps}) > 1 or not all(0.0 < step < np.inf for step in steps):
+    if len(steps) > 1 or not all(0.0 < step < np.inf for step in steps):
         stated = " and ".join(f"{step:g}" for step in steps)
-        raise unreadable(path, key, f"states the sample time {stated}", "keep one, a positive number")
-    held = "; ".join(f"{name} holds {what}" for name, what in list(left_out.items())[:5])
+        raise source.unreadable(f"states the sample time {stated}", "keep one, a positive number")
     if not arrays:
-        raise unreadable(path, key, f"holds no arrays of numbers{f' ({held})' if held else ''}", hint)
+        held = f" ({'; '.join(left_out[:5])})" if left_out else ""
+        raise source.unreadable(f"holds no arrays of numbers{held}", _MATLAB)
     names: list[str] = []
-    columns: list[list[str]] = []
+    columns: list[NDArray] = []
     for name, (_, array) in arrays.items():
-        wide = array[:, None] if array.ndim == 1 else array
-        wide = wide.T if wide.shape[0] == 1 else wide
-        names += [name if wide.shape[1] == 1 else f"{name}{i + 1}" for i in range(wide.shape[1])]
-        columns += [written_out(x) for x in wide.T]
-    if len({len(column) for column in columns}) > 1:
-        shapes = ", ".join(
-            f"{name} {' x '.join(map(str, array.shape))}" for name, (_, array) in arrays.items()
-        )
+        rows = array[:, None] if array.ndim == 1 else array.T if array.shape[0] == 1 else array
+        names += [name if rows.shape[1] == 1 else f"{name}{i + 1}" for i in range(rows.shape[1])]
+        columns += list(rows.T)
+    if len({*map(len, columns)}) > 1:
+        shapes = ", ".join(f"{name} {' x '.join(map(str, one.shape))}" for name, (_, one) in arrays.items())
         more = "keep the signals of one experiment in a file, all of one length, a sample in each row"
-        raise unreadable(path, key, f"holds arrays of different lengths ({shapes})", more)
-    rows = [(line, list(row)) for line, row in enumerate(zip(*columns, strict=True), start=1)]
-    sheet = sheet_of(path, key, (1, ", ".join(names)), names, rows, replace(given, decimal="."))
-    step, unit = steps[0] if steps else None, units[0] if units else None
-    return replace(sheet, texts=(), sample_time=step, time_unit=unit)
+        raise source.unreadable(f"holds arrays of different lengths ({shapes})", more)
+    return names, columns, next(iter(steps), None), next(iter(units), None)
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, NDArray]]:
     """Yield the arrays in a value by name; a struct gives the arrays of its fields by their names."""
-    if hasattr(value, "toarray"):
-        value.check_format(full_check=True)
-        value = value.toarray() if value.shape[0] * value.shape[1] <= _MOST_DENSE else [None]
     if not isinstance(value, Mapping):
         array = np.asarray(value) if not isinstance(value, list) else np.empty(len(value), dtype=object)
         if isinstance(value, list):
@@ -194,11 +148,7 @@ def _wrong(array: NDArray) -> str:
         return "text"
     if kind == "O":
         several = any(np.size(item) > 1 for item in array.ravel())
-        return (
-            f"cells, as of several experiments (in MATLAB: getexp(data, 1)), or an object ({_MATLAB})"
-            * several
-            or "objects"
-        )
+        return f"cells, as of several experiments, or an object ({_MATLAB})" if several else "objects"
     if kind not in "fiubmM":
         return "complex numbers" if kind == "c" else f"numbers of the kind {array.dtype}"
     return f"an array of {array.ndim} dimensions" if array.ndim > 2 else ""

@@ -22,15 +22,15 @@ _CHANNELS = {
 # What separates entries of the option, or quotes it.
 _SEPARATORS = frozenset(',="')
 TIME_UNITS = tuple(SECONDS)
-_UNITS = {
-    **{unit: unit for unit in TIME_UNITS},
-    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
-    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
-    **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
-    **dict.fromkeys(("mins", "minute", "minutes"), "min"),
-    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
-    **dict.fromkeys(("day", "days"), "d"),
+_SPELLINGS = {
+    "s": "sec secs second seconds",
+    "ms": "msec millisecond milliseconds",
+    "us": "usec microsecond microseconds",
+    "min": "mins minute minutes",
+    "h": "hr hrs hour hours",
+    "d": "day days",
 }
+_UNITS = {one: unit for unit in TIME_UNITS for one in (unit, *_SPELLINGS.get(unit, "").split())}
 _TIME = re.compile(
     r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
 )
@@ -42,7 +42,6 @@ _CLOCK = re.compile(
 _SHORT = re.compile(
     r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
 )
-_MOSTLY = 0.9
 # Words that make it likely that a column holds the input, the output or the reference: first those of control
 # systems, which decide. They are proposed, and never taken unasked.
 _WORDS: tuple[dict[str, str], ...] = (
@@ -79,27 +78,25 @@ def time_columns(sheet: Sheet) -> list[str]:
     If no name is one of times, columns that are called as clocks are and rise, or hold dates or times of day.
     At last columns whose dates cannot be read: to do without them would be to guess.
     """
-    header, columns = sheet.header, sheet.columns
-    called = [(header[i] if i < len(header) and header[i] else str(i + 1)) for i in range(len(columns))]
-    rises = [_mostly(column.numbers, rises=True) for column in columns]
-    changing = [column.dated and _mostly(column.numbers, rises=False) for column in columns]
-    every = list(zip(called, columns, rises, changing, strict=True))
+    header = sheet.header
+    every = [
+        (header[i] if i < len(header) and header[i] else str(i + 1), column, column.mostly(rises=True))
+        for i, column in enumerate(sheet.columns)
+    ]
     for found in (
-        [(n, c) for n, c, up, _ in every if _TIME.fullmatch(n) or (up and _SHORT.fullmatch(n))],
-        [(n, c) for n, c, up, dated in every if dated or (up and not c.dated and _CLOCK.fullmatch(n))],
-        [(n, c) for n, c, _, _ in every if c.undated],
+        [(n, c) for n, c, up in every if _TIME.fullmatch(n) or (up and _SHORT.fullmatch(n))],
+        [
+            (n, c)
+            for n, c, up in every
+            if (c.mostly(rises=False) if c.dated else up and _CLOCK.fullmatch(n) is not None)
+        ],
+        [(n, c) for n, c, _ in every if c.undated],
     ):
         if found:
             # Dates and times of day that were joined are the same column.
             once = [n for i, (n, c) in enumerate(found) if c is not found[i - 1][1] or i == 0]
             return [name for name in once if name.startswith("dat")] or once
     return []
-
-
-def _mostly(x: Array, *, rises: bool) -> bool:
-    """Return whether numbers rise from row to row, or at least change."""
-    steps = np.diff(x[~np.isnan(x)])
-    return bool(np.mean(steps > 0.0 if rises else steps != 0.0) > _MOSTLY) if steps.size else False
 
 
 def is_called_time(name: str) -> bool:
@@ -154,13 +151,12 @@ def _unclear(sheet: Sheet, what: str, missing: Sequence[str], wanted: Mapping[st
         start if role.startswith(start) else f"{start} ({role})"
         for role, start in zip(missing, starts, strict=True)
     ]
-    message = f"{sheet.path.name} has {what} for {', '.join(names)} ({_contents(sheet)})"
-    if starts == ["frequency"]:
-        return sheet.error("data-missing-column", message, "name a column frequency, or frequency_rad_per_s")
-    hint = f"name one column {' and one '.join(starts)}"
-    if not sheet.key:
+    hint = "name a column frequency, or frequency_rad_per_s"
+    if starts != ["frequency"]:
+        hint = f"name one column {' and one '.join(starts)}"
         kept = {role: name for role, name in wanted.items() if role not in missing}
-        hint += f", or say which it is: {columns_option(sheet, kept, missing)}"
+        hint += "" if sheet.source.key else f", or say which it is: {columns_option(sheet, kept, missing)}"
+    message = f"{sheet.path.name} has {what} for {', '.join(names)} ({_contents(sheet)})"
     return sheet.error("data-missing-column", message, hint)
 
 
@@ -175,36 +171,67 @@ def column_named(sheet: Sheet, name: str) -> Column:
     return sheet.columns[named_columns(sheet, name.strip().lower())[0]]
 
 
-def channel_columns(letter: str, count: int, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
-    """Return channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user says.
+def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
+    """Return the columns that are named and, of inputs or outputs if none is named, those called u, y1, ..
 
     Raises:
-        DataError: `data-missing-column`, a single channel has a column of either name.
+        DataError: `data-missing-column`, several may be the same one.
     """
-    if count > 1 or f"{letter}1" in columns:
-        channels = [f"{letter}{i + 1}" for i in range(count)]
-        return {channel: columns.get(channel, channel) for channel in channels}
-    plain, numbered = (
-        [header for header in sheet.header if re.match(rf"{start}(?![a-z0-9])", header)]
-        for start in (letter, f"{letter}1")
+    found: dict[str, str] = {}
+    for letter, pattern in _CHANNELS.items():
+        every: dict[str, list[str]] = {}
+        for name in sheet.header:
+            matched = pattern.fullmatch(name)
+            if matched and not any(other.startswith(letter) for other in named):
+                every.setdefault(f"{letter}{matched[2] or 1}", []).append(name)
+        for role, names in every.items():
+            exact = [name for name in names if name in (role, letter)] or names
+            if len(exact) > 1:
+                message = f"{sheet.path.name} has several columns that may be {role}: {', '.join(exact)}"
+                hint = f"say which one counts: --columns {role}={exact[0]}"
+                raise sheet.error("data-missing-column", message, hint)
+            found[role] = exact[0]
+    return {**found, **named}
+
+
+def roles_of(sheet: Sheet, named: Mapping[str, str], units: Units | None = None) -> dict[str, str]:
+    """Return role -> column: of the channels of a plant, or of what a log calls u, y1, r, time, ..
+
+    Args:
+        named: the columns that the user names, by role.
+
+    Raises:
+        DataError: `data-missing-column`, it is not clear which column has a role.
+    """
+    channels = {} if units is None else units.channels
+    for channel, (name, _) in channels.items():
+        same = [header for header in sheet.names if name_and_unit(header)[0].lower() == name.lower()]
+        taken = any(re.match(rf"{channel[0]}\d*(?![a-z0-9])", header) for header in sheet.header)
+        if name and len(same) == 1 and not taken:
+            named = {channel: same[0], **named}
+    columns = _whole(sheet, with_channels(sheet, named))
+    counts = (
+        [_count(letter, sheet, columns) for letter in "uy"]
+        if units is None
+        else [units.inputs, units.outputs]
     )
-    if plain and numbered:
-        listed = ", ".join([*plain, *numbered])
-        message = f"{sheet.path.name} has several columns that may be {letter}1: {listed}"
-        hint = f"say which one counts: --columns {letter}1={plain[0]}"
-        raise sheet.error("data-missing-column", message, hint)
-    begun = any(header.startswith(f"{letter}1") for header in sheet.header)
-    return {f"{letter}1": f"{letter}1" if begun else letter}
+    wanted = [role for letter, n in zip("uy", counts, strict=True) for role in _of(letter, n)]
+    found = {role: columns.get(role, role) for role in wanted}
+    references = _references(sheet, columns, counts[0]) if units is None or units.closed_loop else {}
+    unasked = units is None and not references.keys() & columns.keys()
+    own = [column_named(sheet, name) for name in references.values()] if unasked else []
+    usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
+    return found | (references if usable else {}) | _time(sheet, columns)
 
 
-def time_column(sheet: Sheet, columns: Mapping[str, str]) -> str:
-    """Return the name of the column of times; empty without one, or if the user says `time=none`.
+def _of(letter: str, count: int) -> list[str]:
+    return [f"{letter}{i + 1}" for i in range(count)]
 
-    Raises:
-        DataError: `data-missing-column`, there are several.
-    """
+
+def _time(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+    """Return `time` -> its column; nothing without one, or if the user says `time=none`."""
     if "time" in columns:
-        return "" if without_times(sheet, columns) else columns["time"]
+        return {} if without_times(sheet, columns) else {"time": columns["time"]}
     claimed = {column.strip().lower() for column in columns.values()}
     timed = [name for name in time_columns(sheet) if name not in claimed]
     if len(timed) > 1:
@@ -212,7 +239,7 @@ def time_column(sheet: Sheet, columns: Mapping[str, str]) -> str:
         message = f"{sheet.path.name} has several columns of times: {', '.join(timed)}"
         hint = f"say which one counts: --columns time={which}"
         raise sheet.error("data-missing-column", message, hint)
-    return timed[0] if timed else ""
+    return {"time": timed[0]} if timed else {}
 
 
 def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
@@ -220,19 +247,9 @@ def without_times(sheet: Sheet, columns: Mapping[str, str]) -> bool:
     return columns.get("time", "").strip().lower() == NO_TIMES and NO_TIMES not in sheet.header
 
 
-def reference_columns(
-    inputs: int, sheet: Sheet, columns: Mapping[str, str], *, clean: bool
-) -> dict[str, str]:
-    """Return `r1` -> the column of the reference that is added to an input, if every input has one.
-
-    Args:
-        columns: the columns that the user names, by channel.
-        clean: whether columns that nobody names count only if they hold numbers alone.
-
-    Raises:
-        DataError: `data-missing-column`, only some are named.
-    """
-    channels = [f"r{i + 1}" for i in range(inputs)]
+def _references(sheet: Sheet, columns: Mapping[str, str], inputs: int) -> dict[str, str]:
+    """Return `r1` -> the column of the reference that is added to an input, if every input has one."""
+    channels = _of("r", inputs)
     found = {name: columns.get(name, name) for name in channels if name in columns or name in sheet.header}
     if inputs == 1 and not found and "r" in sheet.header:
         found = {"r1": "r"}
@@ -242,34 +259,10 @@ def reference_columns(
         message = f"--columns names {', '.join(named)}, and {sheet.path.name} has no column for {missing}"
         hint = f"name the reference of every input, or none: --columns {missing}=NAME"
         raise sheet.error("data-missing-column", message, hint)
-    own = [column_named(sheet, name) for name in found.values()] if clean and not named else []
-    usable = all(one.fault is None and not np.isnan(one.numbers).any() for one in own)
-    return found if len(found) == inputs and usable else {}
+    return found if len(found) == inputs else {}
 
 
-def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
-    """Return the columns that are named and, of inputs or outputs if none is named, those called u, y1, .."""
-    found = {}
-    for letter, pattern in _CHANNELS.items():
-        for name in sheet.header:
-            matched = pattern.fullmatch(name)
-            if matched and not any(other.startswith(letter) for other in named):
-                found[f"{letter}{matched[2] or 1}"] = name
-    return {**found, **named}
-
-
-def with_names_of(units: Units, sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
-    """Return the named columns, and the columns that have the name of a channel in the spec."""
-    found = {}
-    for channel, (name, _) in units.channels.items():
-        same = [header for header in sheet.names if name_and_unit(header)[0].lower() == name.lower()]
-        taken = any(re.match(rf"{channel[0]}\d*(?![a-z0-9])", header) for header in sheet.header)
-        if name and len(same) == 1 and not taken:
-            found[channel] = same[0]
-    return {**found, **columns}
-
-
-def with_headers(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
+def _whole(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
     """Return named columns by their whole names, which state units."""
     whole = {}
     for channel, column in columns.items():
@@ -280,26 +273,21 @@ def with_headers(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, str]:
     return whole
 
 
-def count_of(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
-    """Return how many inputs or outputs are named; they are numbered from one on.
-
-    Raises:
-        DataError: `data-missing-column`, there is none, or a number is left out.
-    """
+def _count(letter: str, sheet: Sheet, columns: Mapping[str, str]) -> int:
+    """Return how many inputs or outputs are named; they are numbered from one on."""
     named = [name for name in columns if name.startswith(letter)]
-    if named and set(named) == {f"{letter}{i + 1}" for i in range(len(named))}:
+    if named and set(named) == set(_of(letter, len(named))):
         return len(named)
     what = "input" if letter == "u" else "output"
     message = f"which column of {sheet.path.name} is the {what}? ({_contents(sheet)})"
     if named:
         listed = ", ".join(sorted(named))
         message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
-    first = [f"{x}{i + 1}" for x in "uy" for i in range(max(sum(name[0] == x for name in columns), 1))]
+    first = [role for x in "uy" for role in _of(x, max(sum(name[0] == x for name in columns), 1))]
     kept = {channel: name for channel, name in columns.items() if channel in ("time", *first)}
     option = columns_option(sheet, kept, [channel for channel in first if channel not in columns])
-    raise sheet.error(
-        "data-missing-column", message, f"name them, or give their numbers, for example {option}"
-    )
+    hint = f"name them, or give their numbers, for example {option}"
+    raise sheet.error("data-missing-column", message, hint)
 
 
 def columns_option(sheet: Sheet, named: Mapping[str, str], wanted: Sequence[str]) -> str:

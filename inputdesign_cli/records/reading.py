@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+import zipfile
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from inputdesign_cli.errors import STANDARD_STREAM, DataError
-from inputdesign_cli.records.arrays import MOST_UNPACKED, check_unpacked, read_mat, read_npz
-from inputdesign_cli.records.moments import with_days
+from inputdesign_cli.records.arrays import MOST_UNPACKED, arrays_of_mat, columns_of_arrays
+from inputdesign_cli.records.cells import with_days
 from inputdesign_cli.records.preparation import Preparation
-from inputdesign_cli.records.sheet import Sheet, unreadable
-from inputdesign_cli.records.text import decoded, read_text, sheet_of, written_out
+from inputdesign_cli.records.sheet import Sheet, Source
+from inputdesign_cli.records.text import decoded, sheet_of, table_in
 from inputdesign_cli.regular_file import read_regular
 
 _MOST_BYTES = 100 * 2**20
-PARQUET = (".parquet", ".pq")
-EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
+_PARQUET = (".parquet", ".pq")
+_EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
 _OF_VARIABLES = (".mat", ".npz")
 
 
@@ -33,30 +38,32 @@ def read_sheet(path: Path, *, key: str = "", preparation: Preparation | None = N
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
-    return with_days(_read(path, key, preparation or Preparation()))
+    return with_days(_read(Source(path, key, preparation or Preparation())))
 
 
-def _read(path: Path, key: str, given: Preparation) -> Sheet:
+def _read(source: Source) -> Sheet:
+    path = source.path
     file, _, named = path.name.partition("#")
     kind = Path(file).suffix.lower()
-    if kind not in (*EXCEL, *_OF_VARIABLES):  # only their sheets and variables have names
+    if kind not in (*_EXCEL, *_OF_VARIABLES):  # only their sheets and variables have names
         kind, named = path.suffix.lower(), ""
-    raw = _bytes(path.with_name(file) if named else path, key)
+    raw = _bytes(source, path.with_name(file) if named else path)
     if len(raw) > _MOST_BYTES:
-        raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
-    if kind == ".npz":  # an archive itself
-        return read_npz(path, key, raw, named, given)
-    if kind == ".mat":
-        return read_mat(path, key, raw, named, given)
-    if kind in PARQUET:
-        return _read_parquet(path, key, raw, given)
-    if kind in EXCEL:
-        check_unpacked(path, key, raw)
-        return _read_workbook(path, key, raw, named, given)
-    return read_text(path, key, decoded(path, key, raw), given)
+        raise source.unreadable("is larger than 100 MiB", "keep the rows and columns that are needed")
+    if kind in (*_EXCEL, ".npz"):
+        _check_unpacked(source, raw)
+    if kind in _OF_VARIABLES:
+        values = _arrays_of_npz(source, raw) if kind == ".npz" else arrays_of_mat(source, raw)
+        names, columns, step, unit = columns_of_arrays(source, values, named)
+        sheet = _of_columns(source, names, columns)
+        return replace(sheet, texts=(), sample_time=step, time_unit=unit)
+    if kind in _PARQUET:
+        frame = _loaded(source, "a parquet file", lambda pandas: _frame(pandas, source, raw))
+        return _of_columns(source, list(map(str, frame)), [frame[name].to_numpy() for name in frame])
+    return _workbook(source, raw, named) if kind in _EXCEL else table_in(source, decoded(source, raw))
 
 
-def _bytes(path: Path, key: str) -> bytes:
+def _bytes(source: Source, path: Path) -> bytes:
     try:
         return read_regular(path, _MOST_BYTES + 1)
     except FileNotFoundError:
@@ -64,50 +71,65 @@ def _bytes(path: Path, key: str) -> bytes:
         if str(path) == STANDARD_STREAM:
             what += ": data are not read from standard input"
             hint = "write them to a file, whose ending shows its kind, and name that"
-        elif key:
+        elif source.key:
             hint = "paths are relative to the folder of the spec"
-        raise unreadable(path, key, what, hint) from None
     except IsADirectoryError:
-        raise unreadable(path, key, "is a folder", "name a CSV file") from None
+        what, hint = "is a folder", "name a CSV file"
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file") from None
+        what, hint = f"cannot be read: {reason}", "name a CSV file"
+    raise source.unreadable(what, hint)
 
 
-def _read_parquet(path: Path, key: str, raw: bytes, given: Preparation) -> Sheet:
-    """The columns of a parquet file, its index among them."""
-    frame = _loaded(path, key, "a parquet file", lambda pandas: _frame(pandas, path, key, raw))
-    names = [str(name) for name in frame]
-    rows = zip(*(written_out(frame[name].to_numpy()) for name in frame), strict=True)
-    body = [(line, list(row)) for line, row in enumerate(rows, start=1)]
-    return sheet_of(path, key, (1, ", ".join(names)), names, body, replace(given, decimal="."))
+def _check_unpacked(source: Source, raw: bytes) -> None:
+    """Raise `DataError` (`data-unreadable`) for an archive that unpacks to too much."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except Exception:  # its reader says what is wrong with a broken one
+        return
+    if size > MOST_UNPACKED:
+        raise source.unreadable("unpacks to more than 1 GiB", "keep the rows that are needed")
 
 
-def _read_workbook(path: Path, key: str, raw: bytes, named: str, given: Preparation) -> Sheet:
+def _arrays_of_npz(source: Source, raw: bytes) -> dict[str, Any]:
+    arrays: dict[str, Any] = {}
+    try:
+        with np.load(io.BytesIO(raw), allow_pickle=False) as found:
+            for name in found.files:
+                try:
+                    arrays[name] = found[name]
+                except ValueError:  # objects of Python are never unpickled
+                    arrays[name] = np.array([None])
+    except Exception:  # a broken archive makes its reader raise anything
+        hint = "write it with numpy.savez(file, u=.., y=..)"
+        raise source.unreadable("is no .npz file of numbers", hint) from None
+    return arrays
+
+
+def _workbook(source: Source, raw: bytes, named: str) -> Sheet:
     """The table in a sheet of a workbook, the first unless one is named; lines are its rows."""
     how = {"header": None, "sheet_name": None, "dtype": object}
-    frames = _loaded(path, key, "a workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), **how))
+    frames = _loaded(source, "a workbook", lambda pandas: pandas.read_excel(io.BytesIO(raw), **how))
     if named and named not in frames:
-        raise unreadable(path, key, "has no such sheet", f"the sheets are {', '.join(frames)}")
+        raise source.unreadable("has no such sheet", f"the sheets are {', '.join(frames)}")
     first, *others = frames
-    rows = map(written_out, frames[named or first].to_numpy(dtype=object))
-    stated = replace(given, separator="\t", decimal=".")
+    rows = map(_written, frames[named or first].to_numpy(dtype=object))
+    stated = replace(source, given=replace(source.given, separator="\t", decimal="."))
     try:
-        sheet = read_text(path, key, "\n".join(map("\t".join, rows)), stated)
+        sheet = table_in(stated, "\n".join(map("\t".join, rows)))
     except DataError as error:
-        also = (
-            f"; its sheets are {', '.join(frames)}: name one as '{path.name}#{others[0]}'" if others else ""
-        )
+        name = f"{source.path.name}#{others[0]}" if others else ""
+        also = f"; its sheets are {', '.join(frames)}: name one as '{name}'" if others else ""
         raise DataError([replace(one, hint=f"{one.hint}{also}") for one in error.diagnostics]) from None
     return replace(sheet, others=() if named else tuple(others))
 
 
-def _frame(pandas: Any, path: Path, key: str, raw: bytes) -> Any:
+def _frame(pandas: Any, source: Source, raw: bytes) -> Any:
     """The frame in a parquet file, with its index in columns before the others."""
     parquet = import_module("pyarrow.parquet").ParquetFile(io.BytesIO(raw))
-    names = parquet.schema_arrow.names
-    if 8 * parquet.metadata.num_rows * len(names) > MOST_UNPACKED:
-        raise unreadable(path, key, "unpacks to more than 1 GiB", "keep the rows that are needed")
+    if 8 * parquet.metadata.num_rows * len(parquet.schema_arrow.names) > MOST_UNPACKED:
+        raise source.unreadable("unpacks to more than 1 GiB", "keep the rows that are needed")
     frame = pandas.read_parquet(io.BytesIO(raw))
     if isinstance(frame.index, pandas.RangeIndex) and frame.index.name is None:
         return frame
@@ -116,15 +138,38 @@ def _frame(pandas: Any, path: Path, key: str, raw: bytes) -> Any:
     return frame.reset_index()
 
 
-def _loaded(path: Path, key: str, kind: str, load: Callable[[Any], Any]) -> Any:
+def _loaded(source: Source, kind: str, load: Callable[[Any], Any]) -> Any:
     import pandas
 
     try:
         return load(pandas)
     except ImportError:
         hint = 'install what reads it: pip install "inputdesign-cli[data]"; or save it as CSV'
-        raise unreadable(path, key, f"is {kind}, and what reads it is not installed", hint) from None
+        raise source.unreadable(f"is {kind}, and what reads it is not installed", hint) from None
     except DataError:
         raise
     except Exception:  # a broken file makes its reader raise anything
-        raise unreadable(path, key, f"is not {kind} that can be read", "save it as CSV") from None
+        raise source.unreadable(f"is not {kind} that can be read", "save it as CSV") from None
+
+
+def _of_columns(source: Source, names: Sequence[str], columns: Sequence[NDArray]) -> Sheet:
+    """The sheet of columns that a file has as such; their numbers have decimal points."""
+    rows = zip(*map(_written, columns), strict=True)
+    body = [(line, list(row)) for line, row in enumerate(rows, start=1)]
+    stated = replace(source, given=replace(source.given, decimal="."))
+    return sheet_of(stated, (1, ", ".join(names)), names, body)
+
+
+def _written(values: NDArray) -> list[str]:
+    """Return numbers, dates, lengths of time or text as cells of text, numbers with a decimal point."""
+    if values.dtype.kind == "m":
+        values = values / np.timedelta64(1, "s")
+    if values.dtype.kind in "fiub":
+        return [repr(value) for value in values.astype(float).tolist()]
+    return [_cell(value) for value in values]
+
+
+def _cell(value: object) -> str:
+    if value is None or str(value) in ("nan", "NaT", "<NA>"):
+        return ""
+    return repr(float(value)) if isinstance(value, Real) else " ".join(str(value).replace('"', " ").split())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -15,23 +15,14 @@ from inputdesign_cli.errors import DataError, Diagnostic, Location, bad_spec
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.other_systems import samples_repeated
 from inputdesign_cli.findings.places import Recorded, Samples
-from inputdesign_cli.findings.prepared_records import columns_against_spec, times_assumed, times_disagree
+from inputdesign_cli.findings.prepared_records import TIMES_ASSUMED, columns_against_spec
 from inputdesign_cli.identification import resolution_of
 from inputdesign_cli.outcome.units import Units
-from inputdesign_cli.records.columns import (
-    called,
-    count_of,
-    reference_columns,
-    rising,
-    with_channels,
-    with_headers,
-    with_names_of,
-    without_times,
-)
+from inputdesign_cli.records.columns import called, rising, roles_of, without_times
 from inputdesign_cli.records.preparation import Preparation
 from inputdesign_cli.records.reading import read_sheet
-from inputdesign_cli.records.segments import EVEN, SHORTEST, Segment, joined_rows, segments_of
-from inputdesign_cli.records.signals import Signals, signals_of, typical_step
+from inputdesign_cli.records.segments import EVEN, segments_of
+from inputdesign_cli.records.signals import SHORTEST, Signals, joined_rows, signals_of, typical_step
 from inputdesign_cli.specification.models.units import SECONDS
 
 # The sample time of a file may differ by this share from the one of the spec, or from the one that is stated.
@@ -112,15 +103,12 @@ def read_log(path: Path, preparation: Preparation) -> Record:
         DataError: the file cannot be read, or does not show its inputs and outputs.
     """
     sheet = read_sheet(path, preparation=preparation)
-    columns = with_headers(sheet, with_channels(sheet, preparation.columns))
-    inputs, outputs = (count_of(letter, sheet, columns) for letter in "uy")
-    references = reference_columns(inputs, sheet, columns, clean=True)
-    given = replace(preparation, columns=columns)
-    signals = joined_rows(signals_of(sheet, inputs, outputs, given, references), resample=given.resample)
-    step, found = _step_of(signals, given)
-    record = _record(signals, step, signals.unit or "s", given, inputs, found)
-    named = {channel: column for channel, column in columns.items() if channel != "time" or signals.name}
-    return replace(record, names=named)
+    roles = roles_of(sheet, preparation.columns)
+    signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
+    step = _step_of(signals, preparation.sample_time, resample=preparation.resample)
+    found = [_assumed(signals, preparation)] if step is None else []
+    record = _record(signals, step or 1.0, signals.unit or "s", preparation, roles, found)
+    return replace(record, names=roles)
 
 
 def read_logs(paths: Sequence[Path], preparation: Preparation) -> Record:
@@ -168,13 +156,11 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
 def _read(path: Path, units: Units, preparation: Preparation) -> Record:
     """Read one file for a plant."""
     sheet = read_sheet(path, preparation=preparation)
-    columns = with_names_of(units, sheet, with_headers(sheet, preparation.columns))
-    given = replace(preparation, columns=columns)
-    references = reference_columns(units.inputs, sheet, columns, clean=False) if units.closed_loop else {}
-    signals = signals_of(sheet, units.inputs, units.outputs, given, references)
-    signals = _in_step(joined_rows(signals, resample=given.resample), units, preparation)
-    found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, columns)
-    return _record(signals, units.sample_time, units.time_unit, given, units.inputs, found)
+    roles = roles_of(sheet, preparation.columns, units)
+    signals = joined_rows(signals_of(sheet, roles, preparation), resample=preparation.resample)
+    found = columns_against_spec(sheet.names, units.channels, units.inputs, units.outputs, roles)
+    in_step = _in_step(signals, units, preparation)
+    return _record(in_step, units.sample_time, units.time_unit, preparation, roles, found)
 
 
 def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
@@ -183,11 +169,7 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
     labels = [path.name if counts[path.name] == 1 else str(path) for path in paths]
     recorded = [one.recorded for one in records if one.recorded is not None]
     references = [one.r for one in records if one.r is not None]
-    findings = [
-        (path.name, found) for path, one in zip(paths, records, strict=True) for found in one.findings
-    ]
-    if len(paths) > 1:
-        findings = [(name, replace(found, message=f"{name}: {found.message}")) for name, found in findings]
+    begin = [f"{path.name}: " if len(paths) > 1 else "" for path in paths]
     return replace(
         records[0],
         u=np.concatenate([one.u for one in records]),
@@ -196,7 +178,11 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
         time=np.concatenate([one.time for one in records]),
         lengths=tuple(length for one in records for length in one.lengths),
         files=tuple((label, len(one.y)) for label, one in zip(labels, records, strict=True)),
-        findings=tuple(found for _, found in findings),
+        findings=tuple(
+            replace(found, message=f"{name}{found.message}")
+            for name, one in zip(begin, records, strict=True)
+            for found in one.findings
+        ),
         means=np.average([one.means for one in records], axis=0, weights=[len(one.u) for one in records]),
         recorded=Recorded(
             np.concatenate([one.values for one in recorded]),
@@ -210,76 +196,89 @@ def _together(paths: Sequence[Path], records: Sequence[Record]) -> Record:
 
 
 def _record(
-    signals: Signals, step: float, unit: str, preparation: Preparation, r: int, found: Iterable[Finding]
+    signals: Signals,
+    step: float,
+    unit: str,
+    preparation: Preparation,
+    roles: Mapping[str, str],
+    found: Iterable[Finding],
 ) -> Record:
-    """The record in the signals of one file, of which the first `r` are inputs."""
+    """The record in the signals of one file, whose references follow the inputs."""
+    r = sum(role.startswith("u") for role in roles)
     segments, done = segments_of(signals, step, unit, preparation)
-    inputs = np.concatenate([part.u for part in segments])
+    times, u, y = (np.concatenate(part) for part in zip(*segments, strict=True))
+    lengths = tuple(len(part.y) for part in segments)
+    # The signals of the file at the samples of the segments.
+    stamped = np.flatnonzero(~np.isnan(signals.time))
+    stamps = signals.time[stamped] * (1.0 if signals.name else step)
+    at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
+    logged = signals.y[at]
+    held = np.concatenate([np.zeros_like(logged[:1], dtype=bool), logged[1:] == logged[:-1]])
+    held[np.cumsum([0, *lengths])[:-1]] = False
     return Record(
-        inputs[:, :r],
-        np.concatenate([part.y for part in segments]),
-        inputs[:, r:] if inputs.shape[1] > r else None,
-        np.concatenate([part.time for part in segments]),
-        tuple(len(part.y) for part in segments),
-        ((signals.sheet.path.name, len(inputs)),),
-        _recorded(signals, step, segments, r),
+        u[:, :r],
+        y,
+        u[:, r:] if u.shape[1] > r else None,
+        times,
+        lengths,
+        ((signals.sheet.path.name, len(u)),),
+        Recorded(
+            np.column_stack([signals.u[at, :r], logged]),
+            signals.sheet.lines[at],
+            held,
+            resolution_of(signals.y),
+        ),
         step=step,
         time_unit=unit,
         findings=(*signals.findings, *done, *found),
         header=tuple(signals.sheet.header),
         means=np.nanmean(signals.u[:, :r], axis=0),
-        lined=any(part.lined for part in segments),
+        lined=any(one.where.startswith("y") and one.figures.get("line") for one in done),
     )
 
 
-def _recorded(signals: Signals, step: float, segments: Sequence[Segment], r: int) -> Recorded:
-    """The signals of the file at the samples of the segments, `step` apart."""
-    stamped = np.flatnonzero(~np.isnan(signals.time))
-    stamps = signals.time[stamped] * (1.0 if signals.name else step)
-    times = np.concatenate([part.time for part in segments])
-    at = stamped[np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)]
-    values = np.column_stack([signals.u[:, :r], signals.y])[at]
-    y, begins = values[:, r:], np.cumsum([0, *(len(part.time) for part in segments)])[:-1]
-    held = np.concatenate([np.zeros_like(y[:1], dtype=bool), y[1:] == y[:-1]])
-    held[begins] = False
-    return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
+def _step_of(signals: Signals, stated: float | None, *, resample: bool) -> float | None:
+    """The sample time by the option, the times or the file; None if nothing says it.
+
+    Raises:
+        DataError: `data-not-uniform`, times advance by something else than the user states.
+    """
+    apart = typical_step(signals.time) if signals.name else np.nan
+    if stated is None:
+        return apart if np.isfinite(apart) else signals.sheet.sample_time
+    if abs(apart - stated) > _ALIKE * stated and not (resample and apart - stated <= _LONGER * stated):
+        message = (
+            f"times in column {signals.name} advance by {apart:.6g}, and --sample-time says {stated:.6g}"
+        )
+        hint = "leave --sample-time out; or mind --time-unit; or, if that column does not count, time=none"
+        raise signals.sheet.error("data-not-uniform", message, hint, 0)
+    return stated
 
 
-def _step_of(signals: Signals, preparation: Preparation) -> tuple[float, list[Finding]]:
-    """The sample time by the times, the option or the file; 1 if nothing says it."""
-    sheet, stated = signals.sheet, preparation.sample_time or signals.sheet.sample_time
-    if signals.name and not preparation.sample_time:
-        step = typical_step(signals.time)
-        if not np.isfinite(step):
-            message, hint = f"{sheet.path.name} has one time only", "give the sample time: --sample-time 0.5"
-            raise sheet.error("data-not-uniform", message, hint, 0)
-        if stated is not None and abs(step - stated) > _ROUND * stated:
-            return step, [times_disagree(stated, step)]
-        return step, []
-    if stated:
-        _check_stated(signals, stated, resample=preparation.resample)
-        return stated, []
-    if without_times(sheet, preparation.columns):
-        return 1.0, [times_assumed("No times are read", [])]
+def _assumed(signals: Signals, preparation: Preparation) -> Finding:
+    """Return the finding that the sample time is taken for 1, and which columns may hold times.
+
+    Raises:
+        DataError: `data-not-uniform`, there is one time only.
+    """
+    sheet = signals.sheet
+    if signals.name:
+        hint = "give the sample time: --sample-time 0.5"
+        raise sheet.error("data-not-uniform", f"{sheet.path.name} has one time only", hint, 0)
     taken = {column.strip().lower() for column in preparation.columns.values()}
     likely = [i for i, one in enumerate(sheet.columns) if one.dated or i in rising(sheet)]
     names = [called(sheet, i) for i in likely if taken.isdisjoint((sheet.name_of(i).lower(), str(i + 1)))]
-    return 1.0, [times_assumed("No column is called as times are", names)]
-
-
-def _check_stated(signals: Signals, step: float, *, resample: bool) -> None:
-    """Raise `DataError` (`data-not-uniform`) where times advance by something else than the user states."""
-    apart = typical_step(signals.time) if signals.name else step
-    if (apart - step > _ALIKE * step or step - apart > _ALIKE * step) and not (
-        resample and apart - step <= _LONGER * step
-    ):
-        message = f"times in column {signals.name} advance by {apart:.6g}, and --sample-time says {step:.6g}"
-        hint = "leave --sample-time out; or mind --time-unit; or, if that column does not count, time=none"
-        raise signals.sheet.error("data-not-uniform", message, hint, 0)
+    listed = [] if without_times(sheet, preparation.columns) else names
+    fact = f"perhaps times stand in {', '.join(listed)}" if listed else ""
+    return TIMES_ASSUMED.found(fact, columns=listed)
 
 
 def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signals:
-    """The signals with times in the unit of the spec."""
+    """The signals with times in the unit of the spec.
+
+    Raises:
+        DataError: `data-wrong-unit`; `data-not-uniform`, the sample time is another one.
+    """
     sheet, stated, scale = signals.sheet, preparation.sample_time, 1.0
     if signals.unit and (signals.name or preparation.time_unit):
         scale = SECONDS[signals.unit] / SECONDS[units.time_unit]
@@ -289,18 +288,15 @@ def _in_step(signals: Signals, units: Units, preparation: Preparation) -> Signal
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     signals = replace(signals, time=signals.time * scale) if signals.name else signals
-    steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
-    stated = stated or (None if steps.size else sheet.sample_time)
-    if stated is not None:
-        stated *= scale if preparation.time_unit else 1.0
-        _check_stated(signals, stated, resample=preparation.resample)
-    typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
-    if abs(typical - units.sample_time) <= (EVEN if stated else _ALIKE) * units.sample_time:
+    stated = stated or (None if signals.name else sheet.sample_time)
+    stated = stated and stated * (scale if preparation.time_unit else 1.0)
+    step = _step_of(signals, stated, resample=preparation.resample) or units.sample_time
+    if abs(step - units.sample_time) <= (EVEN if stated else _ALIKE) * units.sample_time:
         return signals
     default = " (as it is where none is stated)" if units.sample_time == 1.0 else ""
-    said = f"the data are sampled every {typical:.6g} {units.time_unit}, but sample_time is "
+    said = f"the data are sampled every {step:.6g} {units.time_unit}, but sample_time is "
     message = f"{said}{units.sample_time:g} {units.time_unit}{default}"
-    hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
+    hint = f"if that is right, set sample_time: {step:.6g} and design anew"
     place = Location(str(sheet.path), int(sheet.lines[min(1, len(sheet.lines) - 1)]), 1)
-    details = {"data_sample_time": typical}
+    details = {"data_sample_time": step}
     raise DataError(Diagnostic("data-not-uniform", message, hint, "sample_time", place, details))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +11,26 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Diagnostic, Location
+from inputdesign_cli.records.preparation import Preparation
 
 _PLAIN = (
     "write plain numbers like -1234.5: digits 0 to 9, a decimal point, nothing between thousands; leave "
     "a cell empty where there is no value, and write 1 and 0 for ON and OFF"
 )
+
+
+@dataclass(frozen=True)
+class Source:
+    """A data file, the key of the spec that names it, and how the user says that it is written."""
+
+    path: Path
+    key: str = ""
+    given: Preparation = field(default_factory=Preparation)
+
+    def unreadable(self, what: str, hint: str, line: int | None = None) -> DataError:
+        """Return the error about a file that cannot be read at all, or not from some line on."""
+        location = None if line is None else Location(str(self.path), line, 1)
+        return DataError.because("data-unreadable", f"the file {self.path} {what}", hint, self.key, location)
 
 
 @dataclass(frozen=True)
@@ -41,34 +56,42 @@ class Column:
     undated: bool = False
     done: tuple[str, ...] = ()
 
+    def mostly(self, *, rises: bool) -> bool:
+        """Return whether nine tenths of the numbers rise from row to row, or at least change."""
+        steps = np.diff(self.numbers[~np.isnan(self.numbers)])
+        return bool(np.mean(steps > 0.0 if rises else steps != 0.0) > 0.9) if steps.size else False
+
 
 @dataclass(frozen=True)
 class Sheet:
     """What a file holds.
 
     Attributes:
-        path, key: of the file, and the key of the spec that names it.
         names: of the columns; empty where the file has none.
         lines: (n,) of the text file, or of rows counted from one.
         head: line and text of the header; `texts` what the rows say, for diagnostics.
         shown: whether messages may show what the file holds: most of it is numbers.
-        passed: lines between rows of numbers that are no rows, and what they are (see `text`).
+        passed: blank lines and rows that are commented out, between rows of numbers.
         sample_time, time_unit: what the file itself states.
         others: sheets of the workbook that were not read, where none was named.
     """
 
-    path: Path
-    key: str
+    source: Source
     names: tuple[str, ...]
     columns: tuple[Column, ...]
     lines: NDArray[np.int64]
     head: tuple[int, str] = (1, "")
     texts: Sequence[str] = ()
     shown: bool = True
-    passed: tuple[tuple[int, str], ...] = ()
+    passed: tuple[int, ...] = ()
     sample_time: float | None = None
     time_unit: str | None = None
     others: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """Return the path of the file."""
+        return self.source.path
 
     @property
     def header(self) -> list[str]:
@@ -89,10 +112,5 @@ class Sheet:
         if not self.shown:  # it may be secret
             text, message = "", f"{self.path.name} is no table of numbers: most of its cells are text"
             hint = "keep the columns of numbers, or say which they are: --columns u1=2,y1=3"
-        return DataError(Diagnostic(code, message, hint, self.key, Location(str(self.path), line, 1, text)))
-
-
-def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = None) -> DataError:
-    """Return the error about a file that cannot be read at all, or not from some line on."""
-    location = None if line is None else Location(str(path), line, 1)
-    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key, location)
+        place = Location(str(self.path), line, 1, text)
+        return DataError(Diagnostic(code, message, hint, self.source.key, place))

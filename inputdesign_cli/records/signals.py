@@ -13,18 +13,9 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.finding import Finding
 from inputdesign_cli.findings.outlying_values import beyond_precision
-from inputdesign_cli.findings.prepared_records import TIMES_READ, sheets_unread
-from inputdesign_cli.records.columns import (
-    TIME_UNITS,
-    called,
-    channel_columns,
-    column_named,
-    columns_of,
-    rising,
-    time_column,
-    time_unit_in,
-)
-from inputdesign_cli.records.moments import SAY, form_of_digits
+from inputdesign_cli.findings.prepared_records import COLUMNS_JOINED, SHEETS_UNREAD, TIMES_READ
+from inputdesign_cli.records.cells import SAY_TIME, is_date_in_digits
+from inputdesign_cli.records.columns import TIME_UNITS, called, column_named, columns_of, rising, time_unit_in
 from inputdesign_cli.records.preparation import Preparation, Run
 from inputdesign_cli.records.sheet import Sheet
 
@@ -33,6 +24,12 @@ _ROUND = 1e-4
 _SINCE_1970 = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 # Counts of these years: a count in one unit is out of range in any other, and as seconds lies millennia away.
 _FIRST, _LAST = (datetime(year, 1, 1, tzinfo=UTC).timestamp() for year in (2000, 2100))
+SHORTEST = 10
+# Rows count unchanged where this share of the whole ones stands in long stretches, or, of short records,
+# where this share is whole.
+_KEPT, _FEW, _SHORT = 0.25, 0.5, 2 * SHORTEST
+# Steps of an output that are longer, in its own, are gaps.
+_OWN_GAP, _NEARLY, _MOSTLY = 3.0, 1.1, 0.95
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Signals:
     Attributes:
         time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
         unit: of the times, if the file or the user says it; `dated`: they are dates, counted in seconds.
-        inputs, outputs: what findings call the columns of u and y.
+        names: what findings call the columns of u, the last of which may be references, and of y.
         without: (n,), rows that are to be left out.
         findings: what was done to read them.
     """
@@ -54,8 +51,7 @@ class Signals:
     dated: bool
     u: Array
     y: Array
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    names: tuple[str, ...]
     without: NDArray[np.bool_]
     findings: tuple[Finding, ...] = ()
 
@@ -67,42 +63,41 @@ class Signals:
         return replace(self, sheet=sheet, time=time, u=u, y=y, without=self.without[rows])
 
 
-def signals_of(
-    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Mapping[str, str]
-) -> Signals:
-    """Return the columns of the channels; the columns of `references` follow the inputs, by their labels.
+def signals_of(sheet: Sheet, roles: Mapping[str, str], preparation: Preparation) -> Signals:
+    """Return the columns of the roles u1, .., r1, .., y1, .. and time; references follow the inputs.
 
     Raises:
         DataError: a column is missing, holds text or nothing, or leaves the range of arithmetic; the times
             do not increase, or cannot be read.
     """
-    name = time_column(sheet, preparation.columns)
-    u, y = (channel_columns(*one, sheet, preparation.columns) for one in (("u", inputs), ("y", outputs)))
-    wanted = {**u, **y, **references, **({"time": name} if name else {})}
-    found = columns_of(sheet, wanted)
+    name = roles.get("time", "")
+    found = columns_of(sheet, roles)
     for role, numbers in found.items():
         if np.isnan(numbers).all():
-            message = f"the column {wanted[role]} holds no number"
+            message = f"the column {roles[role]} holds no number"
             hint = "is it another column? A workbook holds values of formulas once a spreadsheet saved it"
             raise sheet.error("data-not-a-number", message, hint, 0)
     time, unit, dated, findings = _times(sheet, found.get("time"), name, preparation)
+    own = {letter: [role for role in roles if role[0] == letter] for letter in "ury"}
+    ordered = [*own["u"], *own["r"], *own["y"]]
+    single = {f"{letter}1": letter for letter in "uy" if len(own[letter]) == 1}
+    others = f"read {sheet.path.name}#NAME for one of {', '.join(sheet.others)}"
     kept = Signals(
         sheet,
         time,
         name,
         unit,
         dated,
-        np.column_stack([found[role] for role in (*u, *references)]),
-        np.column_stack([found[role] for role in y]),
-        (*(("u",) if inputs == 1 else u), *references),
-        ("y",) if outputs == 1 else tuple(y),
+        np.column_stack([found[role] for role in ordered[: -len(own["y"])]]),
+        np.column_stack([found[role] for role in own["y"]]),
+        tuple(single.get(role, role) for role in ordered),
         _left_out(sheet, preparation.without),
-        (*findings, *sheets_unread(sheet.path.name, sheet.others)),
+        (*findings, *SHEETS_UNREAD.when(sheet.others, others, sheets=list(sheet.others))),
     ).at(_rows(sheet, time, preparation, timed=bool(name)))
-    for role, x in zip((*u, *references, *y), (*kept.u.T, *kept.y.T), strict=True):
+    for role, x in zip(ordered, (*kept.u.T, *kept.y.T), strict=True):
         values = np.where(kept.without, np.nan, x)
         if not np.isnan(values).all():
-            check_range(kept.sheet, wanted[role], values)
+            check_range(kept.sheet, roles[role], values)
     if name:
         _check_rising(kept.sheet, kept.time)
     return kept
@@ -116,32 +111,31 @@ def _times(
         unit = _unit(sheet, "", preparation.time_unit, dated=False)
         return np.arange(len(sheet.lines), dtype=float), unit, False, []
     column = column_named(sheet, name)
-    findings = [TIMES_READ.found(f"{done}.", where=name) for done in column.done]
+    findings = [TIMES_READ.found(done, where=name) for done in column.done]
     unit = _unit(sheet, name, preparation.time_unit, dated=column.dated)
     if column.dated or unit:
         return time, unit, column.dated, findings
     there = time[~np.isnan(time)]
-    form, what = form_of_digits(there)
-    if form:
-        message = f"{there[0]:.17g} in column {name} looks like a {what} in digits"
-        hint = f"{SAY}; here perhaps --time-format {form}; if it counts, say in what: --time-unit s"
+    if is_date_in_digits(there):
+        message = f"{there[0]:.17g} in column {name} looks like a date in digits"
+        hint = (
+            f"{SAY_TIME}; here perhaps --time-format %Y%m%d%H%M%S; if it counts, say in what: --time-unit s"
+        )
         raise sheet.error("data-not-a-number", message, hint, int(np.flatnonzero(~np.isnan(time))[0]))
     for what, a_second in _SINCE_1970.items():
         if a_second * _FIRST <= there.min() and there.max() <= a_second * _LAST:
             begun = datetime.fromtimestamp(there[0] / a_second, UTC)
-            said = f"{name} counts {what} since 1970. The first is {begun:%Y-%m-%d %H:%M:%S} UTC."
-            read = TIMES_READ.found(said, where=name, begun=begun.isoformat())
+            fact = f"{name} counts {what} since 1970, from {begun:%Y-%m-%d %H:%M:%S} UTC on"
+            read = TIMES_READ.found(fact, where=name, begun=begun.isoformat())
             return (time - there[0]) / a_second, "s", True, [*findings, read]
     return time, None, False, findings
 
 
 def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | None:
     """The unit of the times in column `name`, by the option, the column or the file; None if unknown."""
-    own = time_unit_in(sheet, name, dated=dated)
+    own, units = time_unit_in(sheet, name, dated=dated), ", ".join(TIME_UNITS)
     if own is None and sheet.time_unit and said is None:
-        message = (
-            f"{sheet.path.name} states its times in {sheet.time_unit!r}, none of {', '.join(TIME_UNITS)}"
-        )
+        message = f"{sheet.path.name} states its times in {sheet.time_unit!r}, none of {units}"
         raise sheet.error("data-wrong-unit", message, "say which it is: --time-unit s")
     if said is not None and own is not None and own != said:
         holds = "holds dates, which are counted in s" if dated else f"states its times in {own}"
@@ -154,19 +148,15 @@ def _unit(sheet: Sheet, name: str, said: str | None, *, dated: bool) -> str | No
 def _rows(sheet: Sheet, time: Array, preparation: Preparation, *, timed: bool) -> NDArray[np.int64]:
     """The rows that --skip and --range keep."""
     scaled = time if timed else time * (preparation.sample_time or sheet.sample_time or 1.0)
-    rows = np.arange(min(preparation.skip, len(sheet.lines)), len(sheet.lines))
+    kept = np.arange(len(time)) >= preparation.skip
     if preparation.span is not None:
         begin, end = preparation.span
-        rows = rows[(scaled[rows] >= begin) & (scaled[rows] <= end)]
-    if rows.size:
-        return rows
-    hint = f"--skip {preparation.skip} leaves them all out"
-    if preparation.skip < len(sheet.lines):
-        hint = (
-            f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}: mind --skip and --range"
-        )
-    message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
-    raise DataError.because("data-unreadable", message, hint, "", Location(str(sheet.path), 1, 1))
+        kept &= (scaled >= begin) & (scaled <= end)
+    if not np.any(kept):
+        message = f"nothing is left of the {len(time)} rows of {sheet.path.name}"
+        hint = f"its times run from {np.nanmin(scaled):.6g} to {np.nanmax(scaled):.6g}"
+        raise _nothing_left(sheet, message, f"{hint}: mind --skip and --range")
+    return np.flatnonzero(kept)
 
 
 def _left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
@@ -177,9 +167,13 @@ def _left_out(sheet: Sheet, runs: Sequence[Run]) -> NDArray[np.bool_]:
         if not np.any(inside):
             message = f"{sheet.path.name} has no row from {first} to {last}, which --without is to leave out"
             hint = f"its rows of numbers are lines {sheet.lines[0]} to {sheet.lines[-1]}, the header counted"
-            raise DataError.because("data-unreadable", message, hint, "", Location(str(sheet.path), 1, 1))
+            raise _nothing_left(sheet, message, hint)
         found |= inside
     return found
+
+
+def _nothing_left(sheet: Sheet, message: str, hint: str) -> DataError:
+    return DataError.because("data-unreadable", message, hint, "", Location(str(sheet.path), 1, 1))
 
 
 def _check_rising(sheet: Sheet, time: Array) -> None:
@@ -189,14 +183,14 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
     if not wrong.size:
         return
     before, row = there[wrong[0]], there[wrong[0] + 1]
-    follows = f"{time[before]:.10g} is followed by {time[row]:.10g}"
-    hint = "sort the rows, keep one row of each time, or write times with more digits; if the rows are even, "
-    hint += "add time=none to --columns, and --sample-time"
+    hint = (
+        "sort the rows, keep one row of each time, or write times with more digits; if the rows are even, "
+        "add time=none to --columns, and --sample-time"
+    )
     other = [called(sheet, at) for at in rising(sheet)]
-    if other:
-        hint += f"; or is the time in column {other[0]}, which rises? Then --columns time={other[0]}"
-    message = f"the times of {sheet.path.name} do not increase: {follows}"
-    raise sheet.error("data-not-uniform", message, hint, int(row))
+    hint += f"; or is the time in column {other[0]}? Then --columns time={other[0]}" if other else ""
+    message = f"the times of {sheet.path.name} do not increase: {time[before]:.10g} is followed by "
+    raise sheet.error("data-not-uniform", f"{message}{time[row]:.10g}", hint, int(row))
 
 
 def typical_step(time: Array) -> float:
@@ -220,6 +214,86 @@ def check_range(sheet: Sheet, name: str, x: Array) -> None:
     fault = beyond_precision(name, x)
     if fault is not None:
         row, message, hint = fault
-        if not sheet.key:
+        if not sheet.source.key:
             hint += f"; if it is a fault of measurement, --without {sheet.lines[row]} leaves its row out"
         raise sheet.error("beyond-precision", message, hint, row)
+
+
+def joined_rows(signals: Signals, *, resample: bool) -> Signals:
+    """Return the signals at the times of the output that was written most often; or, if few miss, all rows.
+
+    Inputs are held until they are written again, and are their means until the next row; outputs are
+    interpolated linearly. Rows stay unchanged if enough of them are whole.
+
+    Args:
+        resample: whether that is asked for.
+
+    Raises:
+        DataError: `data-not-a-number`, rows would have to be joined, and that is not asked for or cannot be.
+    """
+    there = ~np.isnan(np.column_stack([signals.u, signals.y]))
+    whole = np.asarray(there.all(axis=1))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], whole.astype(int), [0]])))
+    stretches = edges[1::2] - edges[::2]
+    short = len(whole) < _SHORT and whole.mean() >= _FEW
+    if short or stretches[stretches >= SHORTEST].sum() > _KEPT * whole.sum():
+        return signals
+    counts = dict(zip(signals.names, there.sum(axis=0).tolist(), strict=True))
+    listed = ", ".join(f"{name} in {count}" for name, count in counts.items())
+    timed = ~np.isnan(signals.time)
+    possible = bool(signals.name) and bool(np.all(np.any(there & timed[:, None], axis=0)))
+    if not (resample and possible):
+        message = f"hardly a row of {signals.sheet.path.name} has numbers in all columns ({listed} of "
+        message += f"{len(whole)} rows): they were written at different times"
+        hint = "join the rows of each sample, or log the time with them"
+        if possible:
+            hint = "add --resample (inputs are held until written again, outputs interpolated), or join the "
+            hint += "rows"
+        raise signals.sheet.error("data-not-a-number", message, hint, 0)
+    written = ~np.isnan(signals.y) & timed[:, None]
+    rows = np.flatnonzero(written[:, int(np.argmax(written.sum(axis=0)))])
+    every = np.diff(signals.time[timed])
+    even = np.mean(np.abs(every - np.median(every)) <= (_NEARLY - 1.0) * np.median(every)) >= _MOSTLY
+    if even and rows.size > 1 and np.median(np.diff(signals.time[rows])) <= _NEARLY * np.median(every):
+        rows = np.flatnonzero(timed)  # it misses some only
+    time = signals.time[rows]
+    inputs = [_until_next(signals.time, x, time) for x in signals.u.T]
+    outputs = [_between(signals.time[at], x[at], time) for x, at in zip(signals.y.T, written.T, strict=True)]
+    moved = int(np.any([moves for _, moves in inputs], axis=0).sum())
+    found = COLUMNS_JOINED.found(
+        f"{listed} of {len(whole)} rows, joined at {len(rows)} times, between {moved} of which inputs move",
+        counts=counts,
+        rows=len(whole),
+        moved=moved,
+        kept=len(rows),
+    )
+    u, y = (np.column_stack(columns) for columns in ([means for means, _ in inputs], outputs))
+    return replace(signals.at(rows), u=u, y=y, findings=(*signals.findings, found))
+
+
+def _until_next(time: Array, x: Array, instants: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Means of x (n,), held until written again, from each instant to the next, and whether it moves there.
+
+    NaN before it was written first; the last one as it is.
+    """
+    at = np.flatnonzero(~np.isnan(x) & ~np.isnan(time))
+    began, values = time[at], x[at]
+    here = np.searchsorted(began, instants, side="right") - 1
+    held = values[np.maximum(here, 0)]
+    # The integral of x is linear between the times at which it is written, and goes on behind the last.
+    ends = np.append(began, max(instants[-1], began[-1]) + 1.0)
+    area = np.concatenate([[0.0], np.cumsum(values * np.diff(ends))])
+    means = np.append(np.diff(np.interp(instants, ends, area)) / np.diff(instants), held[-1])
+    moves = (np.abs(means - held) > 1e-9 * np.abs(values).max()) & (here >= 0)
+    return np.where(here >= 0, np.where(moves, means, held), np.nan), moves
+
+
+def _between(time: Array, y: Array, instants: Array) -> Array:
+    """y (n,) at some instants, on the line between its neighbours; NaN outside and in gaps."""
+    found = np.interp(instants, time, y, left=np.nan, right=np.nan)
+    steps = np.diff(time)
+    if not steps.size:
+        return found
+    after = np.clip(np.searchsorted(time, instants, side="left"), 1, len(time) - 1)
+    gap = steps[after - 1] > _OWN_GAP * np.median(steps)
+    return np.where(gap & ~np.isin(instants, time), np.nan, found)

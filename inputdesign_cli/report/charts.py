@@ -9,13 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.figures.fan import MOST_NAMED
 from inputdesign_cli.figures.plots import painter
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import rendered
-from inputdesign_cli.outcome.curves import Curves
+from inputdesign_cli.outcome.curves import BoundCurves, Curves
 from inputdesign_cli.outcome.curves_file import read_curves
-from inputdesign_cli.report.captions import captioned
-from inputdesign_cli.report.numbers import spoken
+from inputdesign_cli.outcome.sentences import sentences, spoken
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,6 +49,25 @@ def _caption(stem: str, curves: Curves) -> str:
     loop = kind == "disturbance"
     caption = "What the excitation alone does to the loop." if loop else captioned(curves)
     return f"{caption[:-1]}: {spoken(name)}." if kind in _OF_RUNS and name else caption
+
+
+def captioned(curves: Curves) -> str:
+    """Return the caption of a figure, which speaks of the curves that are in it."""
+    known: dict[str, object] = {"curves": curves, "most_named": MOST_NAMED}
+    if isinstance(curves, BoundCurves):
+        panels = curves.panels
+        designed = max(_highest(panel.r_u, panel.r_adm) for panel in panels)
+        white = max(_highest(panel.r_u_equal, panel.r_adm) for panel in panels)
+        known |= {
+            "bounded": all(panel.r_adm is not None for panel in panels),
+            "white_is_higher": white > designed,
+        }
+    return sentences("inputdesign_cli.report", "captions.txt", type(curves).__name__, known)[0]
+
+
+def _highest(error: Array | None, admitted: Array | None) -> float:
+    """Return the largest ratio (n,) of what there is; zero if something is missing."""
+    return 0.0 if error is None or admitted is None else float(np.nanmax(error / admitted))
 
 
 def chart(paint: Callable[[Figure], object], caption: str) -> Chart:

@@ -8,24 +8,23 @@ from pathlib import Path
 
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.outcome.objectives import objective
 from inputdesign_cli.outcome.run_directory import read_outcome, read_run
+from inputdesign_cli.outcome.sentences import shown
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, run_charts
-from inputdesign_cli.report.evidence import (
-    campaign_answer,
+from inputdesign_cli.report.evidence import estimate_table, requirement_table, simulation_table
+from inputdesign_cli.report.facts import (
+    Fact,
+    answer,
+    assumptions,
     campaign_facts,
-    estimate_answer,
     estimate_facts,
-    estimate_table,
-    requirement_table,
-    simulation_answer,
-    simulation_table,
+    facts,
+    proofs,
+    provenance,
 )
-from inputdesign_cli.report.facts import facts, length, proofs, white
-from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import Question, read_question
-from inputdesign_cli.report.sources import Source, assumptions, citations
+from inputdesign_cli.report.sources import Source, citations
 
 # Headings and the charts that belong under them; charts of data and of simulated runs have their own.
 _SECTIONS = (
@@ -65,20 +64,20 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
         **_figures(charts, [f"{text[0].upper()}{text[1:]}." for text in proofs(outcome)]),
         "title": question.title or run.resolve().name,
         "question": question.sentences,
-        "answer": " ".join([_answer(verb, outcome), *simulation_answer(outcome)]),
+        "answer": answer(verb, outcome),
         "notes": outcome.notes or (),
         "estimate": estimate_table(outcome),
-        "estimate_facts": list(estimate_facts(outcome)),
+        "estimate_facts": estimate_facts(outcome),
         "verdicts": requirement_table(outcome, question.time_unit),
         "facts": [
-            ("status", top_up or outcome.status or "", ""),
-            *((name, text, "") for name, text in campaign_facts(outcome)),
+            Fact("status", top_up or outcome.status or ""),
+            *campaign_facts(outcome),
             *facts(outcome, question.time_unit),
-            ("units", question.units, ""),
+            Fact("units", question.units),
         ],
         "simulation": simulation_table(outcome.simulation),
         "simulated_runs": None if outcome.simulation is None else outcome.simulation.runs,
-        "assumptions": assumptions(question, outcome),
+        "assumptions": assumptions(outcome, question),
         "command": _command(verb, outcome, sources),
         "explored": outcome.exploration is not None,
         "campaign": verb == "campaign",
@@ -87,8 +86,8 @@ def run_page(run: Path, *, pictures: bool = True) -> dict[str, object]:
         "provenance": provenance(
             environment if isinstance(environment, Mapping) else {},
             [
-                ("SHA-256 of spec.yaml", str(outcome.provenance.get("spec_sha256", "")), ""),
-                ("seed of the signal", str(question.seed), ""),
+                Fact("SHA-256 of spec.yaml", str(outcome.provenance.get("spec_sha256", ""))),
+                Fact("seed of the signal", str(question.seed)),
             ],
         ),
         "citations": citations(question, outcome),
@@ -158,27 +157,6 @@ def _command(verb: str, outcome: Outcome, sources: Sequence[str]) -> str:
         levels = [f"{name}={level!r}" for name, level in found.operating_point.items()]
         words += ["--operating-point", ",".join(levels)]
     return shlex.join(["idesign", *words])
-
-
-def _answer(verb: str, outcome: Outcome) -> str:
-    if verb == "campaign":
-        return campaign_answer(outcome)
-    if outcome.identification is not None:
-        return estimate_answer(outcome)
-    found = outcome.objective
-    if found is None:
-        ratio = None if outcome.model_error is None else outcome.model_error.worst_ratio
-        if ratio is None:
-            return "The numbers are below."
-        verdict = "within" if ratio <= 1 else "beyond"
-        return f"The error of the model stays {verdict} what is admitted: r_u / r_adm is at most {ratio:.5g}."
-    sentence = objective(found.kind).answer
-    if found.kind == "shortest_experiment":
-        said = f"{sentence.format(length(outcome))} (by the spectrum alone {found.value:.6g})"
-    else:
-        said = sentence.format(f"{found.value:.6g}")
-    compared = white(outcome)
-    return f"{said} ({compared})." if compared else f"{said}."
 
 
 def flat(value: object, path: str = "") -> list[tuple[str, str]]:

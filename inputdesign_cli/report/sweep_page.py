@@ -17,10 +17,10 @@ from inputdesign_cli.outcome.objectives import OBJECTIVES, objective
 from inputdesign_cli.outcome.run_directory import read_outcome
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, chart
-from inputdesign_cli.report.numbers import provenance
+from inputdesign_cli.report.facts import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import Source, citations
-from inputdesign_cli.sweeps.layout import run_flaw
+from inputdesign_cli.sweeps.layout import checked_run
 
 MOST_ROWS = 200
 _SHOWN = (
@@ -77,10 +77,12 @@ def sweep_sources(root: Path) -> list[Source]:
 def _check_points(table: SweepTable, root: Path) -> None:
     """Runs that were moved away are not missed, but one that is there is to be what the table was made of."""
     for run in filter(None, table.columns["run"]):
-        why = run_flaw(root / run) if (root / run).is_dir() else ""
-        if why:
+        try:
+            if (root / run).is_dir():
+                checked_run(root / run)
+        except DataError as error:
             hint = "give the command of the sweep again: it computes this point anew"
-            raise DataError.because("run-unreadable", why, hint)
+            raise DataError.because("run-unreadable", error.diagnostics[0].message, hint) from None
 
 
 def _columns(table: SweepTable) -> list[tuple[str, str]]:

@@ -3,29 +3,13 @@
 from __future__ import annotations
 
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plugins import announce, points
-from inputdesign_cli.signal.chirp import Chirp
+from inputdesign_cli.plugins import announce, own, points
 from inputdesign_cli.signal.kind import SignalKind
-from inputdesign_cli.signal.levels import FewLevels, signs, signs_and_zeros
-from inputdesign_cli.signal.multisine import Multisine
-from inputdesign_cli.signal.noise import FilteredNoise, WhiteNoise
-from inputdesign_cli.signal.prbs import Prbs
-from inputdesign_cli.signal.steps import Steps
 
 GROUP = "idesign.signals"
 """The group of entry points, each of which names a `SignalKind`."""
 
-_KINDS: dict[str, SignalKind] = {
-    "filtered_noise": FilteredNoise(),
-    "multisine": Multisine(),
-    "binary": FewLevels(signs, few_levels=True, switched=True),
-    "slewed": FewLevels(signs, slewed=True),
-    "ternary": FewLevels(signs_and_zeros, few_levels=True),
-    "prbs": Prbs(),
-    "white": WhiteNoise(),
-    "chirp": Chirp(),
-    "steps": Steps(),
-}
+_KINDS: dict[str, SignalKind] = {}
 
 
 def register(name: str, kind: SignalKind) -> None:
@@ -37,9 +21,10 @@ def register(name: str, kind: SignalKind) -> None:
 def kind_of(name: str) -> SignalKind:
     """Return the kind of this name. It raises `SpecError` if the package that adds it does not hold it."""
     if name not in _KINDS:
-        point = points(GROUP)[name]
+        point = {**points(GROUP), **own(GROUP)}[name]
         try:
-            _KINDS[name] = point.load()
+            kind = point.load()
+            _KINDS[name] = kind() if isinstance(kind, type) else kind
         except (ImportError, AttributeError) as error:
             raise bad_spec(
                 "not-supported",

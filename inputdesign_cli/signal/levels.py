@@ -141,3 +141,8 @@ def _each(values: Array, nearest: Callable[[Array], Array], rms: Array) -> Array
         now = float(np.sqrt(np.mean(levels**2)))
         columns.append(levels * (size / now) if now > 0.0 else levels)
     return np.stack(columns, axis=1)
+
+
+BINARY = FewLevels(signs, few_levels=True, switched=True)
+SLEWED = FewLevels(signs, slewed=True)
+TERNARY = FewLevels(signs_and_zeros, few_levels=True)

@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
-from inputdesign_cli.specification.checks.everything import related, run_checks
+from inputdesign_cli.specification.checks.question import related, run_checks
 from inputdesign_cli.specification.models.experiment import Cost
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.section import PathDiagnostic
@@ -106,51 +106,31 @@ def parse_spec(
     confine: FilePath | None = None,
     design: bool | None = True,
 ) -> Spec:
-    """Read a spec from its text, as `load_spec` does from a file.
+    """Read a spec from its text in YAML, as `load_spec` does from a file, with the same arguments.
 
     Args:
-        text: YAML.
         file: The name in diagnostics.
-        overrides: As for `load_spec`.
         folder: What the paths in the spec are relative to (default: the current folder).
-        confine: As for `load_spec`.
-        design: As for `load_spec`.
-
-    Raises:
-        SpecError: As `load_spec`.
     """
     folder = folder or FilePath()
     return build(read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine), folder, design)
 
 
 def build(tree: Tree, folder: FilePath | None = None, design: bool | None = True) -> Spec:
-    """Return the spec of plain data, checked as a whole; arguments as for `load_spec`.
-
-    Raises:
-        SpecError: As `load_spec`.
-    """
+    """Return the spec of plain data, checked as a whole; arguments and errors as for `load_spec`."""
     install()
     check_mapping(tree)
     design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
-        raise SpecError(_first(_sorted(diagnostics, tree.places)))
+        raise SpecError(_reported(diagnostics, tree.places))
     spec = _with_defaults(spec)
     spec._source, spec._design = Source(tree.data, tree.places, folder or FilePath()), design
     return spec
 
 
 Spec.build = build
-
-
-def _first(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
-    """The first diagnostics; the last one counts the others."""
-    left = len(diagnostics) - _MOST_REPORTED
-    if left <= 0:
-        return diagnostics
-    more = Diagnostic("more-errors", f"{left} more errors are not shown", "mend these first")
-    return [*diagnostics[:_MOST_REPORTED], more]
 
 
 def read_tree(
@@ -191,21 +171,15 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
     section around it, are consequences and are not reported.
     """
     data = copy.deepcopy(tree.data)
-    if not design:
-        _estimated_noise(data)
+    if not design and isinstance(noise := data.setdefault("noise", {}), dict):
+        noise.setdefault("variance", 1.0)  # it may be left out if it is to be estimated
     reported: list[PathDiagnostic] = []
     broken = set(tree.broken)
-    for path in _empty(data, ()):
-        comma = isinstance(path[-1], str) and path[-1].isdecimal()
-        mend = "use a decimal point: a comma begins the next key"
-        hint = mend if comma else "write a value, or remove the key"
-        reported.append(PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True))
-        broken.add(path)
-        _prune(data, path)
-    for one in in_samples(data):
-        reported.append(one)
-        broken.add(one.path)
-        _prune(data, one.path)
+    for find in (_empty, in_samples):
+        for one in list(find(data)):
+            reported.append(one)
+            broken.add(one.path)
+            _prune(data, one.path)
     for attempt in range(_MOST_ROUNDS):
         try:
             spec = Spec.model_validate(data)
@@ -225,13 +199,6 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
     return None, reported
 
 
-def _estimated_noise(data: dict[str, Plain]) -> None:
-    """Supply the variance of the noise: it may be left out if it is to be estimated."""
-    noise = data.setdefault("noise", {})
-    if isinstance(noise, dict):
-        noise.setdefault("variance", 1.0)
-
-
 def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool:
     """Whether an error follows from parts that were removed before.
 
@@ -246,31 +213,30 @@ def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool
     return related(found.path[:-1] if missing else found.path, broken)
 
 
-def _empty(data: Plain, path: Path) -> list[Path]:
+def _empty(data: Plain, path: Path = ()) -> Iterator[PathDiagnostic]:
+    """Keys and entries without a value."""
     if data is None:
-        return [path]
+        comma = isinstance(path[-1], str) and path[-1].isdecimal()
+        mend = "use a decimal point: a comma begins the next key"
+        hint = mend if comma else "write a value, or remove the key"
+        yield PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True)
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    return [found for step, value in items for found in _empty(value, (*path, step))]
+    for step, value in items:
+        yield from _empty(value, (*path, step))
 
 
 def _prune(data: dict[str, Plain], path: Path) -> None:
     """Remove the deepest mapping entry on the path; replace a required section."""
-    holder: dict[str, Plain] | None = None
-    key = ""
-    node: Plain = data
+    holder, key, node = data, "", data
     for step in path:
-        if isinstance(node, dict):
-            if step not in node:
-                break
+        if isinstance(node, dict) and step in node:
             holder, key = node, str(step)
-            node = node[step]
-        elif isinstance(node, list) and isinstance(step, int) and step < len(node):
-            node = node[step]
-        else:
+        elif not (isinstance(node, list) and isinstance(step, int) and step < len(node)):
             break
-    if path and path[0] in _STAND_IN and (holder is None or holder is data):
+        node = node[step]
+    if holder is data and path and path[0] in _STAND_IN:
         data[str(path[0])] = copy.deepcopy(_STAND_IN[str(path[0])])
-    elif holder is not None:
+    else:
         holder.pop(key, None)
 
 
@@ -286,12 +252,17 @@ def _with_defaults(spec: Spec) -> Spec:
     return spec.model_copy(update=update) if update else spec
 
 
-def _sorted(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
-    """Sort by the order of the file, then of the overrides, without repetitions."""
+def _reported(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
+    """The first ones by the order of the file, then of the overrides; the last one counts the others."""
     order = {file: i for i, (file, _) in enumerate(places.sources)}
 
     def place(diagnostic: Diagnostic) -> tuple[int, int, int]:
         at = diagnostic.location
         return (order.get(at.file, len(order)), at.line, at.column) if at else (-1, 0, 0)
 
-    return sorted(dict.fromkeys(diagnostics), key=place)
+    found = sorted(dict.fromkeys(diagnostics), key=place)
+    left = len(found) - _MOST_REPORTED
+    if left > 0:
+        more = Diagnostic("more-errors", f"{left} more errors are not shown", "mend these first")
+        found[_MOST_REPORTED:] = [more]
+    return found

@@ -51,20 +51,25 @@ def from_control(
         kind = type(system).__name__
         hint = "fit a transfer function to it, or identify one from data: idesign identify, idesign explore"
         raise bad_spec("not-supported", f"a {kind} has no parameters to be estimated", hint=hint, key="plant")
-    discrete = system.isdtime(strict=True)
+    discrete, in_states = system.isdtime(strict=True), isinstance(system, control.StateSpace)
     if discrete and system.dt is True:
         message = "the system is in discrete time and does not say its sampling time"
         raise bad_spec("not-sampled", message, hint="give it one: tf(num, den, 0.1)", key="sample_time")
-    _check_arguments(discrete, sample_time, delay, known, blocks)
+    for name, wrong, why, hint in (
+        ("sample_time", discrete and sample_time is not None, "the system has its own dt", "leave it out"),
+        ("delay", discrete and delay is not None, "delays of samples are poles", "multiply by z^-d"),
+        ("known", not _listed(known), "it is no list of names", "write known=['b0']"),
+        ("plant", "plant" in blocks, "it is the system itself", "leave it out, or use Spec.from_dict"),
+        ("parameters", parameters is not None and not in_states, "the system has no states", "leave it out"),
+    ):
+        if wrong:
+            raise bad_spec("bad-argument", f"{name} cannot be given: {why}", hint=hint, key=name)
     if parameters is None:
-        plant = _transfer(system, discrete=discrete)
-    elif isinstance(system, control.StateSpace):
-        plant = _states(system, parameters, discrete=discrete)
+        plant, key = _transfer(system, discrete=discrete), "continuous"
     else:
-        hint = "leave it out: its coefficients are the parameters; or give it as control.ss(..)"
-        raise _bad_argument("parameters", "names entries of a system in state space", hint)
+        plant, key = _states(system, parameters, discrete=discrete), "state_space"
     if delay is not None:
-        plant["continuous" if parameters is None else "state_space"]["delay"] = delay
+        plant[key]["delay"] = delay
     if not discrete and sample_time is not None:
         plant["sample"] = "zoh"
     if len(known):
@@ -76,64 +81,36 @@ def from_control(
     )
 
 
-def _bad_argument(name: str, message: str, hint: str) -> SpecError:
-    return bad_spec("bad-argument", f"{name} {message}", hint=hint, key=name)
-
-
-def _check_arguments(
-    discrete: bool, sample_time: object, delay: object, known: object, blocks: Mapping[str, Plain]
-) -> None:
-    """Raise `SpecError` where an argument would be ignored, or does not go with the others."""
-    if discrete and sample_time is not None:
-        hint = "leave it out, or resample the system"
-        raise _bad_argument("sample_time", "is of a system in continuous time; this one has its dt", hint)
-    if discrete and delay is not None:
-        message = "is of a system in continuous time; in discrete time it is among the poles"
-        raise _bad_argument("delay", message, "multiply the system by z^-d")
-    if isinstance(known, str) or not isinstance(known, Sequence):
-        raise _bad_argument("known", "must be a list of names of parameters", "write known=['b0']")
-    if "plant" in blocks:
-        raise _bad_argument("plant", "is the system itself", "leave it out, or use Spec.from_dict")
+def _listed(value: object) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)
 
 
 def _states(
     system: control.StateSpace, parameters: Mapping[str, Place], *, discrete: bool
 ) -> dict[str, Plain]:
+    """The plant of matrices with names in place of the entries that are estimated."""
     arrays = {"A": system.A, "B": system.B, "C": system.C, "D": system.D}
-    if not isinstance(parameters, Mapping):
-        raise _bad_parameter("must be a mapping of names to entries")
     matrices: dict[str, Plain] = {letter: array.tolist() for letter, array in arrays.items()}
     values: dict[str, Plain] = {}
-    taken: dict[Place, str] = {}
+    if not isinstance(parameters, Mapping):
+        raise _bad_parameter("must be a mapping of names to entries")
     for name, place in parameters.items():
-        letter, i, j = found = _place(str(name), place, arrays)
-        other = taken.setdefault(found, str(name))
-        if other != name:
-            raise _bad_parameter(f"names the entry {letter}[{i}, {j}] twice: {other} and {name}")
-        values[str(name)], matrices[letter][i][j] = matrices[letter][i][j], str(name)
+        try:
+            letter, row, column = place
+            entries = matrices[letter][row]
+            if isinstance(entries[column], str):
+                raise IndexError
+            values[str(name)], entries[column] = entries[column], str(name)
+        except (TypeError, ValueError, LookupError):
+            sizes = ", ".join(f"{letter} is {len(a)} x {a.shape[1]}" for letter, a in arrays.items())
+            raise _bad_parameter(f"has no free entry {place!r} for {name}: {sizes}, from 0") from None
     time = "discrete" if discrete else "continuous"
     return {"parameters": values, "state_space": {**matrices, "time": time}}
 
 
-def _place(name: str, place: object, arrays: Mapping[str, np.ndarray]) -> Place:
-    """The entry of a parameter; indices below 0 count from the end, as in Python."""
-    if isinstance(place, str) or not isinstance(place, Sequence) or len(place) != 3:
-        raise _bad_parameter(f"{name} must be a matrix, a row and a column, not {place!r}")
-    letter, *indices = place
-    if not isinstance(letter, str) or letter not in arrays:
-        raise _bad_parameter(f"{name} is in {letter!r}: the matrices are {', '.join(arrays)}")
-    rows, columns = arrays[letter].shape
-    try:
-        return letter, range(rows)[indices[0]], range(columns)[indices[1]]
-    except TypeError:
-        raise _bad_parameter(f"{name}: row and column must be whole numbers, not {indices}") from None
-    except IndexError:
-        message = f"{name}: {letter} is {rows} x {columns} and has no entry {indices}, from 0"
-        raise _bad_parameter(message) from None
-
-
 def _bad_parameter(message: str) -> SpecError:
-    return _bad_argument("parameters", message, "write parameters={'k': ('B', 1, 0)}: B, row 1, column 0")
+    hint = "write parameters={'k': ('B', 1, 0)}: B, row 1, column 0"
+    return bad_spec("bad-argument", f"parameters {message}", hint=hint, key="parameters")
 
 
 def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete: bool) -> dict[str, Plain]:
@@ -161,10 +138,7 @@ def _in_delays(top: list[float], bottom: list[float]) -> Entry:
     """
     above, below = (np.trim_zeros(np.array(part, dtype=float), "f") for part in (top, bottom))
     if above.size > below.size:
-        message = (
-            f"the system has degree {above.size - 1} in z above and {below.size - 1} below: its output "
-            "would come before its input"
-        )
+        message = f"the system has {above.size - below.size} more zeros than poles in z: it looks ahead"
         raise bad_spec("improper-transfer", message, hint="multiply it by z^-d", key="plant")
     late = [0.0] * (below.size - above.size)
     ascending = np.trim_zeros(below / below[0], "b").tolist()

@@ -41,11 +41,7 @@ class SpecTemplate:
     confine: FilePath | None = None
 
     def spec(self, overrides: Sequence[str]) -> Spec:
-        """Return the checked spec of one variant, without the `sweep` block.
-
-        Raises:
-            SpecError: As `load_spec`.
-        """
+        """Return the checked spec of one variant, without the `sweep` block; errors as of `load_spec`."""
         every = [*self.overrides, *overrides, "sweep=null"]
         return parse_spec(self.text, self.file, every, folder=self.folder, confine=self.confine)
 
@@ -80,8 +76,7 @@ class SpecTemplate:
         try:
             return Sweep.model_validate(self.data["sweep"])
         except ValidationError as error:
-            found = translate(error, self.data["sweep"], Sweep)
-            places = read(self.text, self.file).places
+            found, places = translate(error, self.data["sweep"], Sweep), read(self.text, self.file).places
             absolute = [replace(one, path=("sweep", *one.path)) for one in found]
             raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
 

@@ -187,7 +187,11 @@ class DensityFamily:
 
     has_density = True
     free = False
-    knots: Array = np.zeros(0)
+
+    @property
+    def knots(self) -> Array:
+        """The density has no kinks."""
+        return np.zeros(0)
 
     if TYPE_CHECKING:
 

@@ -31,9 +31,8 @@ class TabulatedSpectrum(DensityFamily):
         level = np.diag(powers * np.pi / (band[1] - band[0])).astype(complex)
         return cls(np.array(band), np.array([level, level]))
 
-    # A plain attribute of the base: mypy wants what takes its place writable, and this is frozen.
     @property
-    def knots(self) -> Array:  # type: ignore[override]
+    def knots(self) -> Array:
         """The frequencies of the table."""
         return self.frequency
 

@@ -24,11 +24,11 @@ from pathlib import Path
 from typing import Any
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome.locks import locked
+from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.origin import digest
-from inputdesign_cli.outcome.record import PAGE, RESULT, SPEC as RUN_SPEC, is_page, is_plain, unreadable
+from inputdesign_cli.outcome.record import RESULT, SPEC as RUN_SPEC, is_plain, unreadable
+from inputdesign_cli.outcome.replacing import locked
 from inputdesign_cli.outcome.run_directory import output_errors, read_run, replace_text
-from inputdesign_cli.outcome.text_formats import json_text
 from inputdesign_cli.regular_file import read_regular
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
@@ -37,18 +37,20 @@ _ENDLESS = -1.0  # seconds, in the words of `locked`
 _FAILURE = ("status", "code", "message", "hint", "key")
 
 
-def run_flaw(directory: Path, spec: str | None = None) -> str:
-    """Return what is wrong with the run of a point, of this `spec` if it is known; nothing where it holds."""
+def checked_run(directory: Path, spec: str | None = None) -> dict[str, Any]:
+    """Return the result of the run of a point, of this `spec` if it is known.
+
+    Raises:
+        DataError: it is not whole, or is the run of another point.
+    """
+    result = read_run(directory)
     try:
-        result = read_run(directory)
         written = digest(read_regular(directory / RUN_SPEC).decode("utf-8"))
-    except DataError as error:
-        return error.diagnostics[0].message
     except (OSError, ValueError) as error:
-        return f"{directory / RUN_SPEC} cannot be read: {error}"
+        raise unreadable(directory / RUN_SPEC, str(error)) from error
     if result.get("spec_sha256") != written or (spec is not None and written != digest(spec)):
-        return f"{directory} is not the run of this point: it has another spec"
-    return ""
+        raise unreadable(directory, "it is not the run of this point, and has another spec")
+    return result
 
 
 @dataclass(frozen=True)
@@ -58,64 +60,42 @@ class Layout:
     root: Path
 
     def run(self, key: str) -> Path:
-        """The run directory of a point."""
+        """Return the run directory of a point."""
         return self.root / "points" / key
 
     def failure(self, key: str) -> Path:
-        """The file that says why a point has no result."""
+        """Return the file that says why a point has no result."""
         return self.root / "failures" / f"{key}.json"
 
-    def has_result(self, key: str) -> bool:
-        """Whether the run of a point is whole."""
-        return (self.run(key) / RESULT).is_file()
-
-    def has_failure(self, key: str) -> bool:
-        """Whether a point has been tried in vain."""
-        return self.failure(key).is_file()
-
-    def read(self, key: str) -> dict[str, Any] | None:
-        """The result of a point, or its failure (which has a `code`), or None.
-
-        Raises:
-            DataError: `run-unreadable`.
-        """
-        for path in (self.run(key) / RESULT, self.failure(key)):
-            try:
-                content = json.loads(read_regular(path))
-            except (FileNotFoundError, NotADirectoryError):
-                continue
-            except (OSError, ValueError, RecursionError) as error:
-                raise unreadable(path, str(error)) from error
-            if not isinstance(content, dict):
-                raise unreadable(path, "it is no mapping")
-            return content
-        return None
-
-    def discard(self, key: str) -> None:
-        """Remove what is there of a point, its run in one step, so that it is computed again."""
-        run = self.run(key)
-        with output_errors(run):
-            if run.exists():
-                partial = run.parent / f".{key}.partial-{os.getpid()}"
-                shutil.rmtree(partial, ignore_errors=True)
-                run.rename(partial)
-                shutil.rmtree(partial, ignore_errors=True)
-            self.failure(key).unlink(missing_ok=True)
-
-    def flaw(self, key: str, spec: str | None = None) -> str:
-        """Return what is wrong with what is there of a point; nothing where it holds, or nothing is there.
+    def read(self, key: str, spec: str | None = None) -> dict[str, Any] | None:
+        """Return the result of a point, or its failure (which has a `code`), or None.
 
         Args:
             spec: the resolved spec of the point, where it is known.
+
+        Raises:
+            DataError: what is there does not hold.
         """
-        if self.has_result(key):
-            return run_flaw(self.run(key), spec)
+        if (self.run(key) / RESULT).is_file():
+            return checked_run(self.run(key), spec)
+        path = self.failure(key)
         try:
-            failure = self.read(key)
-        except DataError as error:
-            return error.diagnostics[0].message
-        whole = failure is None or all(isinstance(failure.get(name), str) for name in _FAILURE)
-        return "" if whole else f"{self.failure(key)} is not what idesign writes of a failure"
+            failure = json.loads(read_regular(path))
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except (OSError, ValueError, RecursionError) as error:
+            raise unreadable(path, str(error)) from error
+        if not (isinstance(failure, dict) and all(isinstance(failure.get(name), str) for name in _FAILURE)):
+            raise unreadable(path, "it is not what idesign writes of a failure")
+        return failure
+
+    def discard(self, key: str) -> None:
+        """Remove what is there of a point, so that it is computed again."""
+        run = self.run(key)
+        with output_errors(run):
+            (run / RESULT).unlink(missing_ok=True)
+            shutil.rmtree(run, ignore_errors=True)
+            self.failure(key).unlink(missing_ok=True)
 
     def write_failure(self, key: str, content: Mapping[str, object]) -> None:
         """Note why a point has no result, in one step."""
@@ -137,27 +117,20 @@ class Layout:
             hint = "look at who may reach the cluster (docs/security.md)"
             raise DataError.because("worker-answer", message, hint)
         target = self.run(key)
-        partial = target.parent / f".{key}.partial-{os.getpid()}"
+        partial = target.parent / f".{key}.partial"
         with output_errors(target):
-            shutil.rmtree(partial, ignore_errors=True)
             partial.mkdir(parents=True)
             for name, content in files.items():
                 (partial / name).write_bytes(content)
             partial.rename(target)
 
-    def remove_page(self) -> None:
-        """Remove the page about what the sweep was before."""
-        if is_page(self.root / PAGE):
-            (self.root / PAGE).unlink()
-
     def clear(self) -> None:
         """Remove what killed processes left half written. Only the holder of the lock may."""
-        for folder in (self.root, self.root / "points", self.root / "failures"):
-            for path in folder.glob(".*.partial*"):
-                if path.is_dir():
-                    shutil.rmtree(path, ignore_errors=True)
-                else:
-                    path.unlink(missing_ok=True)
+        for path in (*self.root.glob(".*.partial*"), *self.root.glob("failures/.*.partial*")):
+            path.unlink(missing_ok=True)
+        for run in self.root.glob("points/*"):
+            if run.name.startswith(".") or not (run / RESULT).is_file():
+                shutil.rmtree(run, ignore_errors=True)
 
 
 @contextlib.contextmanager
@@ -182,7 +155,12 @@ def opened(root: Path) -> Iterator[Layout]:
                 hint = "choose another directory with -o"
                 raise OutputError.because("output-not-a-sweep", message, hint)
             if not held.enter_context(locked(root / LOCK)):
-                raise _taken(root)
+                owner = ""
+                with contextlib.suppress(OSError):
+                    owner = read_regular(root / OWNER, 20).decode(errors="replace").strip()
+                message = f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}"
+                hint = "wait for it, or choose another directory with -o"
+                raise OutputError.because("sweep-locked", message, hint)
             replace_text(root / OWNER, str(os.getpid()))
             for worker in root.glob(f"{WORKER}*"):
                 # Processes of a killed sweep hold it until they have noticed, which takes no time.
@@ -191,14 +169,6 @@ def opened(root: Path) -> Iterator[Layout]:
             layout = Layout(root)
             layout.clear()
         yield layout
-
-
-def _taken(root: Path) -> OutputError:
-    owner = ""
-    with contextlib.suppress(OSError):
-        owner = read_regular(root / OWNER, 20).decode(errors="replace").strip()
-    message = f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}"
-    return OutputError.because("sweep-locked", message, "wait for it, or choose another directory with -o")
 
 
 @contextlib.contextmanager

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.sweep_table import read_sweep
-from inputdesign_cli.questions.verbs import Verb
+from inputdesign_cli.questions import Verb
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.sweeps.grid import Settings
-from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.sweeps.plan import build_plan
+from inputdesign_cli.sweeps.running import SweepRun
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -29,7 +30,7 @@ def sweep(
     executor: Executor | None = None,
     overwrite: bool = False,
 ) -> DataFrame:
-    """Run a verb at every point of a grid and return the table: one row a point, failures included.
+    """Run a verb at every point of a grid and return a table: one row a point, failures included.
 
     The columns are as in sweep.csv: the keys that are varied, `status`, and the numbers of the results
     under their paths in `result.json`.
@@ -45,9 +46,6 @@ def sweep(
         executor: where the points are computed (default: in this process).
         overwrite: whether to replace the table of another sweep.
 
-    Returns:
-        A DataFrame.
-
     Raises:
         SpecError, OutputError: before anything is computed; later OutputError only.
     """
@@ -56,16 +54,9 @@ def sweep(
     text = spec.to_yaml() if isinstance(spec, Spec) else None
     file = spec.resolve_path("<spec>") if isinstance(spec, Spec) else Path(spec)
     with TemporaryDirectory(prefix="idesign-") if directory is None else nullcontext(directory) as kept:
-        run_sweep(
-            file,
-            [settings] if isinstance(settings, str) else settings,
-            directory=Path(kept),
-            zipped=zipped,
-            verb=verb,
-            text=text,
-            executor=executor,
-            overwrite=overwrite,
-        )
+        varied = [settings] if isinstance(settings, str) else settings
+        plan = build_plan(file, varied, zipped=zipped, verb=verb, text=text)
+        SweepRun(plan, Path(kept), executor, overwrite=overwrite).run()
         table = read_sweep(Path(kept))
     # A folder that is gone holds no runs.
     kept_names = (name for name in table.columns if directory is not None or name != "run")

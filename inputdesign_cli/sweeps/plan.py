@@ -13,7 +13,7 @@ from typing import get_args
 from inputdesign_cli.errors import STANDARD_STREAM, OutputError, SpecError, bad_spec
 from inputdesign_cli.outcome.origin import digest
 from inputdesign_cli.outcome.record import environment
-from inputdesign_cli.questions.verbs import Verb
+from inputdesign_cli.questions import Verb
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.specification.yaml.plain import to_yaml
@@ -28,11 +28,12 @@ _TRIED = 50
 
 @dataclass(frozen=True)
 class Plan:
-    """The points of a sweep, in order."""
+    """The points of a sweep, in order; `source` is the file of the spec, or standard input."""
 
     draft: SpecTemplate
     grid: Grid
     verb: Verb
+    source: Path
     _keys: list[str] = field(default_factory=list, repr=False)
 
     def key(self, index: int) -> str:
@@ -153,7 +154,12 @@ def build_plan(
     confine: Path | None = None,
     text: str | None = None,
 ) -> Plan:
-    """Read the spec, unless its text is given, and the settings.
+    """Read the spec, and the settings as `parse_settings` does.
+
+    Args:
+        spec: the file, or with `text` where it would lie.
+        confine: the folder outside of which the spec may name no files.
+        text: of the spec, where it is in no file.
 
     Raises:
         SpecError: the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
@@ -163,6 +169,7 @@ def build_plan(
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
     draft = read_template(spec, fixed, confine=confine, text=text)
-    plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
+    source = Path(STANDARD_STREAM) if text is not None else spec
+    plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb, source)
     plan.check()
     return plan

@@ -20,7 +20,7 @@ from inputdesign_cli.errors import (
     SpecError,
 )
 from inputdesign_cli.outcome.record import environment
-from inputdesign_cli.questions.verbs import Verb, run_verb
+from inputdesign_cli.questions import Verb, run_verb
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweeps.layout import Layout, at_work
 
@@ -55,9 +55,8 @@ class PointJob:
 
 @dataclass(frozen=True)
 class PointEnd:
-    """How a point ended: its status, its failure, and its `files` where ours are out of reach."""
+    """How a point ended: its failure, if it failed, and its `files` where ours are out of reach."""
 
-    status: str
     failure: Mapping[str, object] | None = None
     files: Mapping[str, bytes] | None = None
 
@@ -70,7 +69,7 @@ def run_point(job: PointJob) -> PointEnd:
     """
     if job.root is not None:
         with at_work(job.root):
-            return _compute(job, Layout(job.root).run(job.key))
+            return PointEnd(_compute(job, Layout(job.root).run(job.key)))
     # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
     with _alone, tempfile.TemporaryDirectory(prefix="idesign-") as folder:
         run = Path(folder) / "run"
@@ -81,39 +80,38 @@ def run_point(job: PointJob) -> PointEnd:
             if path.is_relative_to(folder):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
-        end = _compute(replace(job, draft=replace(job.draft, folder=data, confine=None)), run)
-        files = None if end.failure else {path.name: path.read_bytes() for path in sorted(run.iterdir())}
-        return replace(end, files=files)
+        failure = _compute(replace(job, draft=replace(job.draft, folder=data, confine=None)), run)
+        written = {} if failure else {path.name: path.read_bytes() for path in sorted(run.iterdir())}
+        return PointEnd(failure, written or None)
 
 
-def _compute(job: PointJob, directory: Path) -> PointEnd:
+def _compute(job: PointJob, directory: Path) -> dict[str, object] | None:
+    """Compute a point and write its run; return its failure, if it fails."""
+    from inputdesign_cli.figures.plots import draw_all
+    from inputdesign_cli.outcome.run_directory import write_run
+
     started = time.perf_counter()
     try:
         spec = job.draft.spec(job.overrides)
         with bare_interruptions():
             results = run_verb(job.verb, spec)
-        seconds = time.perf_counter() - started
-        timing = {**(results.outcome.timing_s or {}), "point": seconds}
+        timing = {**(results.outcome.timing_s or {}), "point": time.perf_counter() - started}
         results = replace(results, outcome=replace(results.outcome, timing_s=timing))
-        from inputdesign_cli.figures.plots import draw_all
-        from inputdesign_cli.outcome.run_directory import write_run
-
         write_run(results, directory, draw_all(results, job.figures) if job.figures else {})
     except OutputError:
         raise
     except IdesignError as error:
-        codes = {kind.exit_code: status for status, kind in KINDS.items()}
-        status = codes.get(error.exit_code, BROKEN)
-        return failed(status, error.diagnostics[0], time.perf_counter() - started)
+        status = next((status for status, kind in KINDS.items() if kind.exit_code == error.exit_code), BROKEN)
+        return failure_of(status, error.diagnostics[0], time.perf_counter() - started)
     except Exception as error:
         diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
-        return failed(BROKEN, diagnostic, time.perf_counter() - started)
-    return PointEnd(str(results.result.get("status", "done")))
+        return failure_of(BROKEN, diagnostic, time.perf_counter() - started)
+    return None
 
 
-def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:
-    """The end of a point without a result, with the content of its failure file."""
-    content = {
+def failure_of(status: str, diagnostic: Diagnostic, seconds: float = 0.0) -> dict[str, object]:
+    """Return the content of the file about a point without a result."""
+    return {
         "format": 1,
         "status": status,
         "code": diagnostic.code,
@@ -123,4 +121,3 @@ def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:
         "timing_s": {"point": seconds},
         "environment": environment(),
     }
-    return PointEnd(status, content)

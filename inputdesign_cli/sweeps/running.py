@@ -6,27 +6,35 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
-from inputdesign_cli.errors import STANDARD_STREAM, DataError, Diagnostic, IdesignError, OutputError
+from inputdesign_cli.errors import DataError, Diagnostic, IdesignError, OutputError
+from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.origin import Origin
+from inputdesign_cli.outcome.record import PAGE, is_page
 from inputdesign_cli.outcome.run_directory import output_errors, replace_text
-from inputdesign_cli.outcome.text_formats import json_text
-from inputdesign_cli.questions.verbs import Verb
 from inputdesign_cli.specification.yaml.plain import to_yaml
-from inputdesign_cli.sweeps.grid import Settings
 from inputdesign_cli.sweeps.layout import SPEC, SUMMARY, TABLE, Layout, opened
-from inputdesign_cli.sweeps.plan import Plan, build_plan
-from inputdesign_cli.sweeps.point import BROKEN, FAILURES, KINDS, LOST, PointEnd, PointJob, failed, run_point
-from inputdesign_cli.sweeps.table import PENDING, table_lines
+from inputdesign_cli.sweeps.plan import Plan
+from inputdesign_cli.sweeps.point import (
+    BROKEN,
+    FAILURES,
+    KINDS,
+    LOST,
+    PointEnd,
+    PointJob,
+    failure_of,
+    run_point,
+)
+from inputdesign_cli.sweeps.table import PENDING, Row, table_lines
 
 DAMAGED = "damaged"
 """Of a listed point: what is there of it does not hold, so that it is computed again."""
-# While points are computed the table is written anew now and then: first so soon that who follows the sweep
-# sees it, later not more often than this, and for no more than a thirtieth of the time.
+# While points are computed the table is written anew: first so soon that who follows the sweep sees it, later
+# not more often than this, and for no more than a thirtieth of the time.
 _FIRST, _REST, _SHARE = 2.0, 10.0, 30.0
 
 
@@ -70,181 +78,171 @@ class SweepSummary:
 
 
 def list_points(plan: Plan, directory: Path) -> Iterator[Listing]:
-    """The points of a sweep and whether they are done; nothing is computed or written."""
-    layout = Layout(directory)
+    """Yield the points of a sweep and whether they are done; nothing is computed or written."""
+    layout, names = Layout(directory), [axis.key for axis in plan.grid.axes]
     for index, point in enumerate(plan.grid):
         key = plan.key(index)
-        status = "done" if layout.has_result(key) else "failed" if layout.has_failure(key) else PENDING
-        status = DAMAGED if layout.flaw(key, plan.resolved(index)) else status
-        names = (axis.key for axis in plan.grid.axes)
+        try:
+            content = layout.read(key, plan.resolved(index))
+            status = PENDING if content is None else "failed" if "code" in content else "done"
+        except DataError:
+            status = DAMAGED
         yield Listing(dict(zip(names, point, strict=True)), key, status)
 
 
-def run_sweep(
-    spec: Path,
-    settings: Settings = (),
-    *,
-    directory: Path,
-    zipped: bool = False,
-    verb: Verb = "solve",
-    confine: Path | None = None,
-    text: str | None = None,
-    executor: Executor | None = None,
-    fail_fast: bool = False,
-    rerun_failed: bool = False,
-    figures: bool = False,
-    figure_format: str = "png",
-    overwrite: bool = False,
-    watch: Callable[[Progress], None] | None = None,
-) -> SweepSummary:
-    """Run a verb at every point of a grid, but for the points that are done already.
+@dataclass
+class SweepRun:
+    """Runs a verb at every point of a plan, but for the points that are done already.
 
-    Args:
-        spec: the file, or with `text` where it would lie.
-        settings: see `parse_settings`.
-        confine: the folder outside of which the spec may name no files.
-        text: of the spec, where it is in no file.
+    Attributes:
         executor: where the points are computed (default: in this process).
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
-        figures: draw the figures of every point too.
+        figures: draw the figures of every point too, not only of the sweep.
         figure_format: of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
         watch: is called after every point.
-
-    Raises:
-        SpecError, OutputError: before anything is computed; later OutputError only.
-        IdesignError: the first failure, with `fail_fast`.
     """
-    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine, text=text)
-    with opened(directory) as layout:
-        source = Path(STANDARD_STREAM) if text is not None else spec
-        made_from = Origin([source]).seen_from(Path(os.path.realpath(directory)))
-        if not overwrite:
-            plan.check_place(made_from, directory)
-        layout.remove_page()
-        replace_text(directory / SUMMARY, json_text(plan.summary(made_from, {})))
-        replace_text(directory / SPEC, to_yaml(plan.data()))
-        drawn = figure_format if figures else ""
-        run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, drawn, watch)
-        try:
-            run.compute()
-        finally:
-            statuses = run.write_table()
-            replace_text(directory / SUMMARY, json_text(plan.summary(made_from, statuses)))
-        if fail_fast and run.first_failure:
-            raise run.first_failure
-        from inputdesign_cli.figures.sweep_figures import draw_sweep
-        from inputdesign_cli.figures.sweep_table import read_sweep
 
-        files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
-        files += draw_sweep(read_sweep(directory), directory, figure_format)
-        found = (run.computed, statuses, run.first_failure, files, run.damaged)
-        return SweepSummary(directory, len(plan.grid), *found)
-
-
-@dataclass
-class _Run:
     plan: Plan
-    layout: Layout
-    executor: Executor
-    fail_fast: bool
-    rerun_failed: bool
-    figures: str
-    watch: Callable[[Progress], None] | None
-    passed: int = 0
-    computed: int = 0
-    failed: int = 0
-    stopped: bool = False
-    lost: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    damaged: list[str] = field(default_factory=list)
-    seen: set[str] = field(default_factory=set)  # keys of which nothing is left that was not looked at
-    first_failure: IdesignError | None = None
+    directory: Path
+    executor: Executor | None = None
+    fail_fast: bool = False
+    rerun_failed: bool = False
+    figures: bool = False
+    figure_format: str = "png"
+    overwrite: bool = False
+    watch: Callable[[Progress], None] | None = None
+    # By the key of a point that was looked at: its row, None while it is computed.
+    rows: dict[str, Row | None] = field(default_factory=dict, init=False)
+    passed: int = field(default=0, init=False)
+    computed: int = field(default=0, init=False)
+    failed: int = field(default=0, init=False)
+    damaged: list[str] = field(default_factory=list, init=False)
+    first_failure: IdesignError | None = field(default=None, init=False)
 
-    def compute(self) -> None:
+    def run(self) -> SweepSummary:
+        """Compute what is not done yet, and write the table.
+
+        Raises:
+            OutputError: the directory cannot be used.
+            IdesignError: the first failure, with `fail_fast`.
+        """
+        plan, directory = self.plan, self.directory
+        with opened(directory) as self.layout:
+            made_from = Origin([plan.source]).seen_from(Path(os.path.realpath(directory)))
+            if not self.overwrite:
+                plan.check_place(made_from, directory)
+            if is_page(directory / PAGE):  # it is about what the sweep was before
+                (directory / PAGE).unlink()
+            replace_text(directory / SUMMARY, json_text(plan.summary(made_from, {})))
+            replace_text(directory / SPEC, to_yaml(plan.data()))
+            try:
+                self._compute()
+            finally:
+                statuses = self._write_table()
+                replace_text(directory / SUMMARY, json_text(plan.summary(made_from, statuses)))
+            if self.fail_fast and self.first_failure:
+                raise self.first_failure
+            from inputdesign_cli.figures.sweep_figures import draw_sweep
+            from inputdesign_cli.figures.sweep_table import read_sweep
+
+            files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
+            files += draw_sweep(read_sweep(directory), directory, self.figure_format)
+            found = (self.computed, statuses, self.first_failure, files, self.damaged)
+            return SweepSummary(directory, len(plan.grid), *found)
+
+    def _compute(self) -> None:
         """Compute what is not done yet."""
-        points = self.layout.root / "points"
+        points = self.directory / "points"
         with output_errors(points):
             points.mkdir(exist_ok=True)
         due = time.monotonic() + _FIRST
         finished: Finished[PointJob, PointEnd]
-        for finished in self.executor.run(run_point, self._jobs()):
+        executor = self.executor or InProcess()
+        for finished in executor.run(run_point, self._jobs(executor.shares_files)):
             self._take(finished)
-            if self.stopped:
+            if self.fail_fast and self.failed:
                 return
             if time.monotonic() > due:
                 started = time.monotonic()
-                self.write_table()
+                self._write_table()
                 due = time.monotonic() + max(_REST, _SHARE * (time.monotonic() - started))
 
-    def write_table(self) -> dict[str, int]:
+    def _write_table(self) -> dict[str, int]:
         """Write sweep.csv as things stand, and count the points by status."""
-        statuses: Counter[str] = Counter()
+        grid = self.plan.grid
+        rows = [(point, self._row(self.plan.key(index))) for index, point in enumerate(grid)]
+        replace_text(self.directory / TABLE, table_lines([axis.key for axis in grid.axes], rows))
+        return dict(sorted(Counter(row.status for _, row in rows).items()))
 
-        def read(key: str) -> Mapping[str, Any] | None:
-            holds = key in self.seen or not self.layout.flaw(key)
-            content = (self.layout.read(key) if holds else None) or self.lost.get(key)
-            statuses[content.get("status", "done") if content else PENDING] += 1
-            return content
+    def _row(self, key: str) -> Row:
+        """Return the row of a point, from its files where it is computed or was not looked at."""
+        try:
+            return self.rows.get(key) or Row.of(key, self.layout.read(key))
+        except DataError:
+            return Row()
 
-        replace_text(self.layout.root / TABLE, table_lines(self.plan, read))
-        # The table reads every point twice.
-        return {status: n // 2 for status, n in sorted(statuses.items())}
-
-    def _jobs(self) -> Iterator[PointJob]:
-        root = self.layout.root if self.executor.shares_files else None
+    def _jobs(self, shares_files: bool) -> Iterator[PointJob]:
+        root, drawn = self.directory if shares_files else None, self.figure_format if self.figures else ""
         for index in range(len(self.plan.grid)):
-            if self.stopped:
+            if self.fail_fast and self.failed:
                 return
-            key, known = self.plan.key(index), True
-            if key not in self.seen:
-                if why := self.layout.flaw(key, self.plan.resolved(index)):
-                    self.damaged.append(why)
-                    self.layout.discard(key)  # it is computed again
-                self.seen.add(key)
-                known = self.layout.has_result(key)
-                if not known and self.layout.has_failure(key) and not self.rerun_failed:
-                    known = True
-                    self._note_failure(index, self.layout.read(key) or {})
-            if known:
-                self._report()
-            else:
-                yield self.plan.job(index, root, figures=self.figures)
+            key = self.plan.key(index)
+            if key not in self.rows:
+                content = self._known(index, key)
+                self.rows[key] = Row.of(key, content) if content else None
+                if content is None:
+                    yield self.plan.job(index, root, figures=drawn)
+                    continue
+                if "code" in content:
+                    self._note_failure(index, content)
+            self._report()
+
+    def _known(self, index: int, key: str) -> Mapping[str, object] | None:
+        """Return what is there of a point; nothing if that is damaged, or if it is to be tried again."""
+        try:
+            content = self.layout.read(key, self.plan.resolved(index))
+        except DataError as error:
+            self.damaged.append(error.diagnostics[0].message)
+            self.layout.discard(key)
+            return None
+        return None if content and "code" in content and self.rerun_failed else content
 
     def _take(self, finished: Finished[PointJob, PointEnd]) -> None:
         """File what a worker has answered."""
-        job, end = finished.job, finished.answer
+        job, end, error = finished.job, finished.answer, finished.error
         self.computed += 1
-        if isinstance(finished.error, OutputError):
-            raise finished.error
+        if isinstance(error, OutputError):
+            raise error
+        lost = isinstance(error, WorkerLostError)
         if end is None:
-            lost = isinstance(finished.error, WorkerLostError)
             code, status = ("worker-lost", LOST) if lost else ("internal-error", BROKEN)
-            end = failed(status, Diagnostic(code, str(finished.error)), 0.0)
+            end = PointEnd(failure_of(status, Diagnostic(code, str(error))))
         if end.files is not None:
             try:
                 self.layout.adopt(job.key, end.files)
             except DataError as strange:
-                end = failed(BROKEN, strange.diagnostics[0], 0.0)
+                end = PointEnd(failure_of(BROKEN, strange.diagnostics[0]))
         if end.failure is None:
             self.layout.failure(job.key).unlink(missing_ok=True)
+            self.rows[job.key] = Row.of(job.key, self.layout.read(job.key))
         else:
-            if end.status == LOST:  # not the fault of the point: the next call tries it again
-                self.lost[job.key] = end.failure
-            else:
+            if not lost:  # or else it is not the fault of the point: the next call tries it again
                 self.layout.write_failure(job.key, end.failure)
+            self.rows[job.key] = Row.of(job.key, end.failure)
             self._note_failure(job.index, end.failure)
         self._report()
 
-    def _note_failure(self, index: int, content: Mapping[str, Any]) -> None:
+    def _note_failure(self, index: int, content: Mapping[str, object]) -> None:
         self.failed += 1
-        self.stopped = self.stopped or self.fail_fast
         if self.first_failure is None:
             point = " ".join(f"--set {text}" for text in self.plan.grid.overrides(self.plan.grid[index]))
-            kind = KINDS.get(content.get("status", ""), IdesignError)
-            message = f"{content.get('message', '')} (at {point})"
-            diagnostic = Diagnostic(content.get("code", ""), message, content.get("hint", ""))
-            self.first_failure = kind(replace(diagnostic, key=content.get("key", "")))
+            code, status, message, hint, key = (
+                str(content[name]) for name in ("code", "status", "message", "hint", "key")
+            )
+            diagnostic = Diagnostic(code, f"{message} (at {point})", hint, key)
+            self.first_failure = KINDS.get(status, IdesignError)(diagnostic)
 
     def _report(self) -> None:
         self.passed += 1

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from inputdesign_cli.outcome.text_formats import csv_line, shortest
-from inputdesign_cli.sweeps.plan import Plan
-
-Read = Callable[[str], Mapping[str, Any] | None]
 
 PENDING = "pending"
 MOST_ENTRIES = 4
@@ -35,39 +33,45 @@ _LEFT_OUT = frozenset(
 )  # fmt: skip
 
 
-def table_lines(plan: Plan, read: Read) -> Iterator[str]:
-    """The lines of the table, one point in memory at a time.
+@dataclass(frozen=True)
+class Row:
+    """Holds what the table says of a point: `numbers` of its result by their paths, or why it has none."""
+
+    status: str = PENDING
+    numbers: Mapping[str, object] = field(default_factory=dict)
+    seconds: object = None
+    code: str = ""
+    reason: str = ""
+    run: str = ""
+
+    @classmethod
+    def of(cls, key: str, content: Mapping[str, Any] | None) -> Row:
+        """Return the row of a point from its result, its failure (which has a `code`), or neither."""
+        if content is None:
+            return cls()
+        status, seconds = content.get("status", "done"), content.get("timing_s", {}).get("point")
+        if "code" in content:
+            return cls(status, {}, seconds, content["code"], content["message"])
+        return cls(status, scalars(content), seconds, run=f"points/{key}")
+
+
+def table_lines(axes: Sequence[str], rows: Sequence[tuple[Sequence[str], Row]]) -> Iterator[str]:
+    """Return the lines of the table.
 
     Args:
-        read: key of a point -> its result, its failure (which has a `code`), or None while it is pending.
+        axes: the keys that are varied.
+        rows: each point, as the texts of its values, with its row.
     """
-    found: dict[str, None] = {}
-    for index in range(len(plan.grid)):
-        content = read(plan.key(index))
-        if content is not None and "code" not in content:
-            found.update(dict.fromkeys(scalars(content)))
+    found = dict.fromkeys(name for _, row in rows for name in row.numbers)
     names = [*(n for n in FIRST if n in found), *(n for n in found if n not in FIRST)]
-    yield csv_line([*(axis.key for axis in plan.grid.axes), "status", *names, *LAST])
-    for index in range(len(plan.grid)):
-        key = plan.key(index)
-        content = read(key)
-        point = list(plan.grid[index])
-        if content is None:
-            yield csv_line([*point, PENDING, *([""] * (len(names) + len(LAST)))])
-            continue
-        timing = content.get("timing_s", {})
-        seconds = _cell(timing.get("point"))
-        if "code" in content:
-            tail = [seconds, content["code"], content["message"], ""]
-            yield csv_line([*point, content["status"], *([""] * len(names)), *tail])
-        else:
-            values = scalars(content)
-            cells = [_cell(values.get(name)) for name in names]
-            yield csv_line([*point, content.get("status", "done"), *cells, seconds, "", "", f"points/{key}"])
+    yield csv_line([*axes, "status", *names, *LAST])
+    for point, row in rows:
+        cells = [_cell(row.numbers.get(name)) for name in names]
+        yield csv_line([*point, row.status, *cells, _cell(row.seconds), row.code, row.reason, row.run])
 
 
 def scalars(value: object, path: str = "") -> dict[str, object]:
-    """Every number, text and truth value of a result by its path (`power.input[0]`), short lists included."""
+    """Return every number, text and truth value of a result by its path (`power.input[0]`)."""
     found: dict[str, object] = {}
     if isinstance(value, Mapping):
         for key, item in value.items():

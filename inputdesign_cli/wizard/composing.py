@@ -1,32 +1,35 @@
-"""A commented spec from answers: all at once, or question by question."""
+"""A commented spec from answers: all at once, or question by question; `experiment.txt` has its lines."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from inputdesign_cli.errors import IdesignError, OutputError
+from inputdesign_cli.outcome.results import Result
+from inputdesign_cli.outcome.sentences import filled
+from inputdesign_cli.outcome.shares import per_cent
 from inputdesign_cli.specification import Spec, parse_spec
-from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.grammar import seconds, sensible, short
-from inputdesign_cli.wizard.means import input_range, limit_lines, limited, loop_line, signal_lines
+from inputdesign_cli.wizard.grammar import Phrase, short
 from inputdesign_cli.wizard.noise import noise_lines
-from inputdesign_cli.wizard.plants import understand_plant
-from inputdesign_cli.wizard.questions import QUESTIONS, Question, bad_answer, complete, known_from
-from inputdesign_cli.wizard.stated_plants import PlantAnswer
-from inputdesign_cli.wizard.wishes import wished
+from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
+from inputdesign_cli.wizard.questions import (
+    QUESTIONS,
+    Question,
+    bad_answer,
+    chosen,
+    complete,
+    in_their_words,
+    known_from,
+)
+from inputdesign_cli.wizard.wishes import controller, input_range, limited, quantisation, wished
 
 _MOST, LEAST = 5000, 50  # samples
+_TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
 _UNUSED = (
     "how well the plant is known is not used: a Bode plot is designed at the plant as stated, and another "
     "plant needs other powers"
-)
-_DRAWN = (
-    "  scenarios: 30  # what is asked holds at all of these plants, drawn from that",
-    "  worst_case: 0.95  # and at the worst ones that a search finds there",  # in intervals: everywhere
-    "  fresh: 200",
 )
 # Answers that go with every other, in place of answers that are not asked for yet.
 _MEANWHILE = {
@@ -35,37 +38,33 @@ _MEANWHILE = {
     "range": "plus/minus 1",
     "noise": "standard deviation 1",
 }
+# Orders of filtered noise, and numbers of sinusoids up to half the samples, from the simplest on.
+_ORDERS, _LINES = (20, 40), (60, 120, 240)
+_ENOUGH = 1.02  # of the bound over every spectrum
+_LEAST_GAP = 1e-3  # smaller gaps are written as this
+_BEYOND = 2.0  # a bound that many times better leaves limits out, and says nothing
+
+Solve = Callable[[Spec], Result]
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A spec in parts, and the files next to it.
+    """A spec as facts for its template, and the files next to it."""
 
-    Args:
-        heads: the lines before the spectrum.
-        tails: the lines behind it.
-        spectrum: as in a spec; None if the accuracy has the lines.
-        said: the answers.
-        there: seconds that may be taken.
-        notes: what the user must know of the plant, a sentence each.
-        why: the comment on the spectrum.
-    """
-
-    heads: tuple[str, ...]
-    tails: tuple[str, ...]
+    facts: Mapping[str, object]  # what the template knows by name
     files: Mapping[str, bytes]
-    spectrum: str | None
+    spectrum: str | None  # as in a spec; None if the accuracy has the lines
     folder: Path
-    said: Mapping[str, str]
-    there: float
-    notes: tuple[str, ...] = ()
-    why: str = "filtered noise"
+    said: Mapping[str, str]  # the answers
+    there: float  # seconds that may be taken
+    notes: tuple[str, ...] = ()  # what the user must know of the plant, a sentence each
+    why: str = "filtered noise"  # the comment on the spectrum
 
     @property
     def text(self) -> str:
         """The spec."""
-        spectrum = () if self.spectrum is None else (f"spectrum: {self.spectrum}  # {self.why}",)
-        return "\n".join([*self.heads, *spectrum, *self.tails]) + "\n"
+        known = {**self.facts, "spectrum": self.spectrum, "why": self.why}
+        return filled("inputdesign_cli.wizard", "experiment.txt", known)
 
     def spec(self) -> Spec:
         """Return the spec, checked; the files next to it must have been written.
@@ -103,70 +102,84 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    said = {key: sensible(text, key) for key, text in complete(answers).items()}
-    span, there = input_range(said["range"]), seconds(said["time"], "time")
+    said = complete(answers)
+    span, there = input_range(said["range"]), Phrase(said["time"], "time").seconds()
     plant = plant or understand_plant(said["plant"], stem, folder)
-    step = plant.sample_time
-    if there < LEAST * step:
-        why = "a twentieth of the time constant" if plant.sampling is None else plant.why_sampling
-        why = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
-        raise bad_answer("time", why)
-    duration = min(there, _MOST * step)
-    controller = loop_line(said["loop"], plant)
-    asked = wished(said["wish"], plant, controller is not None, duration)
-    # Lines of a response are one over the time apart: it takes all of it.
-    nonparametric = any("frequency_response" in line for line in asked)
-    limits = limit_lines(span, said["limits"], there if nonparametric else duration, step)
-    if duration < there and not nonparametric:
-        limits[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
-    known = _uncertain(plant)
-    unused = [_UNUSED] if nonparametric and known else []
-    loop = ["experiment:", f"  controller: {controller}  # u = r - C y; r is designed"]
-    heads = [
-        "# Written by `idesign wizard`: every line follows from an answer. Change what you know better.",
-        f"title: {json.dumps(said['wish'], ensure_ascii=False)}",
-        *_head(plant),
-        *(f"# against this model: {one}" for one in plant.against),
-        *noise_lines(said["noise"], said["drift"], folder, plant),
-        *([f"# {one}" for one in unused] or known),
-        *([] if controller is None else loop),
-        *asked,
-        "objective: best_accuracy  # use all that is allowed",
-        *limits,
-    ]
-    fitted = limited(said["limits"])[1] is not None
-    tails = signal_lines(said["signals"], said["converter"], span, fitted=fitted)
-    tails += ["  periods: 5"] if nonparametric else []  # equal ones, of which the first is transient
-    return Draft(
-        tuple(heads),
-        tuple(tails),
-        plant.files,
-        None if nonparametric else "{type: fir, order: 20}",
-        folder,
-        said,
-        there,
-        (*(f"against the model of {plant.source}: {one}" for one in plant.against), *unused),
-    )
-
-
-def _head(plant: PlantAnswer) -> list[str]:
-    """Return the lines of the clock and the plant; a file that is included has the clock."""
-    if plant.explored is not None:
-        return [*plant.lines]
-    why = plant.why_sampling
+    step, why = plant.sample_time, plant.why_sampling
     if plant.sampling is None:
         why = f"a twentieth of the time constant of {short(plant.slow)} s, or a little less"
-    return [f"sample_time: {short(plant.sample_time)}  # {why}", "time_unit: s", *plant.lines]
+    if there < LEAST * step:
+        short_of = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
+        raise bad_answer("time", short_of)
+    duration = min(there, _MOST * step)
+    control = controller(said["loop"], plant)
+    asked = wished(said["wish"], plant, control is not None, duration)
+    # Lines of a response are one over the time apart: it takes all of it.
+    nonparametric = any("frequency_response" in line for line in asked)
+    rate, output = limited(said["limits"])
+    unused = nonparametric and (plant.covariance is not None or bool(plant.intervals))
+    facts = {
+        "said": said,
+        "plant": plant,
+        "why_sampling": why,
+        "noise": noise_lines(said["noise"], said["drift"], folder, plant),
+        "unused": _UNUSED * unused,
+        "controller": control,
+        "asked": asked,
+        "span": span,
+        "rate": rate,
+        "output": output,
+        "duration": there if nonparametric else duration,
+        "there": there,
+        "most": _MOST,
+        "made": chosen("signals", said["signals"], _TYPES),
+        "converter": quantisation(said["converter"]),
+    }
+    against = (f"against the model of {plant.source}: {one}" for one in plant.against)
+    spectrum = None if nonparametric else "{type: fir, order: 20}"
+    return Draft(facts, plant.files, spectrum, folder, said, there, (*against, *[_UNUSED] * unused))
 
 
-def _uncertain(plant: PlantAnswer) -> list[str]:
-    """Return the lines of `uncertainty`, if something is said of it."""
-    if plant.covariance is not None:
-        return ["uncertainty:", f"  covariance: {plant.covariance}", *_DRAWN]
-    if not plant.intervals:
-        return []
-    listed = [f"    {name}: [{short(low)}, {short(high)}]" for name, (low, high) in plant.intervals.items()]
-    return ["uncertainty:  # how well it is known", "  intervals:", *listed, *_DRAWN]
+def with_spectrum(draft: Draft, solve: Solve) -> Draft:
+    """Return the draft with the simplest spectrum that is within 2 % of every other at the plant as stated.
+
+    Where none is, it gets the simplest of the best. Filtered noise has power between the lines of a
+    multisine, so that its record does not repeat: a dead time that is a period longer would explain a record
+    that does nearly as well. A record that leaves other dead times open is taken only where all do.
+
+    Raises:
+        IdesignError: nothing can be designed; in words of the answers.
+    """
+    if draft.spectrum is None:
+        return draft
+    tried: list[tuple[Draft, float, float, bool]] = []
+    for words, what in _spectra(draft.spec().experiment.samples):
+        one = replace(draft, spectrum=words, why=what)
+        with in_their_words(draft.said):
+            result = solve(one.spec().with_(uncertainty=None, **{"signal.candidates": 1}))
+        value, bound = (float(result["objective"].get(key) or 0.0) for key in ("value", "any_spectrum_bound"))
+        rivals = bool(result.get("foreseen", {}).get("rivals"))
+        tried.append((one, value, bound, rivals))
+        if value <= _ENOUGH * bound and not rivals:
+            break
+    clear = [one for one in tried if not one[3]] or tried
+    least = min(value for _, value, *_ in clear)
+    best, value, bound, _ = next(one for one in clear if one[1] <= _ENOUGH * least)
+    comment = f"{best.why}; longer ones are no better, as far as was tried"
+    if value <= _BEYOND * bound:
+        gap = max(value / bound - 1.0, _LEAST_GAP)
+        comment = f"{best.why}: no other is better by more than {per_cent(gap, 2)}"
+    return replace(best, why=comment)
+
+
+def _spectra(samples: int) -> list[tuple[str, str]]:
+    """Return the spectra to try in words of a spec and of a comment."""
+    most = max(samples // 2, 1)
+    lines = [min(_LINES[0], most), *(number for number in _LINES[1:] if number <= most)]
+    return [
+        *((f"{{type: fir, order: {order}}}", f"filtered noise of order {order}") for order in _ORDERS),
+        *((f"{{type: multisine, lines: {number}}}", f"{number} sinusoids") for number in lines),
+    ]
 
 
 class Conversation:

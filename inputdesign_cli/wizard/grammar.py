@@ -1,4 +1,7 @@
-"""One grammar of answers: words, a number behind or before them, and its unit. No word may stay unread."""
+"""One grammar of answers: words, a number behind or before them, and its unit. No word may stay unread.
+
+What cannot be read is a SpecError `bad-answer`.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +22,17 @@ _OF = r"\s*(?:(?:of|about|is|ca\.?|up to)\b\s*|[:=]\s*)*"
 _WITHIN = rf"(?:\s*(?:within|{PLUS_MINUS})\s*{NUMBER}{_PER_CENT})?"
 _MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
 # Kinds of units -> each unit in the one that a spec has.
-_SCALES = {
-    "time": {"ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": _MINUTE, "minutes": _MINUTE, "h": _HOUR,
-             "hour": _HOUR, "hours": _HOUR, "d": _DAY},
+SCALES = {
+    "time": {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": _MINUTE, "minutes": _MINUTE,
+             "h": _HOUR, "hour": _HOUR, "hours": _HOUR, "d": _DAY},
     "frequency": {"rad/s": 1.0, "rad/min": 1.0 / _MINUTE, "mhz": 2e-3 * math.pi, "hz": 2.0 * math.pi,
                   "khz": 2e3 * math.pi},
     "rate": {"s": 1.0, "sec": 1.0, "second": 1.0, "min": 1.0 / _MINUTE, "minute": 1.0 / _MINUTE,
              "h": 1.0 / _HOUR, "hour": 1.0 / _HOUR},
 }  # fmt: skip
 # A group each, which holds a unit of the kind; the last three convert nothing.
-_UNITS = {kind: rf"(?:\s*({'|'.join(scales)})\b)?" for kind, scales in _SCALES.items()} | {
-    "rate": rf"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?(?:\s*(?:per|/)\s*({'|'.join(_SCALES['rate'])})\b)?",
+_UNITS = {kind: rf"(?:\s*({'|'.join(scales)})\b)?" for kind, scales in SCALES.items()} | {
+    "rate": rf"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?(?:\s*(?:per|/)\s*({'|'.join(SCALES['rate'])})\b)?",
     "gain": r"((?:\s*[^\s\d,;|]*/[^\s,;|]+)?)",
     "any": rf"({UNIT})",
     "none": "()",
@@ -37,34 +40,22 @@ _UNITS = {kind: rf"(?:\s*({'|'.join(scales)})\b)?" for kind, scales in _SCALES.i
 _FILLING = "a an the of and with in at each all about is for by i want"
 
 
-def sensible(text: str, key: str) -> str:
-    """Return the text of an answer; each of its numbers is of a size that can be meant.
-
-    Raises:
-        SpecError: `bad-answer`.
-    """
-    for found in re.findall(rf"{ALONE}{NUMBER}", text):
-        if float(found) and not SMALLEST <= abs(float(found)) <= LARGEST:
-            why = f"{found} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
-            raise bad_answer(key, why)
-    if strange := re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I):
-        raise bad_answer(key, f"{strange[1]} is no number")
-    return text
-
-
 class Phrase:
     """An answer that is read piece by piece; `finish` refuses what nobody read.
 
-    Every method returns None if the text has no piece of its kind.
+    A method returns None if the text has no piece of its kind.
     """
 
     def __init__(self, text: str, key: str) -> None:
-        """Begin with the whole text of the answer to a question.
-
-        Raises:
-            SpecError: `bad-answer`, a number has a decimal comma.
-        """
+        """Begin with the whole answer to a question; its numbers are of sizes that can be meant."""
         self.text, self.key, self._left = text, key, text
+        sizes = (one for one in re.findall(rf"{ALONE}{NUMBER}", text) if float(one))
+        strange = next((one for one in sizes if not SMALLEST <= abs(float(one)) <= LARGEST), None)
+        if strange is not None:
+            why = f"{strange} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
+            raise bad_answer(key, why)
+        if nan := re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I):
+            raise bad_answer(key, f"{nan[1]} is no number")
         if comma := re.search(r"\d+,\d+", text):
             why = f"{comma[0]} is a number with a comma, or two: write 2.5, and a blank behind commas"
             raise bad_answer(key, why)
@@ -87,9 +78,6 @@ class Phrase:
         Args:
             kind: of the unit: time, frequency, rate, gain, any (which is not converted) or none.
             named: whether words without a number are refused.
-
-        Raises:
-            SpecError: `bad-answer`.
         """
         found = self.take(rf"\b(?:{words})\b{_OF}{NUMBER}{_UNITS[kind]}")
         if found is None and named and (alone := re.search(rf"\b(?:{words})\b", self._left, re.I)):
@@ -117,12 +105,18 @@ class Phrase:
         found = self.number(rf"(?:\b(?:within)\b|{PLUS_MINUS})?\s*{NUMBER}{_PER_CENT}")
         return None if found is None else found / 100.0
 
-    def finish(self, also: str = "") -> None:
-        """Refuse what was not read, except words without content and `also` (words between blanks).
+    def seconds(self) -> float:
+        """Read the whole answer as a time, as in "45 min"."""
+        found = self.take(rf"{NUMBER}\s*([a-z]*)")
+        if found is None:
+            raise bad_answer(self.key, f'"{self.text}" is no time')
+        if (found[2].lower() or "s") not in SCALES["time"]:
+            raise bad_answer(self.key, f'"{found[2]}" is no unit of time: s, min or h')
+        self.finish()
+        return needed(_scaled(found[1], found[2], "time"), self.key, "the time")
 
-        Raises:
-            SpecError: `bad-answer`.
-        """
+    def finish(self, also: str = "") -> None:
+        """Refuse what was not read, except words without content and `also` (words between blanks)."""
         known = f"{_FILLING} {also.lower()}".split()
         for piece in self._left.split("|"):
             if any(word and word not in known for word in re.split(r"[\s,;.:]+", piece.lower())):
@@ -130,29 +124,11 @@ class Phrase:
 
 
 def _scaled(number: str, unit: str | None, kind: str) -> float:
-    return float(number) * _SCALES.get(kind, {}).get((unit or "").lower(), 1.0)
-
-
-def seconds(text: str, key: str) -> float:
-    """Return the seconds of an answer that is a time, as in "45 min".
-
-    Raises:
-        SpecError: `bad-answer`.
-    """
-    found = re.fullmatch(rf"(?:about\s*)?{NUMBER}\s*([a-z]*)", text.strip(), re.I)
-    if found is None or float(found[1]) <= 0.0:
-        raise bad_answer(key, f'"{text}" is no time')
-    if (found[2].lower() or "s") not in _SCALES["time"]:
-        raise bad_answer(key, f'"{found[2]}" is no unit of time: s, min or h')
-    return _scaled(found[1], found[2], "time")
+    return float(number) * SCALES.get(kind, {}).get((unit or "").lower(), 1.0)
 
 
 def needed(value: float | None, key: str, what: str) -> float:
-    """Return the value, which must be there and positive.
-
-    Raises:
-        SpecError: `bad-answer`.
-    """
+    """Return the value, which must be there and positive."""
     if value is None:
         raise bad_answer(key, f"it does not say {what}")
     if not value > 0.0:

@@ -13,18 +13,17 @@ import numpy as np
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.specification import Noise, Spec
-from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.grammar import NUMBER, UNIT, Phrase, needed, seconds, short
-from inputdesign_cli.wizard.questions import AS_LOG, bad_answer, chosen, file_of
-from inputdesign_cli.wizard.stated_plants import PlantAnswer
+from inputdesign_cli.wizard.grammar import NUMBER, SCALES, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.plants import PlantAnswer
+from inputdesign_cli.wizard.questions import AS_LOG, bad_answer, chosen, file_of, in_their_words
 
 _DRIFTING = (1.0, -0.8)  # C of noise that drifts
 _SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above this number of standard deviations colour the noise
 _FEWEST = 20  # rows of data at rest
 _STRONGEST = 0.98  # correlation from one sample to the next
+_STEADY = 1e-3  # D(1) below it is that of an integrator
 _LONG = 100_000  # samples after which no pole of a log remembers anything
-_DRIFTS = "  drift: true  # an integrator in the noise"
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,6 @@ class _Level:
     variance: float
     pole: float
     why: str
-    at_rest: bool = False
     rounded: bool = False  # it is the least that noise can be
 
 
@@ -45,51 +43,52 @@ def noise_lines(text: str, drift: str, folder: Path, plant: PlantAnswer) -> list
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    moves = plant.explored is not None and bool(np.any(plant.explored.noise.drift))
+    explored = plant.explored
+    moves = explored is not None and _moves(explored.noise)
     drifts = chosen("drift", drift, {"yes": True, "no": False, "not known": moves})
-    if plant.explored is not None:
-        return _of_log(plant.explored, plant.source, text, folder, moves=moves, drifts=drifts)
-    level = _stated(text, folder, plant.sample_time)
+    level = None if text == AS_LOG and explored else _stated(text, folder, plant.sample_time)
+    if explored is not None:
+        return _beside_log(explored, level, plant.source, moves=moves, drifts=drifts)
+    assert level is not None
     lines = ["noise:", f"  variance: {short(level.variance)}  # {level.why}"]
     if drifts:
-        return [*lines, _DRIFTS, f"  C: {list(_DRIFTING)}"]
+        return [*lines, *_drift(drifts), f"  C: {list(_DRIFTING)}"]
     return [*lines, f"  D: [1, {short(-level.pole)}]  # {level.why}"] if level.pole else lines
 
 
-def _of_log(explored: Spec, source: str, text: str, folder: Path, *, moves: bool, drifts: bool) -> list[str]:
-    """Return the lines of `noise` beside a log, which moves or not, of noise that is said to drift or not.
+def _beside_log(explored: Spec, level: _Level | None, source: str, *, moves: bool, drifts: bool) -> list[str]:
+    """Return the lines of noise as a log has it, scaled to the size that is stated.
 
-    The size is the one that is stated; a resolution is the least that noise can be, and the log may show
-    more. Noise without drift is correlated as in the log, unless data at rest show its correlation.
+    A resolution is the least that noise can be, and the log may show more. Noise that drifts in the log and
+    is said not to is white; noise that is said to drift beyond the log gets an integrator.
     """
     noise, plant = explored.noise, explored.plant
     assert plant.kind != "regression"
-    own = json.dumps(np.asarray(noise.variance).tolist())
-    if text == AS_LOG and drifts == moves:
-        return [f"noise:  # as in {source}", f"  variance: {own}", *_shape(noise)]
-    powers = np.diag(noise.covariance(plant.outputs))
-    level = _Level(float(np.max(powers)), 0.0, "the variance in the log")
-    if text != AS_LOG:
-        level = _stated(text, folder, explored.sample_time)
     A = _per_output(plant.A if plant.kind == "polynomial" else (1.0,), plant.outputs)
-    steady = not (drifts or moves or level.at_rest)
-    gains = _gains(noise, A) if steady else np.ones(plant.outputs)
-    variance, why = short(level.variance), level.why
-    if level.rounded and np.max(powers * gains) > level.variance:
-        variance, why = own, f"of {source}: more than rounding leaves"
-    elif np.any(gains > 1.0):
-        sizes = float(variance) / gains
-        variance = short(sizes[0]) if sizes.size == 1 else json.dumps(np.diag(sizes).tolist())
-        why += f", correlated as in {source}"
-    listed = ", ".join(map(short, (powers * gains).tolist()))
-    has = f"the log has a variance of {listed}, {'and drift' if moves else 'and no drift'}"
-    lines = [f"noise:  # as you said; {has}", f"  variance: {variance}  # {why}"]
-    if steady or (drifts and moves):  # with the colour that was estimated along
-        return [*lines, *_shape(noise)]
-    lines += [_DRIFTS] if drifts else [f"  D: [1, {short(-level.pole)}]"] if level.pole else []
-    # 1/A stands before C: with the factor A in C, the noise of y is that without A.
-    C = [np.convolve(_DRIFTING if drifts else (1.0,), row).tolist() for row in A]
-    return lines if [[1.0]] * len(C) == C else [*lines, f"  C: {json.dumps(C if len(C) > 1 else C[0])}"]
+    variance = noise.covariance(len(A))
+    powers = np.diag(variance) * (1.0 if moves else _gains(noise, A))
+    if level is not None:
+        shares = level.variance / powers
+        scale = np.sqrt(np.maximum(shares, 1.0) if level.rounded else shares)
+        variance = variance * np.outer(scale, scale)
+    own = short(variance[0, 0]) if len(A) == 1 else json.dumps(variance.tolist())
+    why = f"as in {source}" if level is None else f"{level.why}; as in {source} otherwise"
+    seen = f"{', '.join(map(short, powers))}, {'and drift' if moves else 'and no drift'}"
+    lines = [f"noise:  # the log has a variance of {seen}", f"  variance: {own}  # {why}"]
+    if moves and not drifts:
+        return lines
+    C, D = _per_output(noise.C, len(A)), _per_output(noise.D, len(A))
+    drift, new = (True, _DRIFTING) if drifts and not moves else (noise.drift, (1.0,))
+    C = [np.convolve(row, new).tolist() for row in C]
+    named = [(name, rows) for name, rows in (("C", C), ("D", D)) if any(len(row) > 1 for row in rows)]
+    shape = [f"  {name}: {json.dumps(rows if len(rows) > 1 else rows[0])}" for name, rows in named]
+    return [*lines, *_drift(drift), *shape]
+
+
+def _moves(noise: Noise) -> bool:
+    """Return whether noise drifts, or remembers so long that it cannot be told from drift in a record."""
+    longest = min(abs(float(np.sum(row))) for row in _per_output(noise.D, 1))
+    return bool(np.any(noise.drift)) or longest < _STEADY
 
 
 def _per_output(rows: Sequence[Any], outputs: int) -> Sequence[Sequence[float]]:
@@ -105,22 +104,12 @@ def _gains(noise: Noise, A: Sequence[Sequence[float]]) -> Array:
     return np.array([np.sum(filtered(c, np.convolve(d, a), impulse) ** 2) for c, d, a in rows])
 
 
-def _shape(noise: Noise) -> list[str]:
-    """Return the drift, where there is one, and C and D, where they are not 1."""
-    drift = f"  drift: {json.dumps(noise.drift)}  # an integrator in the noise"
-    rows = (("C", noise.C), ("D", noise.D))
-    return [drift] * bool(np.any(noise.drift)) + [
-        f"  {name}: {json.dumps(found)}" for name, found in rows if found != (1.0,)
-    ]
+def _drift(drift: Any) -> list[str]:
+    return [f"  drift: {json.dumps(drift)}  # an integrator in the noise"] * bool(np.any(drift))
 
 
 def _stated(text: str, folder: Path, step: float) -> _Level:
-    """Return what an answer says; a step is the seconds between samples.
-
-    Raises:
-        SpecError: `bad-answer`.
-        DataError: a file cannot be used.
-    """
+    """Return what an answer says; a step is the seconds between samples."""
     word, _, name = text.partition(" ")
     if word.lower() == "rest":
         return _at_rest(folder / name.strip(), step)
@@ -173,20 +162,21 @@ def _at_rest(path: Path, step: float) -> _Level:
     same = abs(apart - step) <= _SAME_STEP * step
     seen = f"of {path.name}: {y.size} samples" + ("" if same else f", {short(apart)} s apart")
     if abs(rho) <= _WHITE / np.sqrt(y.size):
-        return _Level(power, 0.0, f"{seen}, white as far as they show", at_rest=True)
+        return _Level(power, 0.0, f"{seen}, white as far as they show")
     pole = min(rho if same else max(rho, 0.0) ** (step / apart), _STRONGEST)
     why = f"{seen}, correlation {rho:.2g} from one to the next"
-    return _Level(power * (1.0 - pole**2), pole, why, at_rest=True)
+    return _Level(power * (1.0 - pole**2), pole, why)
 
 
 def _seconds_apart(path: Path) -> float | None:
-    """Return the time between the rows of a file; None without a column of times."""
+    """Return the time between the rows of a file; None without a column of times that grow."""
     from inputdesign_cli.records import read_sheet
     from inputdesign_cli.records.columns import column_named, columns_of, time_columns, time_unit_in
 
     sheet = read_sheet(path, key="noise")
-    for name in time_columns(sheet)[:1]:
-        unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
-        apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"])))
-        return seconds(f"{apart!r} {unit}", "noise") if apart > 0.0 else None
-    return None
+    name = next(iter(time_columns(sheet)), None)
+    if name is None:
+        return None
+    unit = time_unit_in(sheet, name, dated=column_named(sheet, name).dated) or "s"
+    apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"]))) * SCALES["time"][unit]
+    return apart if apart > 0.0 else None

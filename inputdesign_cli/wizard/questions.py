@@ -1,17 +1,18 @@
-"""The ten questions of `idesign wizard`, and their answers, given one by one or in a file."""
+"""The ten questions of `idesign wizard`, their answers, and errors in words of the answers."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import yaml
 
-from inputdesign_cli.errors import IdesignError, Location, SpecError
+from inputdesign_cli.errors import Diagnostic, IdesignError, Location, OutputError, SpecError
 from inputdesign_cli.specification.models.wording import unknown_word
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.reader import read
@@ -27,15 +28,17 @@ class Question:
     default: str | None = None
 
 
-def package_text(name: str) -> str:
-    """Return the text of a file of this package."""
-    return (resources.files(__package__) / name).read_text(encoding="utf-8")
+def package_data(name: str) -> Any:
+    """Return the content of a YAML file of this package."""
+    return yaml.safe_load((resources.files(__package__) / name).read_text(encoding="utf-8"))
 
 
-QUESTIONS = tuple(Question(**entry) for entry in yaml.safe_load(package_text("questions.yaml")))
+QUESTIONS = tuple(Question(**entry) for entry in package_data("questions.yaml"))
 KEYS = tuple(question.key for question in QUESTIONS)
+_FAULTS = package_data("faults.yaml")
 _ALL = f"the questions are {', '.join(KEYS)}"
 AS_LOG = "as the log"
+_LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 
 
 def question(key: str) -> Question:
@@ -55,6 +58,20 @@ def needed_of(answers: Mapping[str, str]) -> list[str]:
     return [one.key for one in QUESTIONS if one.default is None and one.key not in there]
 
 
+def complete(answers: Mapping[str, str]) -> dict[str, str]:
+    """Return the answers, with defaults where none is given.
+
+    Raises:
+        SpecError: `bad-answer` for questions that need one.
+    """
+    given = known_from(answers) | dict(answers)
+    found = {one.key: (given.get(one.key, one.default) or "").strip() for one in QUESTIONS}
+    for key, text in found.items():
+        if not text:
+            raise bad_answer(key, "there is no answer")
+    return found
+
+
 def bad_answer(key: str, why: str) -> SpecError:
     """Return the error that names the question and what is allowed."""
     asked = question(key)
@@ -65,22 +82,14 @@ Choice = TypeVar("Choice")
 
 
 def chosen(key: str, text: str, choices: Mapping[str, Choice]) -> Choice:
-    """Return what an answer chooses by its words.
-
-    Raises:
-        SpecError: `bad-answer`.
-    """
+    """Return what an answer chooses by its words; a SpecError `bad-answer` for other words."""
     if text.lower() not in choices:
         raise bad_answer(key, f'"{text}" is none of these')
     return choices[text.lower()]
 
 
 def file_of(key: str, path: Path) -> Path:
-    """Return the path of the file that an answer names.
-
-    Raises:
-        SpecError: `bad-answer`, there is none.
-    """
+    """Return the path of the file that an answer names; a SpecError `bad-answer` if there is none."""
     if path.is_file():
         return path
     there = f"{path} is a folder" if path.is_dir() else f"{path} is a pipe or a device, not a file"
@@ -89,12 +98,7 @@ def file_of(key: str, path: Path) -> Path:
 
 @dataclass(frozen=True)
 class Answers:
-    """Answers by question, and the places of answers that stand in a file.
-
-    Args:
-        texts: the answers.
-        places: by question; the beginning of the file for questions without an answer in it.
-    """
+    """Answers by question, and the places of answers that stand in a file (else of its beginning)."""
 
     texts: dict[str, str] = field(default_factory=dict)
     places: dict[str, Location] = field(default_factory=dict)
@@ -154,15 +158,58 @@ def _of_file(file: Path) -> Answers:
     return answers
 
 
-def complete(answers: Mapping[str, str]) -> dict[str, str]:
-    """Return the answers, with defaults where none is given.
+@contextmanager
+def in_their_words(said: Mapping[str, str], key: str = "") -> Iterator[None]:
+    """Turn errors inside into errors of an answer.
 
-    Raises:
-        SpecError: `bad-answer` for questions that need one.
+    Args:
+        said: the answers.
+        key: of the question that an error is about where it has no key.
     """
-    given = known_from(answers) | dict(answers)
-    found = {one.key: (given.get(one.key, one.default) or "").strip() for one in QUESTIONS}
-    for key, text in found.items():
-        if not text:
-            raise bad_answer(key, "there is no answer")
-    return found
+    try:
+        yield
+    except OutputError:
+        raise
+    except IdesignError as error:
+        raise type(error)([_reworded(one, said, key) for one in error.diagnostics]) from error
+
+
+def _reworded(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
+    if one.code == "bad-answer" and one.key in KEYS:
+        return one
+    asked = question(_answer_to_blame(one, said) or key or "wish")
+    begins = f"{asked.asks} ({asked.key}): "
+    if one.message.startswith(begins):
+        return one  # by a block inside
+    place = one.location if one.location and not one.location.file.startswith("<") else None
+    hint = "; ".join(filter(None, (_remedy(one, asked.key), f"allowed: {asked.allowed}")))
+    message = begins + _in_words(_FAULTS["messages"].get(one.code, one.message))
+    return replace(one, message=message, hint=hint, key=asked.key, location=place)
+
+
+def _answer_to_blame(one: Diagnostic, said: Mapping[str, str]) -> str:
+    """Return the question whose answer an entry of the spec comes from; empty where that is not known."""
+    # In open loop the only controller is that of the wish, and none holds a plant that integrates.
+    held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
+    by_code: dict[str, str] = _FAULTS["codes"] | ({} if held else _FAULTS["open"])
+    if one.code in by_code:
+        return by_code[one.code]
+    found = (name for path, name in _FAULTS["sections"].items() if f"{one.key}.".startswith(f"{path}."))
+    return next(found, one.key if one.key in KEYS else "")
+
+
+def _remedy(one: Diagnostic, key: str) -> str:
+    if one.code == "admissible-not-positive":
+        return _in_words(one.hint)
+    if one.code == "too-few-lines":
+        enough = _LONG_ENOUGH.search(one.hint)
+        return f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
+    held = one.code == "infinite-information" and key != "loop"  # a controller holds it already
+    return "" if held else _FAULTS["hints"].get(one.code, "")
+
+
+def _in_words(text: str) -> str:
+    """Return a message or a hint without paths and terms of the spec."""
+    for term, words in _FAULTS["terms"].items():
+        text = re.sub(term, words, text)
+    return text

@@ -1,22 +1,95 @@
-"""Requirements of a spec from what the model is for."""
+"""What the model is for and what the experiment may use, as entries of a spec.
+
+What cannot be understood is a SpecError `bad-answer`.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
-from inputdesign_cli.wizard.grammar import ALONE, NUMBER, Phrase, needed, short
+from inputdesign_cli.wizard.grammar import ALONE, NUMBER, PLUS_MINUS, UNIT, Phrase, needed, short
+from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
-from inputdesign_cli.wizard.stated_plants import PlantAnswer
 
 _NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations
 _LINES = 20
+_LEAST_BITS, _MOST_BITS = 2, 32
 _WITHIN = {
     "prediction": r"\bpredict\w*",
     "parameters": r"\bparameters?\b",
     "response": r"\b(?:bode(?: plot| diagram)?|frequency response)\b",
 }
+
+
+@dataclass(frozen=True)
+class Range:
+    """The amplitude about an operating point."""
+
+    amplitude: float
+    offset: float
+
+
+def input_range(text: str) -> Range:
+    """Return the range of "plus/minus 5 around 40", or of "35 to 45"."""
+    said = Phrase(text, "range")
+    ends = said.take(rf"^\s*(?:from\s*)?{NUMBER}{UNIT}\s*(?:to\b|\.\.)\s*{NUMBER}{UNIT}\s*$")
+    if ends is not None:
+        low, high = float(ends[1]), float(ends[2])
+        if not low < high:
+            raise bad_answer("range", f"{low:g} is not below {high:g}")
+        return Range(0.5 * (high - low), 0.5 * (low + high))
+    about = said.take(rf"^\s*{NUMBER}{UNIT}\s*{PLUS_MINUS}\s*{NUMBER}{UNIT}\s*$")
+    middle = float(about[1]) if about is not None else said.after("around|about|at", named=True)
+    side = float(about[2]) if about is not None else said.number(rf"(?:{PLUS_MINUS}|\bby\b)\s*{NUMBER}{UNIT}")
+    if side is None and middle is not None:
+        side = said.number(rf"{NUMBER}{UNIT}")
+    if side is None:
+        raise bad_answer("range", f'"{text}" is no range')
+    said.finish()
+    return Range(needed(side, "range", "the amplitude"), middle or 0.0)
+
+
+def limited(text: str) -> tuple[float | None, float | None]:
+    """Return the limits on the rate, per second, and on the output."""
+    said = Phrase(text, "limits")
+    output, rate = said.after("output", named=True), said.after("rate", "rate", named=True)
+    if rate is None and output is None and text.lower() not in ("none", "no"):
+        raise bad_answer("limits", f'"{text}" is none of these')
+    said.finish("none no")
+    for what, value in (("the rate", rate), ("the output", output)):
+        if value is not None:
+            needed(value, "limits", what)
+    return rate, output
+
+
+def controller(text: str, plant: PlantAnswer) -> str | None:
+    """Return the controller of the experiment as YAML; None in open loop."""
+    known = {"as the plant": plant.controller, "open": None}
+    if text.lower() in known:
+        return known[text.lower()]
+    if plant.channels > 1:
+        raise bad_answer("loop", f"the plant has {plant.channels} channels, and one PI has one: write open")
+    said = Phrase(text, "loop")
+    settings = _pid(said, stated=True)
+    said.finish("PI PID controller")
+    return f"{{pid: {settings}}}"
+
+
+def quantisation(text: str) -> str | None:
+    """Return the converter of "12 bits up to 100" as YAML; None without one."""
+    if text.lower() in ("no", "none"):
+        return None
+    said = Phrase(text, "converter")
+    bits, most = said.number(r"(?<![\w.+-])(\d+)\s*bits?\b"), said.after("up to|over|to|range")
+    if bits is None or most is None:
+        raise bad_answer("converter", f'"{text}" is none of these')
+    said.finish()
+    if not _LEAST_BITS <= bits <= _MOST_BITS:
+        raise bad_answer("converter", f"converters have {_LEAST_BITS} to {_MOST_BITS} bits")
+    return f"{{bits: {bits:.0f}, range: {short(needed(most, 'converter', 'its range'))}}}"
 
 
 def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> list[str]:
@@ -25,9 +98,6 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
     Args:
         controlled: whether the experiment runs under a controller.
         duration: of the experiment, in seconds.
-
-    Raises:
-        SpecError: `bad-answer`.
     """
     said = Phrase(text, "wish")
     if said.take(r"\bloop\b"):
@@ -40,7 +110,13 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         raise bad_answer("wish", f'"{text}" is none of these')
     if kind == "parameters":
         said.finish("physical")
-        return _parameters(plant, part)
+        if not plant.values:
+            why = "this plant has no parameters with names; ask for a prediction or a Bode plot"
+            raise bad_answer("wish", why)
+        sizes = {name: short(part * abs(value) / _NORMAL) for name, value in plant.values.items()}
+        listed = ", ".join(f"{name}: {size}" for name, size in sizes.items())
+        how = f"{100 * part:g} % is 1.96 standard deviations, so that 95 % of estimates are within it"
+        return [f"accuracy:  # {how}", f"  standard_deviation: {{{listed}}}"]
     begins, ends = said.band()
     high = needed(ends, "wish", "up to which frequency (rad/s)")
     said.finish()
@@ -55,27 +131,11 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         raise bad_answer("wish", f"{low:g} is not below {high:g}")
     band = f"band: [{short(low)}, {short(high)}]"
     if kind == "prediction":
-        return [
-            f"accuracy:  # G known within {100 * part:g} %, from one period in the experiment to what you "
-            "named",
-            f"  model_error: {{relative: {short(part)}, {band}}}",
-        ]
-    return [
-        f"accuracy:  # {100 * part:g} % is {_RAYLEIGH:.3g} deviations of a complex error: 95 % are within it",
-        f"  frequency_response: {{relative: {short(part / _RAYLEIGH)}, {band}, lines: {_LINES}}}",
-    ]
-
-
-def _parameters(plant: PlantAnswer, part: float) -> list[str]:
-    if not plant.values:
-        why = "this plant has no parameters with names; ask for a prediction or a Bode plot"
-        raise bad_answer("wish", why)
-    sizes = {name: short(part * abs(value) / _NORMAL) for name, value in plant.values.items()}
-    listed = ", ".join(f"{name}: {size}" for name, size in sizes.items())
-    return [
-        f"accuracy:  # {100 * part:g} % is 1.96 standard deviations, so that 95 % of estimates are within it",
-        f"  standard_deviation: {{{listed}}}",
-    ]
+        how = f"G known within {100 * part:g} %, from one period in the experiment to what you named"
+        return [f"accuracy:  # {how}", f"  model_error: {{relative: {short(part)}, {band}}}"]
+    how = f"{100 * part:g} % is {_RAYLEIGH:.3g} deviations of a complex error: 95 % are within it"
+    size = short(part / _RAYLEIGH)
+    return [f"accuracy:  # {how}", f"  frequency_response: {{relative: {size}, {band}, lines: {_LINES}}}"]
 
 
 def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
@@ -88,7 +148,7 @@ def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
             '("gain .., time constant .., dead time ..")',
         )
     derivative = said.take(r"\bPID\b") is not None
-    settings = pid(said, stated=said.take(r"\b(?:my\s+)?own\b|\bmy\b") is not None)
+    settings = _pid(said, stated=said.take(r"\b(?:my\s+)?own\b|\bmy\b") is not None)
     tuned = settings is None and plant.tunable
     fast = tuned and not derivative
     speed = said.after(r"(?:closed[- ]loop )?time constant|tau_c", "time") if fast else None
@@ -139,15 +199,8 @@ def _margin(said: Phrase) -> str:
     return f"phase_margin: {short(degrees)}"
 
 
-def pid(said: Phrase, *, stated: bool) -> str | None:
-    """Return the settings "Kp 1, Ti 60, Td 5" as YAML, or None without settings.
-
-    Args:
-        stated: whether there must be settings.
-
-    Raises:
-        SpecError: `bad-answer`.
-    """
+def _pid(said: Phrase, *, stated: bool) -> str | None:
+    """Return the settings "Kp 1, Ti 60, Td 5" as YAML, or None without settings, unless they are stated."""
     gain = said.after("Kp", "none")
     times = {name: said.after(name, "time") for name in ("Ti", "Td")}
     there = [name for name, time in times.items() if time is not None]

@@ -41,7 +41,7 @@ def verbs(monkeypatch):
         return Results(typed(RESULT), "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
     monkeypatch.setattr(specification, "load_spec", load_spec)
-    monkeypatch.setattr(import_module("inputdesign_cli.questions.verbs"), "load_spec", load_spec)
+    monkeypatch.setattr(import_module("inputdesign_cli.questions"), "load_spec", load_spec)
     for verb in ("solve", "analyse"):
         monkeypatch.setattr(questions, verb, results)
     monkeypatch.setattr(questions, "validate", lambda spec: None)

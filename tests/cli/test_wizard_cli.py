@@ -78,6 +78,7 @@ class Terminal:
         os.write(self.end, text.encode())
 
 
+@pytest.mark.slow
 def test_in_a_terminal_a_bad_answer_is_asked_again(tmp_path):
     with Terminal(tmp_path, sys.executable, "-m", "inputdesign_cli", "wizard") as terminal:
         for part, text in TYPED:
@@ -89,6 +90,7 @@ def test_in_a_terminal_a_bad_answer_is_asked_again(tmp_path):
     assert (written["limits"]["duration"], written["signal"]["offset"]) == (1200, 40)
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("key", ["\x03", "\x04"])
 def test_control_c_and_d_end_the_questions(key, tmp_path):
     with Terminal(tmp_path, sys.executable, "-m", "inputdesign_cli", "wizard") as terminal:
@@ -122,7 +124,8 @@ def test_answers_make_a_spec_that_is_accepted(run, tmp_path):
     assert (code, "bad-answer" in err, "How much time" in err) == (2, True, True)
 
 
-def test_a_trade_is_a_sweep_with_a_table(run, tmp_path):
+def test_a_trade_is_a_sweep_with_a_table(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})  # no other processes
     spec = (
         "plant: {B: [0, 1], F: [1, -0.8]}\nnoise: {variance: 1}\nexperiment: {samples: 40}\n"
         "accuracy: {standard_deviation: {b1: 0.5}}\nlimits: {amplitude: 2}\n"

@@ -13,10 +13,9 @@ from inputdesign_cli import load_spec, simulate
 from inputdesign_cli.compute.cluster import Cluster
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.outcome.text_formats import json_text
-from inputdesign_cli.sweeps.running import run_sweep
+from inputdesign_cli.outcome.codec import json_text
 from tests.support import jobs
-from tests.support.sweep_files import SPEC, timeless_files, timeless_rows
+from tests.support.sweep_files import SPEC, run_sweep, timeless_files, timeless_rows
 
 pytest.importorskip("distributed")
 # Dask's own warnings are not ours to mend.
@@ -120,6 +119,7 @@ def test_data_files_travel_with_the_points(loopback, tmp_path):
     assert {row["status"] for row in timeless_rows(tmp_path / "there")} == {"optimal"}
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_says_so_and_is_given_up(tmp_path):
     cluster = Loopback(tmp_path)
     worker = cluster.add_worker()
@@ -175,7 +175,7 @@ def test_no_cluster_is_a_complaint():
 SPECS = Path(__file__).parents[2] / "specs"
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [

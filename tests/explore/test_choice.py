@@ -83,6 +83,7 @@ def test_a_second_order_is_not_taken_for_a_first():
     np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], truth, rtol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("hold", "delay"), [(1, 0), pytest.param(8, 2, marks=pytest.mark.slow)])
 def test_a_static_gain_has_no_pole(delay, hold):
     rng = np.random.default_rng(1)
@@ -96,11 +97,11 @@ def test_a_static_gain_has_no_pole(delay, hold):
 @pytest.mark.parametrize(
     ("only", "names"),
     [
-        ("integrator", ("K", "L")),
         ("arx", ("a", "b")),
         *(
             pytest.param(*pair, marks=pytest.mark.slow)
             for pair in (
+                ("integrator", ("K", "L")),
                 ("sopdt", ("K", "T", "zeta", "L")),
                 ("oe", ("b", "f")),
                 ("bj", ("b", "c", "d", "f")),
@@ -124,6 +125,7 @@ def test_an_integrator_is_taken_where_no_time_constant_follows():
     assert found.estimate.theta[0] == pytest.approx(0.02, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
     """Gain 1.7, pole 0.98, dead time of six samples, one line, noise that fades in twelve samples."""
     found = explore_records(drifting(2, 1e-3))
@@ -135,8 +137,8 @@ def test_a_lag_that_drifts_is_found_in_two_records_with_a_gap():
     assert found.slopes == pytest.approx([1e-3], rel=0.15)
 
 
-def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion():
-    one = explore_structure(*([part] for part in (first_order(5, 240), first_order(6, 160))), step=STEP).best
+def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion(found):
+    one = found.outputs[0].best
     plain = replace(one, validation=89.5, criterion=-1.0)
     rich = replace(one, validation=90.0, criterion=-0.9)
     edge = replace(one, validation=90.0, criterion=-2.0, steady=False)
@@ -146,8 +148,8 @@ def test_the_choice_prefers_what_is_steady_and_certain_and_then_the_criterion():
     assert every == (plain, rich, vague, edge, weak)
     assert good == every[:4]
     # In a loop prediction errors alone rank what is steady and certain.
-    looped = [replace(c, by_prediction=True) for c in (weak, plain, rich)]
-    assert [c.criterion for c in ranked(looped)[0]] == [-3.0, -1.0, -0.9]
+    looped = ranked([weak, plain, rich], by_prediction=True)
+    assert [c.criterion for c in looped[0]] == [-3.0, -1.0, -0.9]
 
 
 def looped(rng, samples, noise):
@@ -162,6 +164,7 @@ def looped(rng, samples, noise):
     return column(u, y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", ["arx", pytest.param("oe", marks=pytest.mark.slow)])
 def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(noise):
     found = explore_records([looped(np.random.default_rng(1), 1000, noise)], feedback=True)
@@ -216,6 +219,7 @@ def test_a_record_of_a_single_step_estimates_and_judges_at_once(at, flicker):
     assert corner == pytest.approx(abs(0.1 / (1 - 0.9 * np.exp(-0.1j))), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_a_dead_time_of_a_quarter_of_the_record_is_found(seed):
     rng = np.random.default_rng(seed)

@@ -103,6 +103,7 @@ def test_an_open_loop_is_not_called_a_loop(kind):
         assert answers_output([driven(rng, kind, samples)]) == []
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("hold", [5, 20, 60])
 @pytest.mark.parametrize("pole", [0.7, 0.99])
 def test_an_input_that_is_held_is_no_answer(hold, pole):

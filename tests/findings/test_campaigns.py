@@ -31,18 +31,18 @@ def test_a_plan_that_is_not_as_asked_has_one_finding(change, code, figures):
 
 
 @pytest.mark.parametrize(
-    ("likeness", "follows", "other", "code"),
+    ("likeness", "follows", "other", "expected"),
     [
-        (0.95, True, None, None),
-        (0.95, True, "plan_01.csv", "part-repeated"),
-        (0.7, True, None, "record-follows-in-part"),
-        (0.1, False, None, "record-unlike-plan"),
+        (0.95, True, None, []),
+        (0.95, True, "plan_01.csv", [("part-repeated", "doubt")]),
+        (0.7, True, None, [("record-unlike-plan", "note")]),
+        (0.1, False, None, [("record-unlike-plan", "doubt")]),
     ],
 )
-def test_a_record_that_is_taken_may_follow_its_plan_or_not(likeness, follows, other, code):
+def test_a_record_that_is_taken_may_follow_its_plan_or_not(likeness, follows, other, expected):
     given = {"likeness": likeness, "spliced": 0.96, "like": 0.9, "follows": follows, "other": other}
     found = hardly_followed("r.csv", "plan_02.csv", **given)
-    assert [one.code for one in found] == ([] if code is None else [code])
+    assert [(one.code, one.severity) for one in found] == expected
     for one in found:
         assert one.figures["correlation"] == likeness
         assert one.figures.get("other") == other

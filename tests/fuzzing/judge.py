@@ -16,9 +16,9 @@ from inputdesign_cli.diagnostics import render
 from inputdesign_cli.error_codes import explanations
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.outcome.codec import json_text
 from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.run_directory import finished_result
-from inputdesign_cli.outcome.text_formats import json_text
 from tests.fuzzing.excitation import NotJudgedError
 from tests.fuzzing.textbook import findings
 

@@ -75,14 +75,13 @@ def test_noise_is_known_no_better_than_its_zero(w):
     psi = scipy.signal.lfilter([0, 1.0], [1.0, -c], np.random.default_rng(8).standard_normal(n))[:, None]
     white = White(
         root=np.eye(1),
-        samples=n,
+        lengths=(n,),
         residuals=np.zeros(n),
         variance=1.0,
         starts=np.zeros((n, 0)),
         explained=psi,
         basis=psi / np.linalg.norm(psi),
-        means=np.zeros(1),
-        known=((0, lambda e: scipy.signal.lfilter([0, 1.0], [1.0, -c], e, axis=0)),),
+        echoes=scipy.signal.lfilter([0, 1.0], [1.0, -c], np.eye(1, n))[:, :, None, None],
     )
     along = np.cos(w * np.arange(n))[:, None]
     slope = 2.0 * np.real(np.exp(-1j * w) / (1.0 - c * np.exp(-1j * w)))
@@ -191,6 +190,7 @@ def test_a_dead_time_at_zero_hides_nothing():
     assert by_name(found)["recent_inputs"].probability < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pole", [1.2, *(pytest.param(p, marks=pytest.mark.slow) for p in (1.0, 1.05))])
 def test_the_right_model_of_a_plant_that_only_its_loop_holds_is_not_refuted(pole):
     """A proportional controller without noise: the tests err seldom, and see a lag that lacks."""

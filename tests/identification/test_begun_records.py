@@ -10,7 +10,7 @@ from inputdesign_cli.identification import identify, information_begun_anywhere
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
 
-GAIN, LAG, N, BEFORE = 2.0, 10.0, 500, 200
+GAIN, LAG, N, BEFORE = 2.0, 10.0, 300, 200
 IN_S = "{{continuous: {{gain: 2, time_constant: 10, dead_time: {delay}}}, sample: zoh}}"
 IN_STATES = (
     "{{parameters: {{K: 2, T: 10, L: {delay}}}, sample: zoh, "
@@ -45,25 +45,25 @@ def cut_out(delay, seed, *, colour=0.0, before=BEFORE):
 
 
 @pytest.mark.parametrize(
-    ("words", "delay"),
+    ("words", "delay", "records"),
     [
-        (IN_S, 0.4),
+        (IN_S, 0.4, 1),
         *(
-            pytest.param(*one, marks=pytest.mark.slow)
-            for one in ((IN_S, 12.3), (IN_STATES, 0.4), (IN_STATES, 12.3))
+            pytest.param(*one, 3, marks=pytest.mark.slow)
+            for one in ((IN_S, 0.4), (IN_S, 12.3), (IN_STATES, 0.4), (IN_STATES, 12.3))
         ),
     ],
 )
-def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
+def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay, records):
     """The first dead time of the record holds what nobody recorded."""
     model, failed, deviations, variances = model_of(words, delay), 0, [], []
-    for seed in range(3):
+    for seed in range(records):
         found = identify(model, *cut_out(delay, seed), start=model.theta)
         failed += bool(found.tests.failed)
         deviations.append((found.theta - model.theta) / np.sqrt(np.diag(found.covariance)))
         variances.append(found.noise[0, 0])
-    assert failed <= 1
-    assert np.mean(variances) == pytest.approx(0.01, rel=0.1)
+    assert failed <= records // 3
+    assert np.mean(variances) == pytest.approx(0.01, rel=0.13)
     assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
 
 
@@ -231,8 +231,8 @@ def test_an_integrating_plant_may_be_measured_about_any_level(plant):
 def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
     rng = np.random.default_rng(seed)
     pole = np.exp(-0.1)
-    u = np.repeat(rng.choice([-1.0, 1.0], 100), 4)
-    y = scipy.signal.lfilter([0, 2.0 * (1.0 - pole)], [1, -pole], u) + 0.1 * rng.standard_normal(400)
+    u = np.repeat(rng.choice([-1.0, 1.0], 50), 4)
+    y = scipy.signal.lfilter([0, 2.0 * (1.0 - pole)], [1, -pole], u) + 0.1 * rng.standard_normal(200)
     found = [identify(model_of(words, 2), u[:, None], y[:, None], rest=True) for words in (IN_S, IN_STATES)]
     for one in found:
         assert one.search.converged
@@ -242,6 +242,7 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
         assert 0.0 <= one.theta[2] < 5.0 * np.sqrt(one.covariance[2, 2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.
@@ -262,10 +263,10 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
 @pytest.mark.parametrize(
     ("words", "colour"),
     [
-        (IN_S, ""),
+        (IN_FUNCTIONS, ""),
         pytest.param(IN_FUNCTIONS, COLOUR, marks=pytest.mark.slow),
         *(pytest.param(*one, marks=pytest.mark.slow) for one in ((IN_S, COLOUR), (IN_STATES, COLOUR))),
-        *(pytest.param(one, "", marks=pytest.mark.slow) for one in (IN_STATES, IN_FUNCTIONS)),
+        *(pytest.param(one, "", marks=pytest.mark.slow) for one in (IN_STATES, IN_S)),
     ],
 )
 def test_a_line_through_the_outputs_changes_no_estimate_that_knows_of_it(words, colour):

@@ -161,7 +161,7 @@ def test_a_dead_time_in_s_is_found(hold):
 
 
 def test_a_level_and_a_state_add_unknowns_not_verdicts():
-    u, y = (x[0] for x in data("oe", 300, np.random.default_rng(7)))
+    u, y = (x[0] for x in data("oe", 150, np.random.default_rng(7)))
     found = identify(one_channel([0, 1.0, 0.5], F=[1, -0.7]), u, y + 30.0, rest=False)
     assert min(one.test.probability for one in found.tests.directed) < level("one parameter")
 

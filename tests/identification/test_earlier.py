@@ -7,8 +7,7 @@ import scipy.stats
 from inputdesign_cli.identification import Earlier, identify
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
 from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
 from tests.support.records import shifted, simulated
 
@@ -40,10 +39,10 @@ def test_arx_with_known_noise_is_ridge_regression():
 
 
 def test_one_record_after_the_other_is_both_at_once_in_the_limit():
-    u, y = simulated(JENKINS, 3000, np.random.default_rng(3), runs=2)
+    u, y = simulated(JENKINS, 1500, np.random.default_rng(3), runs=2)
     first = identify(JENKINS, u[0], y[0], rest=True)
     then = identify(JENKINS, u[1], y[1], rest=True, earlier=of(first))
-    joint = identify(JENKINS, np.concatenate(u), np.concatenate(y), rest=True, lengths=[3000, 3000])
+    joint = identify(JENKINS, np.concatenate(u), np.concatenate(y), rest=True, lengths=[1500, 1500])
     deviation = np.sqrt(np.diag(joint.covariance))
     assert np.all(np.abs(then.theta - joint.theta) < 0.15 * deviation)
     np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)

@@ -17,6 +17,7 @@ SLOW = PolynomialModel.single(
 DECADES = st.integers(-6, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_collinear_gradients_are_no_lack_of_excitation(seed):
     u, y = simulated(SLOW, 400, np.random.default_rng(seed))
@@ -52,7 +53,7 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
 @pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_units_of_signals_change_no_answer(rest, of_u, of_y):

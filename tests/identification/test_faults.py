@@ -61,7 +61,7 @@ def test_at_most_one_of_a_thousand_records_is_called_frozen(steps):
     assert sum(bool(seen(*record(seed, steps[seed % len(steps)]))) for seed in range(1000)) <= 1
 
 
-@pytest.mark.parametrize(("step", "stuck", "seeds"), [(None, 12, 4), (0.5, 40, 4), (0.7, 60, 4)])
+@pytest.mark.parametrize(("step", "stuck", "seeds"), [(None, 12, 1), (0.5, 40, 1), (0.7, 60, 2)])
 def test_a_frozen_stretch_is_found_where_it_is(step, stuck, seeds):
     for seed in range(seeds):
         u, y, model = record(seed, step, stuck)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.identification.free_starts import FreeStarts
-from inputdesign_cli.identification.start import Start
+from inputdesign_cli.identification.start import FreeStarts, Start
 
 LENGTHS = (50, 30)
 COUNTS = (3, 4)
@@ -45,12 +44,13 @@ def test_what_is_left_is_that_of_weighed_least_squares(weights, level, rng):
     starts = begun(responses)
     errors = level + rng.standard_normal((sum(LENGTHS), 2)) @ np.array([[1.0, 0.9], [0.0, 0.3]])
     coefficients, root, directions = starts.eliminated(errors, weights)
-    left = errors - starts.combined(coefficients)
+    left = errors - starts.combined(coefficients, starts.starts)
     W = np.linalg.inv(left.T @ left / len(left)) if weights is None else weights
     np.testing.assert_allclose(root.T @ root / W, (root.T @ root / W)[0, 0], rtol=1e-6)
     X = np.kron(np.eye(sum(LENGTHS)), np.linalg.cholesky(W).T) @ dense(responses)
     expected = np.linalg.lstsq(X, (errors @ np.linalg.cholesky(W)).ravel(), rcond=None)[0]
-    np.testing.assert_allclose(np.concatenate(coefficients), expected, rtol=1e-6, atol=1e-6)
+    found = np.concatenate([np.concatenate(rows) for rows in zip(*coefficients, strict=True)])
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(directions.T @ directions, np.eye(directions.shape[1]), atol=1e-9)
     in_white_units = np.kron(np.eye(sum(LENGTHS)), root) @ dense(responses)
     outside = in_white_units - directions @ (directions.T @ in_white_units)

@@ -7,8 +7,7 @@ import scipy
 from inputdesign_cli import parse_spec
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.identification.problem import evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import Records, evaluate
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.questions.building.system import build_model
 

@@ -6,7 +6,7 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import identify, noises_of_residuals
-from inputdesign_cli.identification.noise_first import Whitening
+from inputdesign_cli.identification.white import Whitening
 from inputdesign_cli.levels import RATE, SHARES
 from tests.support.identification_systems import one_channel
 

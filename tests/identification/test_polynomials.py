@@ -11,8 +11,7 @@ from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.polynomial_rows import Row
 from inputdesign_cli.identification.polynomials import FromRest, PolynomialKind
-from inputdesign_cli.identification.problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.records import RecordProblem, Records, evaluate
 from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range

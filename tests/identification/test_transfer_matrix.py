@@ -10,9 +10,6 @@ import scipy.signal
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.identification.problem import evaluate
-from inputdesign_cli.identification.records import Records
-from inputdesign_cli.identification.transfer_matrix import refine
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
@@ -184,6 +181,7 @@ def test_one_channel_has_the_estimate_of_a_plain_optimiser():
     np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(plain.jac.T @ plain.jac), rtol=1e-4)
 
 
+@pytest.mark.first(1)
 @HOLDS
 def test_the_covariance_is_that_of_the_records_information(hold):
     rng = np.random.default_rng(8)
@@ -196,20 +194,6 @@ def test_the_covariance_is_that_of_the_records_information(hold):
     difference = (found.information - expected) / np.outer(scale, scale)
     assert np.abs(difference).max() < (1e-9 if hold else 1e-5)
     np.testing.assert_allclose(found.covariance @ found.information, np.eye(12), atol=1e-8)
-
-
-def test_instruments_alone_come_within_a_fraction_of_a_standard_deviation():
-    rng = np.random.default_rng(9)
-    u = excitation(800, 2, rng)
-    y, _ = noisy(actual(), u, rng, hold=False, level=0.2)
-    record = Records(estimator(two_by_two(), STEP), ((u, y),))
-
-    likeliest = identify(as_sampled(two_by_two(), False), u, y, STEP)
-    far = evaluate(record, np.exp(0.3 * rng.normal(size=12)) * two_by_two().theta)
-    off = refine(record, record.kind, far)[0].theta - likeliest.theta
-    assert off @ likeliest.information @ off < 0.1
-    off = refine(record, record.kind, evaluate(record, likeliest.theta))[0].theta - likeliest.theta
-    assert off @ likeliest.information @ off < 1e-8
 
 
 def test_unstable_starts_are_mirrored():
@@ -231,7 +215,7 @@ def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
     rng = np.random.default_rng(12)
     u = np.where(np.arange(400) < 40, 0.0, 1.0)[:, None]
     y = np.cumsum(u, axis=0) ** 1.2 + rng.normal(size=(400, 1))
-    found = fit_batch(as_sampled(model, True), u, y[None], STEP, start=model.theta)
+    found = fit_batch(as_sampled(model, True), u, y[None], STEP, start=[1.0, 0.05])
     assert not found.converged[0]
 
 

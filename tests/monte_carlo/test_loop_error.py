@@ -8,7 +8,7 @@ import scipy.signal
 
 from inputdesign_cli.design.loop_error import InternalModel, LoopErrorProblem, ModelReference, PowerLimit
 from inputdesign_cli.design.loop_error.desired_loop import DesiredLoop
-from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
+from inputdesign_cli.identification.polynomial_rows import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.loop_error import error_filters, prefilter, study_losses
 from inputdesign_cli.plant import Rational, TransferMatrix
 from inputdesign_cli.plant.polynomial import determinant_and_adjugate, multiply

@@ -1,3 +1,5 @@
+import json
+import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -8,9 +10,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli.arrays import Array, ComplexArray
-from inputdesign_cli.outcome import Outcome, OutcomeError, read_plain, write_plain
-from inputdesign_cli.outcome.codec import NULL, others
-from inputdesign_cli.outcome.text_formats import plain
+from inputdesign_cli.outcome import Outcome, OutcomeError, plain, read_plain
+from inputdesign_cli.outcome.codec import NULL, json_text, others
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ PLAIN = {
 
 
 def test_plain_data_come_back_as_they_were():
-    assert plain(write_plain(read_plain(Whole, PLAIN))) == PLAIN
+    assert plain(read_plain(Whole, PLAIN)) == PLAIN
 
 
 def test_values_have_the_types_of_their_fields():
@@ -106,3 +107,38 @@ def sections(kind, seen):
 def test_a_section_has_one_field_at_most_for_keys_of_other_names():
     for section in sections(Outcome, {Outcome}):
         assert sum("others" in entry.metadata for entry in fields(section)) <= 1, section
+
+
+def test_json_of_numpy_and_complex_values():
+    value = {
+        "b": np.float64(0.1),
+        "a": np.arange(4).reshape(2, 2),
+        "flag": np.bool_(True),
+        "z": np.array([1 + 2j]),
+        "none": None,
+        "pair": (1, "µ"),
+    }
+    text = json_text(value)
+    assert json.loads(text) == {
+        "b": 0.1,
+        "a": [[0, 1], [2, 3]],
+        "flag": True,
+        "z": [{"re": 1.0, "im": 2.0}],
+        "none": None,
+        "pair": [1, "µ"],
+    }
+    assert list(json.loads(text)) == ["b", "a", "flag", "z", "none", "pair"]
+    assert "µ" in text
+    assert text.startswith('{\n "b": 0.1,\n')
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, np.array([1.0, np.nan]), complex(0, -math.inf)])
+def test_json_has_no_nan_and_names_the_place(bad):
+    with pytest.raises(ValueError, match=r"result\.deep\[0\]"):
+        plain({"deep": [bad]})
+
+
+@pytest.mark.parametrize("bad", [{1: 2}, {"a": object()}, {"a": {1, 2}}])
+def test_json_refuses_foreign_types(bad):
+    with pytest.raises(TypeError, match="result"):
+        plain(bad)

@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
 from inputdesign_cli.outcome.golden import compare, load_golden
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.questions.verbs import execute
+from inputdesign_cli.questions import execute
 from tests.support.outcomes import typed
 
 SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
@@ -94,12 +94,12 @@ def test_what_is_not_there_does_not_agree(tmp_path, results, notes):
 
 
 def test_execute_runs_the_verb_with_the_overrides(tmp_path, monkeypatch):
-    monkeypatch.setattr("inputdesign_cli.questions.verbs.load_spec", lambda *a: a)
+    monkeypatch.setattr("inputdesign_cli.questions.load_spec", lambda path, more: [str(path), *more])
     verb = lambda spec: Results(typed({"spec": spec}), resolved_spec="")  # noqa: E731
     monkeypatch.setattr("inputdesign_cli.questions.analyse", verb)
     golden = load_golden(written(tmp_path, GOOD))
-    expected = (tmp_path / "sub" / "b.yaml", ["experiment.samples=10", "spectrum={type: white}"])
-    assert execute(golden, golden.runs[1])["spec"] == list(expected)
+    expected = [str(tmp_path / "sub" / "b.yaml"), "experiment.samples=10", "spectrum={type: white}"]
+    assert execute(golden, golden.runs[1])["spec"] == expected
 
 
 def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch):
@@ -110,7 +110,7 @@ def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch):
         return verb
 
     golden = load_golden(written(tmp_path, GOOD))
-    monkeypatch.setattr("inputdesign_cli.questions.verbs.load_spec", lambda *a: a)
+    monkeypatch.setattr("inputdesign_cli.questions.load_spec", lambda *a: a)
     infeasible = InfeasibleError([])
     monkeypatch.setattr("inputdesign_cli.questions.solve", fails(infeasible))
     assert execute(golden, golden.runs[0]) is infeasible

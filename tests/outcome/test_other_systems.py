@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.support.processes import running
 
 SPECS = Path(__file__).parents[2] / "specs"
@@ -56,6 +58,7 @@ def python(program: str, *arguments: str | Path, cwd: Path) -> subprocess.Comple
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_spec_is_solved_twice_into_one_directory(tmp_path):
     for _ in range(2):
         done = python(

@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
-from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
+from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 
 SIZES = st.floats(1e-30, 1e30) | st.floats(-1e30, -1e-30) | st.just(0.0)
 

@@ -1,9 +1,7 @@
-"""JSON and CSV lose nothing and hide nothing."""
+"""CSV loses nothing and hides nothing."""
 
 import csv
 import io
-import json
-import math
 import struct
 
 import numpy as np
@@ -11,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from inputdesign_cli.outcome.results import Table
-from inputdesign_cli.outcome.text_formats import csv_line, csv_rows, csv_text, json_text, plain, read_csv
+from inputdesign_cli.outcome.text_formats import csv_line, csv_rows, csv_text, read_csv
 
 
 def bits(x: float) -> bytes:
@@ -91,38 +89,3 @@ def test_read_csv_of_a_table_without_rows(tmp_path):
 def test_csv_refuses_what_is_no_table(columns):
     with pytest.raises(ValueError, match="column"):
         csv_text(Table(columns))
-
-
-def test_json_of_numpy_and_complex_values():
-    value = {
-        "b": np.float64(0.1),
-        "a": np.arange(4).reshape(2, 2),
-        "flag": np.bool_(True),
-        "z": np.array([1 + 2j]),
-        "none": None,
-        "pair": (1, "µ"),
-    }
-    text = json_text(value)
-    assert json.loads(text) == {
-        "b": 0.1,
-        "a": [[0, 1], [2, 3]],
-        "flag": True,
-        "z": [{"re": 1.0, "im": 2.0}],
-        "none": None,
-        "pair": [1, "µ"],
-    }
-    assert list(json.loads(text)) == ["b", "a", "flag", "z", "none", "pair"]
-    assert "µ" in text
-    assert text.startswith('{\n "b": 0.1,\n')
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf, np.array([1.0, np.nan]), complex(0, -math.inf)])
-def test_json_has_no_nan_and_names_the_place(bad):
-    with pytest.raises(ValueError, match=r"result\.deep\[0\]"):
-        plain({"deep": [bad]})
-
-
-@pytest.mark.parametrize("bad", [{1: 2}, {"a": object()}, {"a": {1, 2}}])
-def test_json_refuses_foreign_types(bad):
-    with pytest.raises(TypeError, match="result"):
-        plain(bad)

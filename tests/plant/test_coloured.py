@@ -125,7 +125,7 @@ def heater():
     return SampledModel(plant, 0.5)
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
     [{"C": (C,), "D": (D,)}, {"drift": (True,)}, {"C": (np.array([1.0, -0.4]),), "drift": (True,)}],

@@ -172,6 +172,7 @@ def predicted(found, y, u):
     return out
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("unstable", [False, True])
 def test_the_loop_is_that_of_the_equations(unstable):
     """Information by impulses and differences of the predictor; with an unstable plant, too."""

@@ -27,6 +27,7 @@ def objective(asked, *, variance=1.0, gain=3.6):
     ]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("power", [-40, 20])
 def test_designs_follow_their_units_over_eighty_powers_of_ten(power):
     unit = 10.0**power

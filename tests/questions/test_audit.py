@@ -7,8 +7,7 @@ import pytest
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import InaccurateError
-from inputdesign_cli.outcome import Outcome, read_plain, write_plain
-from inputdesign_cli.outcome.text_formats import plain
+from inputdesign_cli.outcome import Outcome, plain, read_plain
 from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import design_outcome
 from inputdesign_cli.questions.task import build_task
@@ -46,7 +45,7 @@ DESIGNS = {
 def designed(request):
     task = build_task(parse_spec(DESIGNS[request.param]))
     done = task.designed()
-    return done, plain(write_plain(design_outcome(done)))
+    return done, plain(design_outcome(done))
 
 
 def refused(done, result):

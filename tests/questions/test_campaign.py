@@ -186,6 +186,7 @@ def test_records_whose_times_go_on_are_one():
     assert continued(data, units.sample_time).lengths == (7, 3)
 
 
+@pytest.mark.slow
 def test_whole_campaigns_are_simulated():
     text = SPEC + "simulation: {runs: 2, seed: 2, compare: [white], plant: {B: [0, 3.2], F: [1, -0.75]}}\n"
     overrides = [

@@ -30,6 +30,7 @@ def spec_of(plant, noise, rest=REST, **kwargs):
     return parse_spec(f"plant: {plant}\nnoise: {noise}\n{rest}", **kwargs)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(("noise", "loop"), [*((noise, None) for noise in NOISES), (NOISES[1], PI)])
 def test_the_same_noise_on_one_plant_in_s_and_in_q_is_one_design(noise, loop):
     rest = REST if loop is None else REST.replace("experiment: {samples: 300}", loop)

@@ -70,6 +70,7 @@ LINES = np.column_stack([RNG.uniform(0.2, 3.1, 60), 10.0 ** RNG.uniform(-4, 0, 6
 FAMILIES = ["{type: fir, order: 4}", "{type: white}", "{type: multisine, lines: 12}"]
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize(("seed", "criterion"), [(1, "D"), (2, "A"), (3, "E"), (1, "T")])
 @pytest.mark.parametrize("spectrum", FAMILIES)
 def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spectrum):
@@ -203,6 +204,7 @@ def test_lines_on_the_pole_are_refused():
     assert refused(Plant(1).text("D", "limits: {input_power: 1}"), spectrum) == "needs-limits"
 
 
+@pytest.mark.slow
 def test_where_digits_end_on_the_way_to_what_is_only_approached_a_remedy_is_told():
     """Power ever nearer to frequency zero is free of charge; a band that leaves it out has an optimum."""
     text = """

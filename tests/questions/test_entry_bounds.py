@@ -143,6 +143,7 @@ def test_no_model_of_the_ellipsoid_breaks_the_bound_and_one_reaches_it(error, bo
     assert worst == pytest.approx(bound, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_ellipsoid_in_continuous_time():
     error = "accuracy: {model_error: {relative: 0.3, region: ellipsoid}}\n"
     result = solve(parse_spec(CONTINUOUS + error)).result

@@ -26,6 +26,7 @@ def saved(path, rows, header):
     return path
 
 
+@pytest.mark.slow
 def test_what_a_reference_tells_is_not_drawn_towards_the_controller(rows, tmp_path):
     named = saved(tmp_path / "named.csv", rows, "u,y,SP")
     plain = saved(tmp_path / "plain.csv", rows, "u,y,r")

@@ -133,6 +133,7 @@ def test_a_short_pilot_from_rest_is_not_said_to_begin_otherwise(write, seed):
     assert abs(start.figures["first_residual"]) > 3.0 * start.figures["noise"]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_noise_from_before_the_record_is_no_start_in_motion(write, seed):
     """A zero of C at 0.93 is remembered beyond the first tenth of 150 samples; the plant was at rest."""

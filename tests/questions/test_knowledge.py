@@ -33,6 +33,7 @@ def record(seed, folder):
     return path, float(np.sum((y - late) ** 2)) / VARIANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [INTERVALS, pytest.param(COVARIANCE, marks=pytest.mark.slow)])
 def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
     path, excess = record(5, tmp_path)

@@ -36,7 +36,7 @@ def test_an_input_that_was_logged_late_leaves_the_verdict_open(logged):
     found = assess(spec, late)
     assert found.verdict == "undecided"
     (told,) = found.results.result["assessment"]["undecided"]
-    assert told.startswith("u was logged 1 sample late: the controller of the spec, u = r - C y, leaves ")
+    assert told.startswith("A column was logged at another time: u is 1 sample late")
     assert told in identify(spec, late).result["notes"]
 
 

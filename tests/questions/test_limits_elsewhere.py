@@ -29,6 +29,7 @@ def peaks(u, plants):
     ]
 
 
+@pytest.mark.slow
 def test_drawn_plants_keep_limits_and_others_are_counted():
     found = solve(parse_spec(SPEC))
     u = found.tables["signal"].columns["u1"]

@@ -185,6 +185,7 @@ def test_data_tell_the_settings_for_the_estimated_plant(tmp_path):
     assert asked["loop"]["Kp"] == pytest.approx(200.0 / (2.4 * 57.5), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "margin",
     [

@@ -141,6 +141,7 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
     assert result["cost"] == pytest.approx(scale * problem.value, rel=1e-4)
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize(
     "overrides",
     [

@@ -35,6 +35,7 @@ def data(write):
     return write(record(load_spec(SPEC)))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("given", ["arx", "jenkins"])
 def test_the_blocks_can_be_pasted(given, write):
     spec = load_spec(SPEC, ["spectrum.order=4"]) if given == "arx" else parse_spec(JENKINS)
@@ -101,6 +102,7 @@ def test_plants_in_s_come_back(hold, denominator, write):
     np.testing.assert_allclose(build_model(again).theta, list(found["theta"].values()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("relative", "enough"), [(2.0, True), pytest.param(0.1, False, marks=pytest.mark.slow)]
 )
@@ -114,6 +116,7 @@ def test_plants_in_s_are_assessed(relative, enough, write):
         assert found.results.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_held_input_taken_for_its_interpolation_is_told(write):
     spec = parse_spec(IN_S.replace("DENOMINATOR", EACH))
     data = write(recorded_in_s(spec, 1500, True, np.random.default_rng(1)))
@@ -128,6 +131,7 @@ def recorded_in_loop(spec, samples, rng):
     return {"time_s": np.arange(samples), "u1": u[:, 0], "u2": u[:, 1], "y1": y[:, 0], "y2": y[:, 1]}
 
 
+@pytest.mark.slow
 def test_a_loop_is_identified_directly_and_topped_up(write):
     spec = load_spec("specs/two_by_two_loop.yaml", ["spectrum.order=4", "experiment.samples=1000"])
     data = write(recorded_in_loop(spec, 1000, np.random.default_rng(1)))

@@ -53,6 +53,10 @@ def within_wishart(simulation):
 
 def test_covariances_lie_in_the_range_of_the_wishart_distribution(studied):
     within_wishart(studied.result["simulation"])
+
+
+@pytest.mark.slow
+def test_of_box_jenkins_plants_they_do_as_well():
     within_wishart(simulate(parse_spec(JENKINS)).result["simulation"])
 
 
@@ -128,6 +132,7 @@ def test_a_loop_keeps_its_promise():
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
 
 
+@pytest.mark.slow
 def test_a_loop_around_a_held_plant_keeps_its_promise():
     """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
     true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
@@ -159,7 +164,7 @@ IN_S += "0.69314718]}, sample: zoh"
 COLOURED = "noise: {C: [1, 0.8], variance: 0.5}"
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize("nominal", [IN_Q, IN_S])
 @pytest.mark.parametrize("loop", ["", ", controller: {numerator: [[[0.1], [0]], [[0], [0.1]]]}"])
 def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
@@ -198,8 +203,9 @@ def test_a_given_table_is_tried(tmp_path):
     np.testing.assert_allclose(simulation["inputs"]["design"]["power"]["input"], [9.0, 4.0], rtol=0.01)
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("signal", [{}, {"offset": [5.0, -3.0], "quantisation": {"bits": 5, "range": 100}}])
-@pytest.mark.parametrize("spec", [SPEC, "specs/first_order.yaml"])
+@pytest.mark.parametrize("spec", ["specs/first_order.yaml", SPEC])
 def test_the_delivered_record_is_tried_about_its_operating_point(spec, signal):
     overrides = ["simulation={runs: 20, excitation: record}", "spectrum.order=3"]
     if signal and "first" in spec:
@@ -222,7 +228,7 @@ class Elsewhere:
             yield Finished(task, pickle.loads(pickle.dumps(there(task))))
 
 
-@pytest.mark.first(2)
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("spec", "overrides"),
     [
@@ -240,6 +246,7 @@ def test_the_result_does_not_depend_on_where_it_is_computed(spec, overrides):
     assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("hold", [True, False])
 def test_plants_in_s_keep_their_promise(hold):
     overrides = ["plant.sample=zoh"] if hold else []
@@ -261,6 +268,7 @@ def test_the_design_reaches_the_cramer_rao_bound():
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_run_that_tells_too_little_is_counted_not_fatal():
     """Poles so fast, and noise so strong, that some runs see a plant that answers at once."""
     spec = parse_spec(

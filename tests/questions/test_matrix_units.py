@@ -17,6 +17,7 @@ accuracy: {model_error: {relative: 0.1}}
 MILLI = "plant.B=[[[0, 1.0, 0.4], [0, -0.0005, 0.0003]], [[0, 0.6, 0.2], [0, 0.0012, -0.0005]]]"
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize("spectrum", ["{type: fir, order: 4}", "{type: free}"])
 @pytest.mark.parametrize(
     ("asked", "same"),
@@ -65,6 +66,7 @@ def test_a_spectrum_of_order_zero_is_white_in_time():
     assert costs[0] < costs[1] < costs[2]
 
 
+@pytest.mark.slow
 def test_free_spectra_of_unequal_limits_are_proved():
     """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
     spec = changed(

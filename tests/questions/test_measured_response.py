@@ -230,6 +230,7 @@ def clipping(share):
     return lambda x: np.clip(x, -share * np.abs(x).max(), share * np.abs(x).max())
 
 
+@pytest.mark.first(4)
 @pytest.mark.parametrize(
     ("where", "curve"),
     [
@@ -281,6 +282,7 @@ signal: {periods: 5, phases: optimised}
 """
 
 
+@pytest.mark.slow
 def test_of_optimised_phases_the_change_is_told_as_large_as_it_is(write):
     spec = parse_spec(OPTIMISED)
     question, u = build_measurement(spec), np.tile(solve(spec).signal[:1002], (16, 1))

@@ -114,6 +114,7 @@ signal: {{samples: 100}}
 """
 
 
+@pytest.mark.first(6)
 @pytest.mark.parametrize(
     "dynamics",
     [
@@ -143,5 +144,5 @@ noise: {{variance: 1}}
 experiment: {{samples: 500}}
 accuracy: {{model_error: {{relative: 0.1}}}}
 """
-    with pytest.raises(SpecError, match="A - K C, sampled, has an eigenvalue of radius 1"):
+    with pytest.raises(SpecError, match="predictor is unstable: sampled, it has an eigenvalue of radius 1"):
         solve(parse_spec(text))

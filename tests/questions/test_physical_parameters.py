@@ -54,7 +54,7 @@ def designed(plant):
     return found.result, np.array(bound.columns["r_u"] if hasattr(bound, "columns") else bound["r_u"])
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [WORDS, SECOND, IN_Q], ids=["first order", "second order", "in q"])
 def test_reparametrisation_changes_neither_cost_nor_error(words):
     first, *others = (designed(plant) for plant in words.values())
@@ -87,6 +87,7 @@ def record_of(model, samples=600, seed=0):
     return u, sum(model.simulate(u, e, 1.0))
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("nominal", ["[2.0, 3.0, 1.685]", "[1.0, 8.0, 9.0]"])
 def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
     """Within four standard deviations, whatever the nominal values."""
@@ -210,6 +211,7 @@ experiment: {samples: 300}
 """
 
 
+@pytest.mark.slow
 def test_a_gain_whose_sign_an_expression_forbids_blames_no_columns(tmp_path):
     """sqrt(p) of a plant with gain -1 ends at zero, where no input explains anything."""
     np.savetxt(tmp_path / "log.csv", _held(-1.0, 4), delimiter=",", header="u,y", comments="")

@@ -247,7 +247,8 @@ def test_an_input_that_a_trace_leaves_out_is_told():
         )
     ).result
     assert found["power"]["input"] == pytest.approx([1.0, 0.0], abs=1e-9)
-    assert [note for note in found["notes"] if note.startswith("input 2 gets no power")]
+    (idle,) = [one for one in found["findings"] if one["code"] == "input-without-power"]
+    assert idle["where"] == "input 2"
 
 
 @pytest.mark.parametrize("spectrum", ["fir, order: 4", "free", "white"])

@@ -31,7 +31,7 @@ WORDS = {
     "short": "numerator: [K]",
     "s": "raise the orders of numerator and denominator",
     "named": "[T2, 1] as another factor of the denominator",
-    "states": "one more state",
+    "states": "a further state",
     "q": "raise the orders of B and F",
     "named q": "by a name in parameters",
 }
@@ -57,7 +57,7 @@ def test_remedies_are_in_the_words_of_the_plant(kind):
 def test_remedies_fit_into_the_sentences_that_hold_them(kind):
     _, found = remedies(PLANTS[kind])
     for fault, remedy in found.items():
-        note = OF_MANY[fault][1].format(p="0.1", lag=3, where="", remedy=remedy)
+        note = OF_MANY[fault].found("probability 0.1", remedy=f"{remedy}.").message
         assert not re.search(r"[,;:.]\s*[,;.]|\s[,;.](?!\.)|  ", note.replace(", ..]", "]")), note
 
 
@@ -101,7 +101,7 @@ def test_entries_have_no_single_lag_more(order, gain):
     keys, values, *_ = ORDERS[order]
     own = keys.format(*(gain.format(value, value) for value in values))
     _, found = remedies(f"{{continuous: {{gain: {gain.format(2.1, 1.3)}, {own}}}, sample: zoh}}")
-    assert "by numerator and denominator, with one more lag, in place of gain" in found["plant"]
+    assert "by numerator and denominator, with a further lag, in place of gain" in found["plant"]
 
 
 def test_a_noise_that_drifts_is_not_told_to_drift():

@@ -49,6 +49,7 @@ def with_empty_cells(rows, every):
     return emptied
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize("every", [12, 25, 60])
 @pytest.mark.parametrize("options", [{}, {"preparation": Preparation(detrend="constant")}])
 def test_a_copy_with_empty_cells_is_refused(every, options, saved):
@@ -62,13 +63,14 @@ def test_a_copy_with_empty_cells_is_refused(every, options, saved):
         explore(files)
 
 
+@pytest.mark.slow
 def test_a_part_with_empty_cells_leaves_the_verdict_open(saved):
     first, second = rows_of(3), rows_of(4)
     second[200:400] = with_empty_cells(first, 25)[100:300]
     found = assess(parse_spec(SPEC), [saved("a.csv", first), saved("b.csv", second)])
     assert found.verdict == "undecided"
     (told, *_) = [r for r in found.results.result["assessment"]["undecided"] if "stand in a.csv as well" in r]
-    assert told.startswith("192 of 492 samples of b.csv")
+    assert "192 of 492 samples of b.csv" in told
 
 
 def test_rests_and_coarse_steps_come_again_by_themselves():

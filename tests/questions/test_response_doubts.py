@@ -63,6 +63,7 @@ def bent(spec, u, curve):
     return float(np.max(np.abs(curved / linear - 1.0)) / 0.05)
 
 
+@pytest.mark.first(5)
 @pytest.mark.parametrize(
     ("curve", "strength"),
     [
@@ -88,6 +89,7 @@ def test_noise_that_misses_whatever_the_nonlinearity_does_is_a_miss(write, quest
     assert finding(found, "nonlinear-response").severity == "doubt"
 
 
+@pytest.mark.first(3)
 @pytest.mark.parametrize(("height", "seed"), [(5.0, 1), (-20.0, 2), (200.0, 1)])
 def test_a_drift_is_no_nonlinearity_and_detrending_mends_it(write, question, height, seed):
     spec, u = question

@@ -57,6 +57,7 @@ def designed(text, *overrides):
     return build_convex(spec).designed().design.result
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize(
     "overrides",
     [

@@ -150,6 +150,7 @@ def test_the_norm_of_the_error_against_a_plain_program():
     assert found.objective == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_norm_costs_more_than_the_entries_and_is_reported():
     entries = designed(OPEN, "accuracy.model_error.norm=entry").result.objective
     outcome = solve(parse_spec(OPEN))

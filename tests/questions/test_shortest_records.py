@@ -260,8 +260,8 @@ def shortest_of_two_levels(b: float, pole: float, variance: float, relative: flo
     raise AssertionError
 
 
-@pytest.mark.first(1)
-@pytest.mark.parametrize("relative", [0.15, 0.2, 0.25])
+@pytest.mark.slow
+@pytest.mark.parametrize("relative", [0.25, 0.2, 0.15])
 def test_two_levels_are_as_short_as_any_that_there_are(relative):
     """Within a sample of the shortest of all sequences."""
     text = f"""
@@ -280,7 +280,7 @@ objective: shortest_experiment
     assert least <= found["samples"] <= least + 1
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.96])
 def test_what_is_known_already_needs_a_short_record_only(share):
     """Records of few samples tell next to nothing beside a prior: in proportion to them none would do."""

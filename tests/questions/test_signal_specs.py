@@ -61,6 +61,7 @@ def test_the_power_of_the_design_on_request():
     assert outcome.result["signal"]["power"][0] == pytest.approx(outcome.result["cost"], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_record_that_is_too_short_names_one_that_is_not():
     with pytest.raises(InfeasibleError) as error:
         solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2, type: filtered_noise}\n"))

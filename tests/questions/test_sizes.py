@@ -50,6 +50,7 @@ def test_a_model_of_many_parameters_is_refused_with_what_fits():
     assert "127 parameters fit" in found.hint
 
 
+@pytest.mark.slow
 def test_a_wide_plant_of_long_polynomials_is_refused():
     row = ", ".join(["[0" + ", 1" * 100 + "]"] * 20)
     assert (

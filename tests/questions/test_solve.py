@@ -9,8 +9,8 @@ from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.outcome.golden import compare, load_golden
+from inputdesign_cli.questions import execute
 from inputdesign_cli.questions.least_cost.sought import GridMethod
-from inputdesign_cli.questions.verbs import execute
 
 ROOT = Path(__file__).parent.parent.parent
 SMALL = """

@@ -73,6 +73,7 @@ def test_an_estimate_is_written_in_the_words_of_the_spec():
     np.testing.assert_allclose(again.theta, moved.theta)
 
 
+@pytest.mark.slow
 def test_a_study():
     rest = REST.replace("samples: 60", "samples: 300") + "simulation: {runs: 40, seed: 2}\n"
     found = simulate(spec_of(WORDS[0], rest)).result["simulation"]["inputs"]["design"]

@@ -83,7 +83,7 @@ def test_noise_of_the_inputs_is_no_excitation_and_strong_lines_are_some():
 
 
 def test_data_that_leave_lines_out_have_no_verdict(write):
-    with pytest.raises(DataError, match="19 of 20 lines of the spec") as caught:
+    with pytest.raises(DataError, match="19 of 20 lines") as caught:
         assess(parse_spec(TEXT), write(table_of(sine())))
     assert caught.value.diagnostics[0].code == "not-exciting"
 

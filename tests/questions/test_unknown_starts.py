@@ -12,7 +12,7 @@ from inputdesign_cli.outcome.design import RequirementMet, Signal
 from inputdesign_cli.outcome.estimate import Assessment
 from inputdesign_cli.outcome.outcome import Outcome
 from inputdesign_cli.questions.building.system import build_model
-from inputdesign_cli.report.evidence import verdict
+from inputdesign_cli.report.facts import verdict
 
 N = 500
 DOUBLE = """

@@ -150,7 +150,8 @@ def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
     message = refused(text.replace("LIMITS", limits.format(*keys.values()))).message
 
     def raised(share):
-        told = {key: float(message.split(f"limits.{key} ")[1].split(" times")[0]) for key in keys}
+        times = {key: message.split(f"limits.{key} would have to be ")[1] for key in keys}
+        told = {key: float(text.split(" times")[0]) for key, text in times.items()}
         bounds = [share * bound * told[key] for key, bound in keys.items()]
         return text.replace("LIMITS", limits.format(*bounds))
 

@@ -66,7 +66,7 @@ def test_text_by_its_code_line_and_option(text, code, line, option, tmp_path):
     assert option in found.hint
 
 
-@pytest.mark.parametrize("form", ["%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S", "%H%M%S"])
+@pytest.mark.parametrize("form", ["%Y%m%d", "%Y%m%d%H%M", "%Y%m%d%H%M%S"])
 @pytest.mark.parametrize("kind", ["csv", "npz"])
 def test_dates_in_digits_are_asked_about(form, kind, tmp_path):
     step = {"%Y%m%d": timedelta(days=1), "%Y%m%d%H%M": timedelta(minutes=1)}.get(form, timedelta(seconds=30))

@@ -1,81 +1,77 @@
 """How the columns of a record are found, and what is said of files that cannot be read."""
 
 import re
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-import scipy.signal
 
-from inputdesign_cli import identify, parse_spec
+from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.records import Preparation, read_log
+from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.records import Preparation, read_data, read_log
 
 STRUCTURE = "sample_time: 2\ntime_unit: min\nplant: {B: [0, 1], F: [1, -0.7]}\n"
-U = np.random.default_rng(1).standard_normal(200)
-Y = scipy.signal.lfilter([0, 1], [1, -0.7], U) + 0.1 * np.random.default_rng(2).standard_normal(200)
+UNITS = Units("min", 2.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+NAMED = replace(UNITS, channels={"u1": ("Valve", "%"), "y1": ("Level", "mm")})
+U, Y = np.random.default_rng(1).standard_normal((2, 200))
+EVEN = [2 * k for k in range(200)]
 
 
 @pytest.fixture
-def estimated(tmp_path):
-    """The estimate from a file with this header and first column."""
+def log(tmp_path):
+    """Writes a record with this header, times first if there are any."""
 
-    def made(header, first):
-        path = tmp_path / "d.csv"
-        rows = "\n".join(f"{t},{u!r},{y!r}" for t, u, y in zip(first, U.tolist(), Y.tolist(), strict=True))
-        path.write_text(f"{header},u,y\n{rows}\n")
-        return identify(parse_spec(STRUCTURE, design=False), path).result
+    def written(header, times=None):
+        columns = [U.tolist(), Y.tolist()] if times is None else [times, U.tolist(), Y.tolist()]
+        rows = "\n".join(",".join(map(str, row)) for row in zip(*columns, strict=True))
+        (tmp_path / "d.csv").write_text(f"{header}\n{rows}\n", encoding="utf-8")
+        return tmp_path / "d.csv"
 
-    return made
+    return written
 
 
-@pytest.mark.first(3)
+def read(path, units=UNITS, **prepared):
+    """The record, whose samples are those that were written."""
+    record = read_data([path], units, Preparation(**prepared))
+    np.testing.assert_array_equal(record.u[:, 0], U)
+    np.testing.assert_array_equal(record.y[:, 0], Y)
+    return record
+
+
+def codes(record):
+    return [one.code for one in record.findings]
+
+
 @pytest.mark.parametrize("name", ["time", "time_min", "t", "t_min", "timestamp", "Time (min)", "t [min]"])
-def test_times_go_by_several_names(name, estimated):
-    assert estimated(name, 2 * np.arange(200))["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)
+def test_times_go_by_several_names(name, log):
+    np.testing.assert_array_equal(read(log(f"{name},u,y", EVEN)).time, EVEN)
     with pytest.raises(DataError, match="sampled every 3"):
-        estimated(name, 3 * np.arange(200))
+        read(log(f"{name},u,y", [3 * k for k in range(200)]))
 
 
-def test_times_may_be_dates(estimated):
+def test_times_may_be_dates(log):
     moments = [datetime(2024, 2, 28, 23) + timedelta(minutes=2 * k) for k in range(200)]
-    assert estimated("timestamp", [m.isoformat(" ") for m in moments])["identification"]["theta"][
-        "b1"
-    ] == pytest.approx(1.0, abs=0.1)
+    np.testing.assert_allclose(np.diff(read(log("timestamp,u,y", moments)).time), 2.0)
     late = [m + timedelta(minutes=5 * (k > 100)) for k, m in enumerate(moments)]
-    cut = estimated("timestamp", [m.isoformat() for m in late])
-    assert "record-cut" in [one["code"] for one in cut["findings"]]
-    assert cut["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)
+    assert "record-cut" in codes(read(log("timestamp,u,y", late)))
     with pytest.raises(DataError, match="no date or time as those above are"):
-        estimated("timestamp", ["2024-01-01", *["yesterday"] * 199])
+        read(log("timestamp,u,y", ["2024-01-01", *["yesterday"] * 199]))
 
 
-def test_another_unit_is_told(estimated):
+def test_another_unit_is_refused_until_the_user_states_it(log):
     with pytest.raises(DataError, match="the times are in ms"):
-        estimated("t_ms", 2 * np.arange(200))
-
-
-def test_a_unit_that_the_user_states_is_converted(tmp_path):
-    path = tmp_path / "s.csv"
-    path.write_text(
-        "t_s,u,y\n"
-        + "".join(
-            f"{120 * k},{u!r},{y!r}\n" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
-        )
-    )
-    spec = parse_spec(STRUCTURE, design=False)
+        read(log("t_ms,u,y", EVEN))
+    path = log("t_s,u,y", [120 * k for k in range(200)])
     with pytest.raises(DataError, match="the times are in s") as raised:
-        identify(spec, path)
+        read(path)
     assert "--time-unit s" in raised.value.diagnostics[0].hint
-    found = identify(spec, path, preparation=Preparation(time_unit="s")).result
-    assert found["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)
-
-
-CHANNELS = "channels: {u1: {name: Valve, unit: '%'}, y1: {name: Level, unit: mm}}\n"
+    np.testing.assert_array_equal(read(path, time_unit="s").time, EVEN)
 
 
 @pytest.mark.parametrize(
-    ("header", "told"),
+    ("header", "units"),
     [
         ("Valve,Level", []),
         ("valve [%],Level (MM)", []),
@@ -84,14 +80,10 @@ CHANNELS = "channels: {u1: {name: Valve, unit: '%'}, y1: {name: Level, unit: mm}
         ("u1 Valve (%),y1 Level (m)", ["m"]),
     ],
 )
-def test_columns_go_by_the_names_of_channels_and_other_units_are_told(header, told, tmp_path):
-    path = tmp_path / "d.csv"
-    rows = "".join(f"{u!r},{y!r}\n" for u, y in zip(U.tolist(), Y.tolist(), strict=True))
-    path.write_text(f"{header}\n{rows}")
-    found = identify(parse_spec(STRUCTURE + CHANNELS, design=False), path).result
-    assert found["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)
-    noted = [one for one in found.get("findings", []) if one["code"] == "unit-not-converted"]
-    assert [one["figures"]["found"] for one in noted] == told
+def test_columns_go_by_the_names_of_channels_and_other_units_are_found(header, units, log):
+    record = read(log(header), NAMED)
+    noted = [one.figures["found"] for one in record.findings if one.code == "unit-not-converted"]
+    assert noted == units
 
 
 @pytest.mark.parametrize(
@@ -102,29 +94,29 @@ def test_columns_go_by_the_names_of_channels_and_other_units_are_told(header, to
         ("time,steam.PV,temp.OP (%)", "temp.OP (%)", "steam.PV"),
     ],
 )
-def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, tmp_path):
+def test_the_hint_about_missing_columns_can_be_pasted(header, u, y, log):
     """The words of control systems decide: OP is the input, PV the output."""
-    path = tmp_path / "d.csv"
-    rows = "".join(
-        f"{2 * k},{u!r},{y!r}\n" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
-    )
-    path.write_text(f"{header}\n{rows}")
-    spec = parse_spec(STRUCTURE, design=False)
+    path = log(header, EVEN)
     with pytest.raises(DataError, match=re.escape(header.replace(",", ", "))) as raised:
-        identify(spec, path)
+        read(path)
     (named,) = re.findall('--columns "(.*)"', raised.value.diagnostics[0].hint)
     assert named == f"time=time,u1={u},y1={y}"
     columns = dict(part.split("=") for part in named.split(","))
-    assert identify(spec, path, preparation=Preparation(columns=columns)).result["identification"]
+    assert read_data([path], UNITS, Preparation(columns=columns)).lengths == (200,)
 
 
-def test_a_column_that_only_begins_like_a_time_is_none(estimated):
-    assert estimated("temperature", 7 * np.arange(200))["identification"]["theta"]["b1"] == pytest.approx(
-        1.0, abs=0.1
-    )
+def test_a_column_that_only_begins_like_a_time_is_none(log):
+    assert read(log("temperature,u,y", [7 * k for k in range(200)])).lengths == (200,)
 
 
-def test_the_variance_of_noise_that_is_estimated_need_not_be_stated(estimated):
+@pytest.mark.parametrize("header", ["u,u1,y", "u a,u b,y"])
+def test_an_input_that_may_be_in_two_columns_is_refused(header, log):
+    with pytest.raises(DataError, match="several columns that may be u1") as raised:
+        read(log(header, EVEN))
+    assert "--columns u1=u" in raised.value.diagnostics[0].hint
+
+
+def test_the_variance_of_noise_that_is_estimated_need_not_be_stated():
     for noise in ("", "noise: {C: [1, 0.1]}\n"):
         parse_spec(STRUCTURE + noise, design=False)
         with pytest.raises(SpecError, match="noise"):
@@ -148,18 +140,12 @@ def test_hints_name_the_likely_mistake_first(setting, said):
 
 
 @pytest.mark.parametrize("column", ["1", "Time", "TIME [s]", "time [s]"])
-def test_the_unit_of_a_column_counts_however_it_is_named(column, tmp_path):
-    path = tmp_path / "d.csv"
-    rows = "\n".join(
-        f"{2 * k},{u!r},{y!r}" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
-    )
-    path.write_text(f"Time [s],Valve (mA),level\n{rows}\n")
-    named = Preparation(columns={"time": column, "u1": "2", "y1": "3"})
-    spec = parse_spec(f"{STRUCTURE}channels: {{u1: {{name: valve, unit: '%'}}}}\n", design=False)
+def test_the_unit_of_a_column_counts_however_it_is_named(column, log):
+    path, columns = log("Time [s],Valve (mA),level", EVEN), {"time": column, "u1": "2", "y1": "3"}
     with pytest.raises(DataError, match="the times are in s, but the spec counts in min"):
-        identify(spec, path, preparation=named)
-    seconds = identify(spec.with_(time_unit="s"), path, preparation=named)
-    assert [one["code"] for one in seconds.result["findings"]] == ["unit-not-converted"]
+        read(path, NAMED, columns=columns)
+    seconds = read(path, replace(NAMED, time_unit="s"), columns=columns)
+    assert codes(seconds) == ["unit-not-converted"]
 
 
 @pytest.mark.parametrize(
@@ -175,29 +161,22 @@ def test_the_unit_of_a_column_counts_however_it_is_named(column, tmp_path):
         ("deg", "degC", False),
     ],
 )
-def test_spellings_of_one_unit_are_no_difference(one, other, same, tmp_path):
-    path = tmp_path / "d.csv"
-    rows = "\n".join(f"{u!r},{y!r}" for u, y in zip(U.tolist(), Y.tolist(), strict=True))
-    path.write_text(f"u,y ({other})\n{rows}\n", encoding="utf-8")
-    spec = parse_spec(f"{STRUCTURE}channels: {{y1: {{name: level, unit: '{one}'}}}}\n", design=False)
-    codes = [one["code"] for one in identify(spec, path).result.get("findings", [])]
-    assert ("unit-not-converted" in codes) is not same
+def test_spellings_of_one_unit_are_no_difference(one, other, same, log):
+    record = read(log(f"u,y ({other})"), replace(UNITS, channels={"y1": ("level", one)}))
+    assert ("unit-not-converted" in codes(record)) is not same
 
 
 @pytest.mark.parametrize(("unit", "agrees"), [("s", True), ("min", False), ("h", False)])
 @pytest.mark.parametrize("times", ["seconds", "dates"])
-def test_a_unit_that_contradicts_the_file_is_refused_by_every_command(unit, agrees, times, tmp_path):
+def test_a_unit_that_contradicts_the_file_is_refused_by_every_command(unit, agrees, times, log):
     """Else a plant sixty times too fast would look like any other."""
-    path = tmp_path / "d.csv"
-    stamps = [datetime(2024, 2, 28) + timedelta(minutes=2 * k) for k in range(len(U))]
-    told = [s.isoformat() for s in stamps] if times == "dates" else [120 * k for k in range(len(U))]
-    rows = "".join(f"{t},{u!r},{y!r}\n" for t, u, y in zip(told, U.tolist(), Y.tolist(), strict=True))
-    path.write_text(f"{'timestamp' if times == 'dates' else 'Time (s)'},u,y\n{rows}")
-    spec = parse_spec(STRUCTURE, design=False)
-    for read in (lambda said: read_log(path, said), lambda said: identify(spec, path, preparation=said)):
+    stamps = [datetime(2024, 2, 28) + timedelta(minutes=2 * k) for k in range(200)]
+    seconds = [120 * k for k in range(200)]
+    path = log(*(("timestamp,u,y", stamps) if times == "dates" else ("Time (s),u,y", seconds)))
+    for reading in (read_log, lambda path, said: read_data([path], UNITS, said)):
         if agrees:
-            assert read(Preparation(time_unit=unit))
+            assert reading(path, Preparation(time_unit=unit)).lengths == (200,)
             continue
         with pytest.raises(DataError, match=f"--time-unit says {unit}") as raised:
-            read(Preparation(time_unit=unit))
+            reading(path, Preparation(time_unit=unit))
         assert raised.value.diagnostics[0].code == "data-wrong-unit"

@@ -19,8 +19,7 @@ from inputdesign_cli.outcome.curves import (
 )
 from inputdesign_cli.outcome.curves_file import curves_json
 from inputdesign_cli.outcome.record import FIGURES
-from inputdesign_cli.report.captions import captioned
-from inputdesign_cli.report.charts import run_charts
+from inputdesign_cli.report.charts import captioned, run_charts
 from tests.support.curves import CURVES
 
 # What was told of figures of which nobody knows what they show.
@@ -66,11 +65,11 @@ def nyquist(**entries):
             "the record that it is estimated from",
             "one part",
         ),
-        (FanCurves(W, ONES[None], ONES, dict.fromkeys("abc", ONES)), "those that bind in colour", "5 of"),
+        (FanCurves(W, ONES[None], ONES, dict.fromkeys("abc", ONES)), "the binding plants in colour", "5 of"),
         (
             FanCurves(W, ONES[None], ONES, dict.fromkeys("abcdefg", ONES)),
-            "each, 5 of the 7 that bind in colour",
-            "each, those",
+            "each, 5 of the 7 binding plants in colour",
+            "each, the binding",
         ),
         (SignalCurves(W, {"u1": ONES}), "values are distributed.", "output"),
         (

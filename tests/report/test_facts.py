@@ -75,19 +75,19 @@ def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
         (
             {"kind": "accuracy_factor", "value": 0.148},
             1.0 + 1e-9,
-            "none was found in the intervals that errs more than those that the design is for: 0.148 of "
-            "what is admitted",
+            "none was found in the intervals that errs more than the plants that the design is for: 0.148 of "
+            "the admissible error",
         ),
         (
             {"kind": "accuracy_factor", "value": 0.5},
             1.002,
-            "the worst that was found in the intervals errs 0.2 % more than those that the design is for: "
-            "0.501 of what is admitted",
+            "the worst that was found in the intervals errs 0.2 % more than the plants that the design is "
+            "for: 0.501 of the admissible error",
         ),
         (
             {"kind": "least_cost", "value": 3.0},
             0.9,
-            "0.9 of what is admitted is the worst that was found in the intervals",
+            "0.9 of the admissible error is the most that was found in the intervals",
         ),
     ],
 )

@@ -18,9 +18,9 @@ import pytest
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.render import bibtex_text, report_text
-from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.outcomes import typed
 from tests.support.pages import XHTML, parse, words
+from tests.support.sweep_files import run_sweep
 
 
 @pytest.mark.first(1)

@@ -15,10 +15,10 @@ from inputdesign_cli.live.pages import Followed, message_page
 from inputdesign_cli.outcome.run_directory import write_run
 from inputdesign_cli.questions import explore
 from inputdesign_cli.report.render import report_text
-from inputdesign_cli.sweeps.running import run_sweep
 from tests.support.browser import clipped, needs_browser, started, violations
 from tests.support.campaigns import applied
 from tests.support.pages import SPEC
+from tests.support.sweep_files import run_sweep
 
 pytestmark = [needs_browser, pytest.mark.browser]
 

@@ -59,7 +59,7 @@ ROWS: list[Row] = [
     ("not-a-number", "sample_time", 'the text "yes"', {"sample_time": "§yes"}),
     ("not-a-number", "sample_time", "a list", {"sample_time": "§[1]"}),
     ("not-a-number", "sample_time", "write 10", {"sample_time": "§010"}),
-    ("not-a-number", "sample_time", "decimal: 16", {"sample_time": "§0x10"}),
+    ("not-a-number", "sample_time", "decimal number", {"sample_time": "§0x10"}),
     ("not-a-number", "sample_time", "underscores: 1000", {"sample_time": "§1_000"}),
     ("not-a-number", "sample_time", "1:30", {"sample_time": "§1:30"}),
     ("not-a-number", "sample_time", "2001-01-01", {"sample_time": "§2001-01-01"}),
@@ -67,7 +67,7 @@ ROWS: list[Row] = [
     ("not-a-number", "sample_time", "write 0.005", {"sample_time": "§5 ms"}),
     ("not-a-number", "sample_time", "remove the quotes", {"sample_time": "§'1e-3'"}),
     ("not-a-number", "sample_time", "3.14159", {"sample_time": "§pi"}),
-    ("not-a-number", "accuracy.model_error.relative", "fraction: 0.01", {
+    ("not-a-number", "accuracy.model_error.relative", "0.01 where a fraction", {
         "accuracy": "{model_error: {relative: §1%}}"}),
     ("not-finite", "sample_time", "finite", {"sample_time": "§.inf"}),
     ("not-finite", "sample_time", "finite", {"sample_time": "§-.INF"}),
@@ -411,8 +411,8 @@ def test_a_misspelt_key_is_not_missing_as_well(diagnostics):
 ASKED = "\nnoise: {variance: 1}\naccuracy: {standard_deviation: {gain: 0.1}}\n"
 CASES = {
     "plant: {B: [0, 1], F: [1, -0.5], delay: 3}": "leading zeros of B",
-    "plant: {continuous: {numerator: [2], denominator: [9, 1]}, delay: 3, sample: zoh}": "under continuous",
-    "plant: {continuous: {gain: 2, time_constant: 9}, dead_time: 3, sample: zoh}": "under continuous",
+    "plant: {continuous: {numerator: [2], denominator: [9, 1]}, delay: 3, sample: zoh}": "under plant.continuous",
+    "plant: {continuous: {gain: 2, time_constant: 9}, dead_time: 3, sample: zoh}": "under plant.continuous",
     "plant: {B: [0, 1]}\nexperiment: {controller: {pid: {Kp: 1, Ki: 2}}}": "Ti: Kp / Ki",
     "plant: {B: [0, 1]}\nexperiment: {controller: {pid: {Kp: 1, Kd: 2}}}": "Td: Kd / Kp",
     "plant: {parameters: {K: 2, θ: 3}, continuous: {numerator: [K], denominator: [9, 1]}}": "a to z",

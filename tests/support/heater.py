@@ -10,7 +10,7 @@ from inputdesign_cli.cli.summary import summary
 STRUCTURE = """
 sample_time: 5
 plant: {B: [0, 0, 0, 0, 0, 0, 0.03, 0.02], F: [1, -0.97]}
-noise: {C: [1, -0.2], D: [1, -0.8], variance: 0.001}
+noise: {D: [1, -0.8], variance: 0.001}
 """
 HEATER = (
     STRUCTURE
@@ -32,7 +32,7 @@ def heater(samples, seed, *, lag=False, drift=0.0, level=(0.0, 0.0), warm=0.0, p
     if lag:
         B, F = B * (1 - LAG), np.convolve(F, [1, -LAG])
     y = scipy.signal.lfilter(B, F, u) + warm * SLOW ** np.arange(samples)
-    y += scipy.signal.lfilter([1, -0.2], [1, -0.8], 0.03 * rng.standard_normal(samples))
+    y += scipy.signal.lfilter([1], [1, -0.8], 0.03 * rng.standard_normal(samples))
     time = 5.0 * np.arange(samples)
     return {"time_s": time, "u": u + level[0], "y": y + level[1] + drift * time / 3600}
 

@@ -4,6 +4,9 @@ import csv
 import json
 from pathlib import Path
 
+from inputdesign_cli.sweeps.plan import build_plan
+from inputdesign_cli.sweeps.running import SweepRun
+
 SPEC = """\
 title: A small design
 plant: {B: [0, 1], F: [1, -0.5]}
@@ -13,6 +16,11 @@ accuracy: {model_error: {relative: 0.1}}
 spectrum: {type: fir, order: 2}
 signal: {type: multisine, candidates: 1, seed: 1}
 """
+
+
+def run_sweep(spec, settings=(), *, directory, verb="solve", **options):
+    """Sweep as the command does."""
+    return SweepRun(build_plan(spec, settings, verb=verb), directory, **options).run()
 
 
 def rows(directory: Path) -> list[dict[str, str]]:

@@ -8,8 +8,8 @@ import pytest
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.sweeps.plan import build_plan
-from inputdesign_cli.sweeps.running import list_points, run_sweep
-from tests.support.sweep_files import rows, timeless_files, timeless_rows
+from inputdesign_cli.sweeps.running import list_points
+from tests.support.sweep_files import rows, run_sweep, timeless_files, timeless_rows
 
 SETTINGS = ["experiment.samples=60,80"]
 

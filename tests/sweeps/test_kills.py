@@ -47,6 +47,7 @@ def kill_at_random(spec, out, points, kills, seed):
     return stood
 
 
+@pytest.mark.slow
 def test_an_interrupt_from_the_terminal_ends_everything_in_order(spec, tmp_path):
     out = tmp_path / "out"
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -26,6 +26,7 @@ def test_no_public_name_is_that_of_a_module():
     assert modules & {name for name in inputdesign_cli.__all__ if name != "__version__"} == set()
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("order", [IMPORTS, IMPORTS[1:] + IMPORTS[:1], IMPORTS[2:] + IMPORTS[:2]], ids=str)
 def test_it_is_a_function_in_every_order_of_imports(order):
     code = "\n".join([*order, "import inputdesign_cli as i", "from inputdesign_cli import sweep"])

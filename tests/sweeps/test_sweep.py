@@ -1,10 +1,10 @@
 """A sweep runs every point once, notes what fails, and never mixes with anything else."""
 
+import hashlib
 import json
 import multiprocessing
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import pytest
 
@@ -13,10 +13,10 @@ from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, Spec
 from inputdesign_cli.figures.sweep_table import read_sweep
 from inputdesign_cli.sweeps.layout import Layout
 from inputdesign_cli.sweeps.plan import build_plan
-from inputdesign_cli.sweeps.running import list_points, run_sweep
-from inputdesign_cli.sweeps.table import scalars, table_lines
+from inputdesign_cli.sweeps.running import list_points
+from inputdesign_cli.sweeps.table import Row, scalars, table_lines
 from tests.support.processes import running
-from tests.support.sweep_files import rows, timeless_files, timeless_rows
+from tests.support.sweep_files import rows, run_sweep, timeless_files, timeless_rows
 
 
 def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):
@@ -227,20 +227,10 @@ def test_the_table_holds_short_lists_and_no_long_ones():
 
 def test_a_number_has_the_fewest_digits_that_can_be_read_back():
     """0.1 and a third in the digits of Python, a whole number without its point."""
-    plan = SimpleNamespace(grid=Points(), key=lambda index: str(index))
     result = {"status": "optimal", "a": 0.1, "b": 1 / 3, "c": 2.0, "n": 7}
-    head, row = table_lines(plan, lambda key: result)
+    head, row = table_lines(["samples"], [(("100",), Row.of("0", result))])
     found = dict(zip(head.strip().split(","), row.strip().split(","), strict=True))
     assert [found[name] for name in "abcn"] == ["0.1", "0.3333333333333333", "2", "7"]
-
-
-class Points(list):
-    """A grid of one point along one axis."""
-
-    axes = (SimpleNamespace(key="samples"),)
-
-    def __init__(self):
-        super().__init__([("100",)])
 
 
 def test_processes_give_what_one_process_gives(spec, tmp_path):
@@ -291,7 +281,9 @@ def test_a_worker_writes_nothing_but_the_files_of_a_run(tmp_path, files):
 def test_a_layout_reads_results_before_failures(tmp_path):
     layout = Layout(tmp_path)
     assert layout.read("k") is None
-    layout.write_failure("k", {"code": "x"})
-    assert layout.read("k") == {"code": "x"}
-    layout.adopt("k", {"spec.yaml": b"", "result.json": b'{"format": 1}'})
-    assert layout.read("k") == {"format": 1}
+    failure = dict.fromkeys(("status", "code", "message", "hint", "key"), "x")
+    layout.write_failure("k", failure)
+    assert layout.read("k") == failure
+    result = {"format": 1, "spec_sha256": hashlib.sha256(b"").hexdigest()}
+    layout.adopt("k", {"spec.yaml": b"", "result.json": json.dumps(result).encode()})
+    assert layout.read("k") == result

@@ -6,10 +6,8 @@ import re
 import pytest
 
 from inputdesign_cli.errors import Diagnostic, IdesignError, InfeasibleError, Location, OutputError, SpecError
-from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, question
-from inputdesign_cli.wizard.spectra import with_spectrum
+from inputdesign_cli.wizard.composing import compose, with_spectrum
+from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, in_their_words, question
 from tests.wizard.test_wizard import ENGINEER
 
 GOOD = {

@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.stated_plants import system_of
+from inputdesign_cli.wizard.plants import system_of
 from tests.wizard.test_faults import GOOD
 
 _TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}

@@ -8,9 +8,9 @@ import pytest
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.means import input_range
+from inputdesign_cli.wizard.questions import in_their_words
 from inputdesign_cli.wizard.solving import lasting, to_log, verdict
+from inputdesign_cli.wizard.wishes import input_range
 from tests.wizard.test_wizard import ENGINEER
 
 
@@ -188,10 +188,10 @@ def test_what_is_enough_is_said_of_the_plants_that_it_is_enough_for():
     fresh = {"draws": 200, "missed": 6, "largest": 1.6}
     result = {"samples": 720, "signal": {"worst_ratio": 0.9}, "robust": {"scenarios": 30, "fresh": fresh}}
     answer = {"signal": {"worst_ratio": 2.0}, "samples": 0}
-    first = next(verdict(spec, result, lambda changed: answer))
+    first = verdict(spec, result, lambda changed: answer)[0]
     assert "but not at every one within what you said of it" in first
     fresh["largest"] = 1.05
-    assert "is enough:" in next(verdict(spec, result, lambda changed: answer))
+    assert "is enough:" in verdict(spec, result, lambda changed: answer)[0]
 
 
 def test_what_is_not_used_for_a_bode_plot_is_said():

@@ -9,7 +9,7 @@ from inputdesign_cli import parse_spec
 from inputdesign_cli.questions.building.system import build_model
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.noise import noise_lines
-from inputdesign_cli.wizard.stated_plants import PlantAnswer
+from inputdesign_cli.wizard.plants import PlantAnswer
 from tests.support.wishes import ENGINEER
 
 
@@ -48,7 +48,8 @@ def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
     draft.validate()
     spec = draft.spec()
     assert spec.sample_time == 5.0
-    assert spec.noise.drift
+    assert spec.noise.variance == pytest.approx(0.04)
+    assert np.sum(spec.noise.D) == pytest.approx(0.0, abs=1e-3)  # the drift
     plant = spec.plant.continuous
     assert plant.numerator == pytest.approx((2.0,), rel=0.05)
     assert plant.denominator == pytest.approx((180.0, 1.0), rel=0.05)
@@ -76,7 +77,8 @@ def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     draft = compose(answers, "x", tmp_path)
     draft.validate()
     noise = draft.spec().noise
-    assert (noise.variance, noise.drift) == (0.04, drifts)
+    assert noise.variance == pytest.approx(0.04, rel=1e-5)
+    assert noise.drift == drifts
     assert "the log has a variance of 0.08" in draft.text
 
 
@@ -93,7 +95,8 @@ def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
 def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
     _log(tmp_path, 300, beside=4.0)
     wish = "prediction within 5 % up to 0.1"
-    draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
+    answers = {**ENGINEER, "plant": "log log.csv", "wish": wish, "loop": "PI Kp 0.5, Ti 180"}
+    draft = compose(answers, "x", tmp_path)
     draft.validate()
     assert any("residuals" in one for one in draft.notes)
     for one in draft.notes:
@@ -132,12 +135,13 @@ def test_noise_of_two_outputs_is_that_of_each():
     assert told.noise.D == spec.noise.D
 
 
-def test_noise_is_that_of_the_output_also_where_the_log_has_it_behind_a_lag():
-    """Noise e C / A that is to drift is that of the output alone where C has A as a factor."""
+def test_noise_that_is_said_to_drift_drifts_beside_a_log_that_does_not():
+    """The variance is that of e over that of e / (1 - 0.7 q^-1)."""
     explored = parse_spec(
         "sample_time: 5\nplant: {A: [1, -0.7], B: [0, 1]}\nnoise: {variance: 1}\n", design=False
     )
     lines = of_log(explored, "standard deviation 0.2", "yes")
     told = parse_spec("\n".join(["plant: {A: [1, -0.7], B: [0, 1]}", *lines]), design=False).noise
     assert told.drift
-    np.testing.assert_allclose(np.polydiv(told.C, [1.0, -0.7])[1], 0.0, atol=1e-12)
+    assert told.C == (1.0, -0.8)
+    assert told.variance == pytest.approx(0.04 * (1 - 0.49), rel=1e-5)

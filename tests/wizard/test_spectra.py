@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, questions
-from inputdesign_cli.wizard.composing import compose
-from inputdesign_cli.wizard.spectra import with_spectrum
+from inputdesign_cli.wizard.composing import compose, with_spectrum
 from tests.wizard.test_wizard import ENGINEER
 
 

@@ -9,9 +9,9 @@ import pytest
 from inputdesign_cli import parse_spec, questions
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.plants import TEMPLATES
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
 from inputdesign_cli.wizard.solving import lasting, verdict
-from inputdesign_cli.wizard.stated_plants import TEMPLATES
 from tests.support.wishes import ENGINEER
 
 WISHES = {
@@ -129,7 +129,7 @@ def test_what_is_told_was_designed():
     first, second = verdict(spec, result, solve)
     assert "60 min at plus/minus 5 is enough" in first
     assert f"{lasting(5 * 199)} would do" in second
-    assert "not enough" in next(verdict(spec, {"samples": 720, "signal": {"worst_ratio": 1.5}}, solve))
+    assert "not enough" in verdict(spec, {"samples": 720, "signal": {"worst_ratio": 1.5}}, solve)[0]
 
 
 def test_a_length_that_does_is_found_where_the_error_does_not_fall_with_its_root():

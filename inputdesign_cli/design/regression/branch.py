@@ -111,7 +111,7 @@ class BranchAndBound:
             self.closed = min(self.closed, level())
             return
         self.nodes += 1
-        found = self.lift.bound(box, kappa, allowed.scaling)
+        found = self.lift.bound(box, kappa, allowed)
         if found is None:
             found = NodeBound(-np.inf, np.zeros(0), box.upper - box.lower)
         # Shapes beyond the limit on u have at least the level; more than that is not known of them.

@@ -1,7 +1,7 @@
 """Lower bounds on the error of every Toeplitz shape in a box: a Kronecker lift with an exact dual point.
 
-With P the Toeplitz matrix of a shape, P11 u = L1 and u = c + D w for some c and D that make w of order one,
-the products (1, w)(1, w)^T (x) P form a positive semidefinite matrix of Toeplitz blocks Y_ij, i, j = 0 .. m.
+With P the Toeplitz matrix of a shape, P11 u = L1 and u = D w for a D that makes w of order one, the products
+(1, w)(1, w)^T (x) P form a positive semidefinite matrix of Toeplitz blocks Y_ij, i, j = 0 .. m.
 Its mean over any distribution of shapes satisfies
 
     E[P11 u] = L1,   E[w_i P11 u] = L1 E[w_i],
@@ -51,15 +51,20 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Scaling:
-    """u = centre + D w with |w|^2 <= limit for all shapes of a box that matter (see `limits.scaling`).
+class BoxLimits:
+    """u = D w with |w|^2 <= limit for all shapes of a box that matter (see `limits.box_limits`).
 
     The limit keeps the relaxation bounded and pays for the last digits of its dual point.
+
+    Attributes:
+        least_v: no shape of the box has a smaller v.
+        assumed: the limit takes the eigenvalues of R11 / r_0 to be above `limits.SMALLEST_EIGENVALUE`.
     """
 
-    centre: Array
     D: Array
     limit: float
+    least_v: float
+    assumed: bool
 
 
 @dataclass(frozen=True)
@@ -119,25 +124,22 @@ class Lift:
         """Return E[(1, w)_i (1, w)_j P_ra] for the first m columns of P, (t, m + 1, m + 1, n, m)."""
         return np.einsum("tijk,kra->tijra", self._unknowns[0], self.problem.lags[:, :, : self.problem.m])
 
-    def _errors(self, scaling: Scaling) -> NDArray[np.float64]:
+    def _errors(self, D: Array) -> NDArray[np.float64]:
         """(t, m + 1, n): E[(1, w)_i (P u - L)], P u from the first m columns of P: its first rows vanish."""
-        affine = np.column_stack([scaling.centre, scaling.D])
         wanted = np.concatenate([self.problem.first, self.problem.second])
-        return np.einsum("tijra,aj->tir", self._multiplied, affine) - (
-            self._unknowns[0][:, :, 0, 0, None] * wanted
-        )
+        excited = np.einsum("tijra,aj->tir", self._multiplied[:, :, 1:], D)
+        return excited - self._unknowns[0][:, :, 0, 0, None] * wanted
 
-    def bound(self, box: Box, kappa: float, scaling: Scaling) -> NodeBound | None:
+    def bound(self, box: Box, kappa: float, allowed: BoxLimits) -> NodeBound | None:
         """A lower bound on |b|^2 + kappa v over the box; None when the solver gave nothing to build on."""
-        first, m = self.problem.first, self.problem.m
-        blocks = self.blocks(box, scaling)
-        q, scale = self.cost(kappa, scaling)
+        m = self.problem.m
+        blocks = self.blocks(box, allowed)
+        q, scale = self.cost(kappa, allowed.D)
         answer = solve_conic(q, blocks, tolerance=_TOLERANCE)
         if not all(np.all(np.isfinite(z)) for z in answer.multipliers):
             return None
         # Whatever the solver says of its answer: the dual point is repaired, and its value is ours.
-        value = scale * self._repaired(q, blocks, answer.multipliers, scaling.limit, 1.0 / scale)
-        value += kappa * float(first @ scaling.centre)
+        value = scale * self._repaired(q, blocks, answer.multipliers, allowed.limit, 1.0 / scale)
         if answer.status not in ("solved", "almost_solved"):
             return NodeBound(value, np.zeros(0), box.upper - box.lower)
         Y = np.tensordot(np.append(1.0, answer.x), self._unknowns[0], axes=1)
@@ -145,23 +147,23 @@ class Lift:
         spread = np.abs(Y[0, 1:, 1:m] - w[:, None] * rho[1:m]).sum(axis=0)
         return NodeBound(value, rho, spread)
 
-    def cost(self, kappa: float, scaling: Scaling) -> tuple[Array, float]:
+    def cost(self, kappa: float, D: Array) -> tuple[Array, float]:
         """|b|^2 + kappa L1^T D w, divided by the second value returned."""
         Y, B = self._unknowns
         scale = max(1.0, kappa)
-        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ scaling.D))
+        variance = Y[1:, 0, 1:, 0] @ (kappa * (self.problem.first @ D))
         return (variance + np.trace(B[1:], axis1=1, axis2=2)) / scale, scale
 
-    def blocks(self, box: Box, scaling: Scaling) -> list[Block]:
+    def blocks(self, box: Box, allowed: BoxLimits) -> list[Block]:
         """The products come first, then the Gram matrix and the limit: `_repaired` goes by their places."""
         Y, B = self._unknowns
         size, m = len(Y), self.problem.m
-        errors = self._errors(scaling)
+        errors = self._errors(allowed.D)
         gram = np.zeros((size, m + 1 + self.biases, m + 1 + self.biases))
         gram[:, : m + 1, : m + 1], gram[:, m + 1 :, m + 1 :] = Y[..., 0], B
         gram[:, : m + 1, m + 1 :] = errors[:, :, m : m + self.biases]
         gram[:, m + 1 :, : m + 1] = gram[:, : m + 1, m + 1 :].swapaxes(1, 2)
-        room = (np.arange(size) == 0) - np.einsum("tii->t", Y[:, 1:, 1:, 0]) / scaling.limit
+        room = (np.arange(size) == 0) - np.einsum("tii->t", Y[:, 1:, 1:, 0]) / allowed.limit
         blocks = [
             *self.products,
             Block.of("psd", gram),

@@ -6,23 +6,24 @@ sample on average, which counts as dead time.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant import Model, Rational, TransferMatrix, delayed, discretised, pid
 from inputdesign_cli.questions.building.weights import rational
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.controller import (
+from inputdesign_cli.specification.models.loop import (
     ContinuousController,
     Controller,
+    LoopMargin,
     LoopsController,
     Pid,
     PidController,
     SingleController,
+    Tuning,
 )
-from inputdesign_cli.specification.models.loop import LoopMargin, Tuning
 from inputdesign_cli.specification.models.transfer import DiscreteMatrix
 
 
@@ -59,7 +60,6 @@ def _single(controller: SingleController, sample_time: float) -> Rational:
             return rational(controller)
 
 
-_KEY = "accuracy.loop.tuning"
 _REAL = 1e-9
 
 
@@ -104,26 +104,21 @@ def _with_values(spec: Spec, model: Model) -> Spec:
 def tuned(process: Process, tuning: Tuning) -> Pid:
     """Return the settings of a PI or PID controller."""
     K, T, L = process.gain, process.time_constant, process.dead_time
+    Td = 0.0
     if tuning.simc is not None:
         reach = (tuning.simc.tau_c or L) + L
-        if T is None:
-            return Pid(Kp=1.0 / (K * reach), Ti=4.0 * reach, sample=tuning.sample)
-        return Pid(Kp=T / (K * reach), Ti=min(T, 4.0 * reach), sample=tuning.sample)
-    assert tuning.amigo is not None
-    if tuning.amigo.type == "pi":
-        if T is None:
-            return Pid(Kp=0.35 / (K * L), Ti=13.4 * L, sample=tuning.sample)
-        gain = (0.15 + (0.35 - L * T / (L + T) ** 2) * T / L) / K
-        times = 0.35 * L + 13.0 * L * T**2 / (T**2 + 12.0 * L * T + 7.0 * L**2)
-        return Pid(Kp=gain, Ti=times, sample=tuning.sample)
-    if T is None:
-        return Pid(Kp=0.45 / (K * L), Ti=8.0 * L, Td=0.5 * L, sample=tuning.sample)
-    return Pid(
-        Kp=(0.2 + 0.45 * T / L) / K,
-        Ti=(0.4 * L + 0.8 * T) / (L + 0.1 * T) * L,
-        Td=0.5 * L * T / (0.3 * L + T),
-        sample=tuning.sample,
-    )
+        Kp, Ti = (1.0 / reach, 4.0 * reach) if T is None else (T / reach, min(T, 4.0 * reach))
+    elif tuning.amigo is not None and tuning.amigo.type == "pi":
+        Kp, Ti = 0.35 / L, 13.4 * L
+        if T is not None:
+            Kp = 0.15 + (0.35 - L * T / (L + T) ** 2) * T / L
+            Ti = 0.35 * L + 13.0 * L * T**2 / (T**2 + 12.0 * L * T + 7.0 * L**2)
+    else:
+        Kp, Ti, Td = 0.45 / L, 8.0 * L, 0.5 * L
+        if T is not None:
+            Kp, Ti = 0.2 + 0.45 * T / L, (0.4 * L + 0.8 * T) / (L + 0.1 * T) * L
+            Td = 0.5 * L * T / (0.3 * L + T)
+    return Pid(Kp=Kp / K, Ti=Ti, Td=Td, sample=tuning.sample)
 
 
 def process_of(spec: Spec) -> Process:
@@ -133,7 +128,12 @@ def process_of(spec: Spec) -> Process:
         SpecError: `not-supported`.
     """
     plant = spec.plant
-    refuse = _refusal(spec)
+
+    def refuse(why: str) -> SpecError:
+        message = f"{why}, and the rules of tuning are for a gain, one or two lags and a dead time"
+        hint = "tune it yourself: accuracy.loop.controller: {pid: {Kp: .., Ti: ..}}"
+        return spec.complain("not-supported", message, hint=hint, key="accuracy.loop.tuning")
+
     if plant.kind != "continuous" or not plant.sampled:
         raise refuse("the plant is not written in s with sample: zoh")
     if (plant.inputs, plant.outputs) != (1, 1):
@@ -157,12 +157,3 @@ def process_of(spec: Spec) -> Process:
         dead_time += 0.5 * lags[0]
         kept = None if kept is None else kept + 0.5 * lags[0]
     return Process(gain, kept, dead_time)
-
-
-def _refusal(spec: Spec) -> Callable[[str], Exception]:
-    def refuse(why: str) -> Exception:
-        message = f"{why}, and the rules of tuning are for a gain, one or two lags and a dead time"
-        hint = "tune it yourself: accuracy.loop.controller: {pid: {Kp: .., Ti: ..}}"
-        return spec.complain("not-supported", message, hint=hint, key=_KEY)
-
-    return refuse

@@ -26,11 +26,7 @@ _GENEROUS = 10  # hard plants take this many times as long as the first rounds
 
 
 def check_model(spec: Spec, model: Model) -> None:
-    """Refuse models whose gradients do not fit into memory.
-
-    Raises:
-        SpecError: `too-large`.
-    """
+    """Refuse models whose gradients do not fit into memory. It raises `SpecError` (`too-large`)."""
     channels = model.outputs * model.inputs
     room = _MOST_BYTES // (16 * _NODES * channels)
     if len(model.names) > room:
@@ -92,12 +88,9 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
     if seconds(size) > limit:
         fits = max(k for k in range(size) if seconds(k) <= limit)
         need = f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more"
-        more = f"{_GENEROUS * seconds(size):.2g}"
-        hint = (
-            f"{fits} parameters fit: lower the orders, or write solver.time_limit: {float(more):.0f} or more"
-        )
-        message = f"{need}; solver.time_limit is {limit:g}"
-        raise spec.complain("too-large", message, hint=hint, key="plant")
+        longer = f"solver.time_limit: {float(f'{_GENEROUS * seconds(size):.2g}'):.0f} or more"
+        hint = f"{fits} parameters fit: lower the orders, or write {longer}"
+        raise spec.complain("too-large", f"{need}; solver.time_limit is {limit:g}", hint=hint, key="plant")
 
 
 def check_record(spec: Spec, parameters: int) -> None:

@@ -8,14 +8,14 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array, ComplexArray
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
-from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.signal_settings import stated_moves, stated_peaks
 from inputdesign_cli.questions.building.tables import bad_table, read_frequency_table
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.limits import Curve, PowerLimit as PowerBounds
+from inputdesign_cli.specification.models.limits import Curve
 
 _KEY = "limits.spectrum"
 
@@ -23,14 +23,10 @@ _KEY = "limits.spectrum"
 def build_power_limits(spec: Spec) -> list[PowerLimit]:
     """Return the upper and lower limits on the powers, without lower limits of zero."""
     limits = spec.limits
-    stated: tuple[tuple[PowerKind, PowerBounds | None], ...] = (
-        ("input", limits.input_power),
-        ("output", limits.output_power),
-        ("excitation", limits.excitation_power),
-    )
+    stated = (limits.input_power, limits.output_power, limits.excitation_power)
     return [
         PowerLimit(kind, float(v), upper, None if np.size(value) == 1 else channel)
-        for kind, bounds in stated
+        for kind, bounds in zip(POWER_KINDS, stated, strict=True)
         if bounds is not None
         for value, upper in ((bounds.max, True), (bounds.min, False))
         if value is not None

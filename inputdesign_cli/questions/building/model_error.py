@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import scipy
 
@@ -23,8 +26,8 @@ from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
-from inputdesign_cli.plant import Model, Rational, ScalarTransfer
+from inputdesign_cli.outcome.shares import rounded_down, rounded_up
+from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.questions.building.controllers import loop_controller
 from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.questions.building.system import build_loop
@@ -32,7 +35,6 @@ from inputdesign_cli.questions.building.tables import bad_table, has_column, rea
 from inputdesign_cli.questions.building.weights import build_weight, check_finite, on_the_limit, rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
-from inputdesign_cli.specification.models.controller import Controller
 
 _KEY = "accuracy.model_error"
 _LOOP = "accuracy.loop"
@@ -55,11 +57,8 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 def build_calibration(spec: Spec) -> Calibration | None:
     """Return how alpha is calibrated for `confidence: {exact: ..}`; None without it."""
-    error = spec.accuracy.error
-    stated = None if error is None else error.calibrated
-    if stated is None or stated.exact is None:
-        return None
-    return Calibration(stated.exact, stated.draws)
+    stated = None if (error := spec.accuracy.error) is None else error.calibrated
+    return None if stated is None or stated.exact is None else Calibration(stated.exact, stated.draws)
 
 
 def required_band(
@@ -114,47 +113,33 @@ def _on_entry(
     entry: Entry | None,
     nominal: Model | None,
 ) -> OnModelError:
-    admissible = _admissible_of(spec, error, experiment.model, band, entry, nominal)
+    units, admissible = build_units(spec), _admissible_of(spec, error, experiment.model, band, entry, nominal)
     if error.weight is not None:
         key = f"{_KEY}.weight"
         weight = build_weight(spec, error.weight, key)
         check_finite(spec, weight, band, "admissible-not-positive", key)
-        if error.region == "ellipsoid":
-            _check_nowhere_void(spec, weight, band, key)
+        void = on_the_limit(weight.zero_points, band)
+        if error.region == "ellipsoid" and void is not None:  # ellipsoids are compared with r_adm
+            message = f"{key} vanishes at {units.named(void)}, where region: ellipsoid has nothing to bound"
+            hint = "leave that frequency out of the band, or use region: first_order"
+            raise spec.complain("not-supported", message, hint=hint, key=key)
         admissible = Weighted(admissible, weight)
-    alpha = model_error_alpha(spec, experiment.model)
-    made: OnModelError
-    if error.region == "first_order":
-        made = ModelError(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
-    else:
+    bound: Callable[..., OnModelError] = ModelError
+    if error.region == "ellipsoid":
         _check_fraction(spec, experiment.model, entry)
-        made = EllipsoidError(
-            experiment=experiment,
-            band=band,
-            entry=entry,
-            admissible=admissible,
-            alpha=alpha,
-            against="absolute" if error.relative is None else "relative",
-        )
+        bound = partial(EllipsoidError, against="absolute" if error.relative is None else "relative")
+    alpha = model_error_alpha(spec, experiment.model)
+    made = bound(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
     if nominal is None:
         check_bounded(spec, made, _KEY if spec.accuracy.loop is None else _LOOP)
-    if nominal is None or not _has_floor(spec):
-        units = build_units(spec)
+    stated = spec.uncertainty
+    # Scenarios have a positive r_adm since the nominal plant has one.
+    if nominal is None or stated is None or (stated.r_adm != "fixed" and stated.floor == 0.0):
         try:
             check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
         except SpecError as missed:
             raise _too_much(spec, admissible, made) or missed from missed
     return made
-
-
-def _check_nowhere_void(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], key: str) -> None:
-    """Raise `SpecError` (`not-supported`) if a weight vanishes: ellipsoids are compared with r_adm."""
-    void, units = on_the_limit(weight.zero_points, band), build_units(spec)
-    if void is not None:
-        where = f"{void / units.frequency:.6g} {units.per_time}"
-        message = f"{key} vanishes at {where}, where region: ellipsoid has nothing to bound"
-        hint = "leave that frequency out of the band, move the zero off it, or use region: first_order"
-        raise spec.complain("not-supported", message, hint=hint, key=key)
 
 
 def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
@@ -172,12 +157,6 @@ def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> Sp
     )
 
 
-def _has_floor(spec: Spec) -> bool:
-    """Whether r_adm of scenarios is positive since r_adm of the nominal plant is."""
-    stated = spec.uncertainty
-    return stated is not None and (stated.r_adm == "fixed" or stated.floor > 0.0)
-
-
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
     """Raise `SpecError` (`unbounded-error`) if no information is enough for the requirement.
 
@@ -191,19 +170,14 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
         far, close = np.abs(requirement.rows(at + side * np.array([1e-5, 1e-6]) * hi)).max(axis=(1, 2))
         # A weight may hide the pole.
         if not np.isfinite(close) or close > _GROWS * far:
-            where = f"{at / units.frequency:.6g} {units.per_time}"
-            cause = f"G has a pole on the unit circle, at {where}, that is estimated"
+            cause = f"G has a pole on the unit circle, at {units.named(at)}, that is estimated"
             message = f"{cause}: no experiment bounds the error there"
-            hint = f"leave that frequency out: {key}.band: [{_beside(at, lo, hi, units.frequency)}]"
+            # The larger part of the band on one side of the pole.
+            margin, right = 1e-2 * (hi - lo), hi - at >= at - lo
+            low, high = (at + margin, hi) if right else (lo, at - margin)
+            rest = f"{rounded_up(low / units.frequency, 4)}, {rounded_down(high / units.frequency, 4)}"
+            hint = f"leave that frequency out: {key}.band: [{rest}]"
             raise spec.complain("unbounded-error", message, hint=hint, key=key)
-
-
-def _beside(at: float, lo: float, hi: float, unit: float) -> str:
-    """The larger part of the band on one side of a frequency, in the user's unit."""
-    margin = 1e-2 * (hi - lo)
-    left, right = (lo, at - margin), (at + margin, hi)
-    edges = right if right[1] - right[0] >= left[1] - left[0] else left
-    return f"{rounded_up(edges[0] / unit, 4)}, {rounded_down(edges[1] / unit, 4)}"
 
 
 def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
@@ -302,13 +276,7 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float
         check_finite(spec, weight, band, "admissible-not-positive", key)
         return Sensitivity(loop, weight)
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
-    return Sensitivity(loop, Rational.build([peak]), None if kept is None else _settings(given))
-
-
-def _settings(controller: Controller) -> dict[str, float] | None:
-    """The settings of a PID controller; empty for other controllers."""
-    if controller.kind != "pid":
-        return {}
-    stated = controller.pid
-    listed = {"Kp": stated.Kp, "Ti": stated.Ti, "Td": stated.Td or None}
-    return {name: value for name, value in listed.items() if value is not None}
+    settings: dict[str, float] = {}
+    if given.kind == "pid":
+        settings = {key: float(v) for key in ("Kp", "Ti", "Td") if (v := getattr(given.pid, key))}
+    return Sensitivity(loop, Rational.build([peak]), None if kept is None else settings)

@@ -93,16 +93,15 @@ def _of_named(
 
 def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> Expression:
     """A coefficient of the model as an expression in the named parameters of the plant."""
-    i, j = parameter.places[0]
+    letter, (i, j) = parameter.letter, parameter.places[0]
     if plant.kind == "state_space":
-        return plant.term(parameter.letter, i, j)
+        return plant.term(letter, i, j)
     if plant.kind == "polynomial":
-        return plant.coefficients(parameter.letter, i, j)[parameter.power]
-    terms = plant.terms
-    if parameter.letter == DELAY:
-        return terms.delay[i][j]
-    below = terms.denominator[i][j]
-    entry = terms.numerator[i][j] if parameter.letter == "b" else below
+        return plant.coefficients(letter, i, j)[parameter.power]
+    if letter == DELAY:
+        return plant.terms.delay[i][j]
+    below = plant.terms.denominator[i][j]
+    entry = plant.terms.numerator[i][j] if letter == "b" else below
     return entry[-1 - parameter.power] / below[0]
 
 

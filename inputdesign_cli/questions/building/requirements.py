@@ -53,15 +53,15 @@ def build_requirements(
             cannot be met or is not supported.
         DataError: a table cannot be used.
     """
-
-    def made(key: str) -> list[RequirementFactory]:
-        if key in ("model_error", "loop") and nominal is not None:
-            return [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
-        if key in added("requirements"):
-            return cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
-        return BUILDERS[key](spec, experiment)
-
-    return [make for key in spec.accuracy.requirements for make in made(key)]
+    found: list[RequirementFactory] = []
+    for key in spec.accuracy.requirements:
+        if key in ("model_error", "loop"):
+            found += [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
+        elif key in added("requirements"):
+            found += cast(AddedRequirement, spec.accuracy.at(key)).build(spec, experiment)
+        else:
+            found += _BUILDERS[key](spec, experiment)
+    return found
 
 
 def build_criterion(spec: Spec, experiment: Experiment) -> Callable[[Experiment], Criterion] | None:
@@ -107,38 +107,31 @@ def stated_bounds(spec: Spec) -> list[StatedBound]:
 
     There are none for a bound over the whole confidence ellipsoid: its error is not in proportion.
     """
-    accuracy, found = spec.accuracy, list[StatedBound]()
-    error, variance = accuracy.error, accuracy.weighted_variance
-    if error is not None and error.region == "ellipsoid":
+    accuracy = spec.accuracy
+    if accuracy.error is not None and accuracy.error.region == "ellipsoid":
         return []
-    key = "accuracy.model_error"
-    if error is not None and error.relative is not None:
-        found.append(StatedBound(f"{key}.relative", "relative", error.relative, fraction=True))
-    if error is not None and error.absolute is not None:
-        found.append(StatedBound(f"{key}.absolute", "absolute", error.absolute))
-    if accuracy.application is not None:
-        key, gamma = "accuracy.application.gamma", accuracy.application.gamma
-        found.append(StatedBound(key, "gamma", gamma, power=-2))
-    if variance is not None:
-        key = "accuracy.weighted_variance.max"
-        found.append(StatedBound(key, "weighted_variance", variance.max, power=2))
-    key = "accuracy.standard_deviation"
-    found += [
-        StatedBound(f"{key}.{name}", f"standard_deviation of {name}", most)
+    rows = [
+        ("model_error.relative", "relative", 1),
+        ("model_error.absolute", "absolute", 1),
+        ("application.gamma", "gamma", -2),
+        ("weighted_variance.max", "weighted_variance", 2),
+    ]
+    stated = [(f"accuracy.{key}", label, accuracy.at(*key.split(".")), power) for key, label, power in rows]
+    stated += [
+        (f"accuracy.standard_deviation.{name}", f"standard_deviation of {name}", most, 1)
         for name, most in (accuracy.standard_deviation or {}).items()
     ]
-    return found
-
-
-def _model_errors(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    return [_maker(error) for error in build_model_errors(spec, experiment)]
+    return [
+        StatedBound(key, label, value, power=power, fraction=label == "relative")
+        for key, label, value, power in stated
+        if isinstance(value, float)
+    ]
 
 
 def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
     stated = spec.accuracy.information
     assert stated is not None
-    names = experiment.model.names
-    return [_target(spec, names, stated.matrix, stated.parameters, "accuracy.information", "information")]
+    return [_target(spec, experiment, stated.matrix, stated.parameters, "accuracy.information")]
 
 
 def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
@@ -147,14 +140,12 @@ def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]
     assert asked is not None
     chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
     hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
-    names = experiment.model.names
-    return [_target(spec, names, hessian, asked.parameters, "accuracy.application", "application")]
+    return [_target(spec, experiment, hessian, asked.parameters, "accuracy.application")]
 
 
 def _standard_deviations(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    key, names = "accuracy.standard_deviation", experiment.model.names
     return [
-        _target(spec, names, np.array([[1.0 / most**2]]), (name,), key, f"standard_deviation of {name}")
+        _target(spec, experiment, [[1.0 / most**2]], (name,), "accuracy.standard_deviation", f" of {name}")
         for name, most in (spec.accuracy.standard_deviation or {}).items()
     ]
 
@@ -164,9 +155,10 @@ def _maker(requirement: OverFrequency) -> RequirementFactory:
 
 
 def _target(
-    spec: Spec, known: Sequence[str], matrix: ArrayLike, names: Sequence[str] | None, key: str, label: str
+    spec: Spec, raw: Experiment, matrix: ArrayLike, names: Sequence[str] | None, key: str, of: str = ""
 ) -> RequirementFactory:
-    full = embedded(spec, known, np.array(matrix, dtype=float), names, key)
+    full = embedded(spec, raw.model.names, np.array(matrix, dtype=float), names, key)
+    label = key.removeprefix("accuracy.") + of
     return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
 
 
@@ -189,23 +181,19 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
 
 def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
     """Raise `SpecError` (`admissible-not-positive`) if G vanishes: its relative variance is infinite."""
-    grid, units = variance.grid, build_units(spec)
-    size = variance.nominal_size(grid)
+    units, size = build_units(spec), variance.nominal_size(variance.grid)
     if size.min() <= _RELATIVE_ZERO * np.median(size):
-        at = grid[int(np.argmin(size))] / units.frequency
+        at = units.named(variance.grid[int(np.argmin(size))])
         named = f"entry {units.entry(*variance.entry)} of G" if variance.entry and not units.single else "G"
-        message = f"{named} vanishes at {at:.6g} {units.per_time}: its relative variance is infinite there"
+        message = f"{named} vanishes at {at}: its relative variance is infinite there"
         hint, key = "restrict `band` to the frequencies that matter", "accuracy.weighted_variance"
         raise spec.complain("admissible-not-positive", message, hint=hint, key=key)
 
 
-BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
-    "model_error": _model_errors,
-    "loop": _model_errors,
+_BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "information": _information,
     "application": _application,
     "weighted_variance": _weighted_variances,
     "standard_deviation": _standard_deviations,
     "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
 }
-"""The builder of each key of `accuracy`."""

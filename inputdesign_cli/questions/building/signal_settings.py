@@ -87,7 +87,7 @@ def build_signal_settings(spec: Spec, method: str | None = None) -> SignalSettin
         hold=signal.hold or 1,
         ramp=signal.ramp or 0,
         bits=signal.bits,
-        level=None if signal.amplitudes is None else per_channel(signal.amplitudes, inputs),
+        level=per_channel(signal.amplitudes, inputs),
         candidates=signal.candidates or candidates,
         most_candidates=signal.candidates or most,
         seed=signal.seed or 0,
@@ -99,11 +99,7 @@ def stated_peaks(spec: Spec) -> tuple[Array | None, Array | None]:
     amplitude = spec.limits.amplitude
     if amplitude is None:
         return None, None
-    u, y = amplitude.input, amplitude.output
-    return (
-        None if u is None else per_channel(u, spec.plant.inputs),
-        None if y is None else per_channel(y, spec.plant.outputs),
-    )
+    return per_channel(amplitude.input, spec.plant.inputs), per_channel(amplitude.output, spec.plant.outputs)
 
 
 def stated_moves(spec: Spec) -> Array | None:
@@ -111,9 +107,9 @@ def stated_moves(spec: Spec) -> Array | None:
 
     It is infinite if the limit on |u| is tighter: moves between -a and a are 2 a at most.
     """
-    if spec.limits.rate is None:
-        return None
     rate, (peak, _) = per_channel(spec.limits.rate, spec.plant.inputs), stated_peaks(spec)
+    if rate is None:
+        return None
     tighter = np.ones(rate.size, dtype=bool) if peak is None else rate < 2.0 * peak
     return np.where(tighter, rate / np.sqrt(spec.signal.hold or 1), np.inf)
 
@@ -124,39 +120,30 @@ def build_bounds(spec: Spec) -> Bounds:
     Samples count from a value of the converter. If the offset lies between two values, the peak is reduced by
     the difference.
     """
-    rate, inputs, quantisers = spec.limits.rate, spec.plant.inputs, _quantisers(spec)
     amplitude, output = stated_peaks(spec)
-    if amplitude is not None and quantisers:
-        amplitude = amplitude - np.abs(
-            per_channel(spec.signal.offset or 0.0, inputs) - operating_points(spec)
-        )
-    return Bounds(
-        amplitude=amplitude,
-        rate=None if rate is None else per_channel(rate, inputs),
-        output=output,
-        quantisers=quantisers,
-    )
+    if amplitude is not None:
+        amplitude = amplitude - np.abs(_offsets(spec) - operating_points(spec))
+    rate = per_channel(spec.limits.rate, spec.plant.inputs)
+    return Bounds(amplitude=amplitude, rate=rate, output=output, quantisers=_quantisers(spec))
+
+
+def _offsets(spec: Spec) -> Array:
+    return np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), spec.plant.inputs)
 
 
 def _quantisers(spec: Spec) -> tuple[Quantiser, ...]:
     """The converter of each input; all have the same number of bits."""
-    stated, inputs = spec.signal.quantisation, spec.plant.inputs
+    stated = spec.signal.quantisation
     if stated is None:
         return ()
-    spans = per_channel(stated.range, inputs)
-    offsets = per_channel(spec.signal.offset or 0.0, inputs)
-    return tuple(
-        Quantiser(stated.bits, float(span), float(offset))
-        for span, offset in zip(spans, offsets, strict=True)
-    )
+    each = np.broadcast(stated.range, _offsets(spec))
+    return tuple(Quantiser(stated.bits, float(span), float(offset)) for span, offset in each)
 
 
 def operating_points(spec: Spec) -> Array:
     """Return the offset (r,) of each input, or the nearest value of its converter."""
     quantisers = _quantisers(spec)
-    if quantisers:
-        return np.array([quantiser.operating_point for quantiser in quantisers])
-    return per_channel(spec.signal.offset or 0.0, spec.plant.inputs)
+    return np.array([one.operating_point for one in quantisers]) if quantisers else _offsets(spec)
 
 
 def deviations(spec: Spec, table: Table) -> Array:
@@ -175,11 +162,8 @@ def sampling_rate(spec: Spec) -> float:
 def _method(spec: Spec) -> str:
     """The type of signal: stated, or the one that other keys belong to."""
     signal = spec.signal
-    if signal.type is not None:
-        return signal.type
-    if signal.stated("phases", "lines"):
-        return "multisine"
-    return "prbs" if signal.bits is not None else _usual_method(spec)
+    implied = "multisine" if signal.stated("phases", "lines") else "prbs" if signal.bits is not None else ""
+    return signal.type or implied or _usual_method(spec)
 
 
 def _usual_method(spec: Spec) -> str:
@@ -208,9 +192,9 @@ def _ramps_needed(spec: Spec) -> bool:
     return moves is not None and not spec.closed_loop and peak is not None and bool(np.isfinite(moves).any())
 
 
-def per_channel(value: float | tuple[float, ...], channels: int) -> Array:
-    """Return a value (channels,) for each channel; a single number holds for all."""
-    return np.broadcast_to(np.asarray(value, dtype=float), channels)
+def per_channel(value: float | tuple[float, ...] | None, channels: int) -> Array | None:
+    """Return a value (channels,) for each channel; a single number holds for all, None for none."""
+    return None if value is None else np.broadcast_to(np.asarray(value, dtype=float), channels)
 
 
 _STEPS_ROUNDING = 1e-12
@@ -243,14 +227,17 @@ def _length_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
     least, period = least_period(spec.plant.inputs), samples // block
     if samples % block:
         nearest = " or ".join(str(n) for n in (samples - samples % block, block * (period + 1)) if n)
-        parts = f"{settings.periods} equal periods" if settings.periods > 1 else "a whole number"
-        held = f" of values held for {settings.hold} samples" if settings.hold > 1 else ""
         hint = f"write signal.samples: {nearest}, or another number of periods"
-        yield "conflicting-keys", key, f"{samples} samples do not make {parts}{held}", hint
+        message = f"{samples} samples are no multiple of {block}: periods times samples of a hold"
+        yield "conflicting-keys", key, message, hint
     elif block > 1 and period < least:
-        has = f"{period} {'value' if period == 1 else 'values'}"
         hint = "ask for more samples, fewer periods or a shorter hold"
-        yield "conflicting-keys", key, f"one period has {has}, and needs at least {least}", hint
+        yield (
+            "conflicting-keys",
+            key,
+            f"the values of a period are {period}, and must be {least} or more",
+            hint,
+        )
     if 2 * ramp > samples:
         message = f"ramp is {ramp}, but the signal has {samples} samples to fade in and out"
         yield "out-of-range", "signal.ramp", message, f"write at most {samples // 2}"
@@ -291,26 +278,22 @@ def _kind_faults(spec: Spec, settings: SignalSettings) -> Iterator[Fault]:
 
 def _level_faults(spec: Spec, channel: int) -> Iterator[Fault]:
     """Level, limits and converter of an input fit each other; in a loop, limits are not of the signal."""
-    bounds, stated, inputs = build_bounds(spec), spec.signal.amplitudes, spec.plant.inputs
+    bounds, inputs = build_bounds(spec), spec.plant.inputs
     limits = {
         key: float(bound[channel])
         for key, bound in (("limits.amplitude", bounds.amplitude), ("limits.rate", bounds.rate))
         if bound is not None and not spec.closed_loop
     }
-    most, level = (
-        limits.get("limits.amplitude"),
-        None if stated is None else per_channel(stated, inputs)[channel],
-    )
-    if level is not None and most is not None and level > most:
+    most, levels = limits.get("limits.amplitude", np.inf), per_channel(spec.signal.amplitudes, inputs)
+    if levels is not None and levels[channel] > most:
         of = f" of input {channel + 1}" if inputs > 1 else ""
         hint = "lower it, or remove it: the tool finds the level that the accuracy needs"
-        message = f"amplitudes is {level:g}, above limits.amplitude {most:g}{of}"
+        message = f"amplitudes is {levels[channel]:g}, above limits.amplitude {most:g}{of}"
         yield "conflicting-keys", "signal.amplitudes", message, hint
     for quantiser in bounds.quantisers[channel : channel + 1]:
         step, span = quantiser.step, quantiser.span
         if quantiser.reach() < step:
-            reach = f"its values reach from {-span:g} to {span - step:g}"
-            message = f"the offset {quantiser.offset:g} leaves the converter no room: {reach}"
+            message = f"the offset {quantiser.offset:g} leaves no room in [{-span:g}, {span - step:g}]"
             hint = "move the offset, or widen quantisation.range"
             yield "coarse-converter", "signal.offset", message, hint
         for key, bound in limits.items():

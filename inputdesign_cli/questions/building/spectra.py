@@ -191,11 +191,7 @@ def _read(spec: Spec, name: str, symbol: str, r: int, *, least: int) -> tuple[Ar
 
 
 def _below_nyquist(spec: Spec, name: str, frequency: Array) -> Array:
-    """The frequencies; the last may lie beyond pi by rounding.
-
-    Raises:
-        DataError: `bad-table`.
-    """
+    """The frequencies; the last may lie beyond pi by rounding. It raises `DataError` (`bad-table`)."""
     if not spec.plant.sampled:
         return frequency
     if frequency[-1] > np.pi * (1 + 1e-4):

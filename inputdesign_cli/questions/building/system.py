@@ -9,7 +9,7 @@ import numpy as np
 
 from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import Weight
-from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
     Coloured,
     ContinuousModel,
@@ -32,9 +32,9 @@ from inputdesign_cli.questions.building.parameters import degrees_of, delays_of,
 from inputdesign_cli.questions.building.prior import PRIOR, stated_prior
 from inputdesign_cli.questions.building.tables import read_frequency_table, read_samples
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import depth
+from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
@@ -57,47 +57,31 @@ def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> 
             `conflicting-keys` for K together with coloured noise.
     """
     stated = plant.state_space
-    n, r, p = len(stated.A), plant.inputs, plant.outputs
-    given = {
-        "A": np.array(stated.A),
-        "B": np.array(stated.B),
-        "C": np.array(stated.C),
-        "D": np.zeros((p, r)) if stated.D is None else np.array(stated.D),
-        "K": np.zeros((n, p)) if stated.K is None else np.array(stated.K),
-    }
-    written = [(letter, given[letter].shape) for letter in stated.stated(*given)]
-    places = [(letter, i, j) for letter, shape in written for i, j in np.ndindex(shape)]
+    shapes = {"D": (plant.outputs, plant.inputs), "K": (len(stated.A), plant.outputs)}
+    given = {letter: np.array(stated.at(letter), dtype=float) for letter in stated.stated(*"ABCDK")}
+    places = [(letter, *ij) for letter, matrix in given.items() for ij in np.ndindex(matrix.shape)]
     free = [place for place in (*places, (DELAY, 0, 0)) if plant.term(*place).names]
-    model = StateSpaceModel(
-        Matrices(**given, delay=stated.delay),
-        tuple(free),
-        covariance,
-        spec.sample_time if plant.sample is not None else None,
-    )
-    _check(spec, plant, model)
-    return model
-
-
-def _check(spec: Spec, plant: StateSpacePlant, model: StateSpaceModel) -> None:
-    key = "plant.state_space"
+    zeros = {letter: np.zeros(shape) for letter, shape in shapes.items()}
+    step = spec.sample_time if plant.sample is not None else None
+    model = StateSpaceModel(Matrices(**zeros | given, delay=stated.delay), tuple(free), covariance, step)
     coloured = any(spec.noise.drifts) or any(len(np.ravel(x)) > 1 for x in (spec.noise.C, spec.noise.D))
-    if plant.state_space.K is not None and coloured:
+    if "K" in given and coloured:
         message = "K says how the noise is coloured, and noise does so, too"
         hint = "remove K, or C, D and drift"
-        raise spec.complain("conflicting-keys", message, hint=hint, key=f"{key}.K")
+        raise spec.complain("conflicting-keys", message, hint=hint, key="plant.state_space.K")
     away = np.abs(model.predictor_poles[:, None] - model.poles).min(axis=1, initial=np.inf)
     own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # the poles that K makes
-    worst = float(np.max(np.abs(model.predictor_poles), initial=0.0))
-    if worst > 1.0 + _ROUNDING or np.any(np.abs(own) > 1.0 - _ROUNDING):
-        what = "A - K C" if plant.state_space.K is not None else "A"
-        message = f"the predictor is unstable: {what}, sampled, has an eigenvalue of radius {worst:.6g}"
-        hint = "check the signs of A; an unstable plant needs a gain K with which A - K C is stable"
-        raise spec.complain("unstable-polynomial", message, hint=hint, key=f"{key}.A")
-    worst = float(np.max(np.abs(model.poles), initial=0.0))
-    if worst > 1.0 + _ROUNDING and not spec.closed_loop:
-        message = f"the plant is unstable: A, sampled, has an eigenvalue of radius {worst:.6g}"
-        hint = "check the signs of A; an unstable plant needs a loop: add experiment.controller"
-        raise spec.complain("unstable-polynomial", message, hint=hint, key=f"{key}.A")
+    gained = np.any(np.abs(own) > 1.0 - _ROUNDING)
+    for what, poles, wrong, hint in (
+        ("predictor", model.predictor_poles, gained, "it needs a gain K with which A - K C is stable"),
+        ("plant", model.poles, False, "an unstable plant needs a loop: add experiment.controller"),
+    ):
+        worst = float(np.max(np.abs(poles), initial=0.0))
+        if wrong or (worst > 1.0 + _ROUNDING and not (what == "plant" and spec.closed_loop)):
+            message = f"the {what} is unstable: sampled, it has an eigenvalue of radius {worst:.6g}"
+            hint = f"check the signs of A; {hint}"
+            raise spec.complain("unstable-polynomial", message, hint=hint, key="plant.state_space.A")
+    return model
 
 
 # The share of pi/sample_time at which a proposed band ends.
@@ -115,15 +99,18 @@ def build_model(spec: Spec) -> Model:
     C, D = per_output(noise.C), per_output(noise.D)
     match spec.plant:
         case PolynomialPlant() as plant:
-            one, pairs = np.ones(1), tuple(zip(D, noise.held, strict=True))
-            inside = polynomial_model(plant, noise, covariance, [one if held else d for d, held in pairs])
-            outside = [d if held else one for d, held in pairs]
-            return reparametrised(spec, plant, _coloured(inside, noise, [one], outside))
+            one = np.ones(1)
+            inside, outside = (
+                [one if held is out else d for d, held in zip(D, noise.held, strict=True)]
+                for out in (True, False)
+            )
+            model: Listed = polynomial_model(plant, noise, covariance, inside)
+            C, D = (one,), tuple(outside)
         case ContinuousPlant() as plant:
             matrix = plant.continuous
             continuous = ContinuousModel.monic(
-                _reversed(matrix.numerator_matrix),
-                _reversed(matrix.denominator_matrix),
+                _arrays(matrix.numerator_matrix, -1),
+                _arrays(matrix.denominator_matrix, -1),
                 covariance,
                 common=matrix.common,
                 delay=delays_of(plant),
@@ -131,20 +118,15 @@ def build_model(spec: Spec) -> Model:
                 degrees=degrees_of(plant),
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
-            return reparametrised(spec, plant, _coloured(model, noise, C, D))
         case StateSpacePlant() as plant:
-            states = state_space_model(spec, plant, covariance)
-            return reparametrised(spec, plant, _coloured(states, noise, C, D))
-    message = "a regression has no dynamics to be estimated here"
-    hint = "ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1"
-    raise spec.complain("not-supported", message, hint=hint, key="plant")
-
-
-def _coloured(model: Listed, noise: NoiseShape, C: Sequence[Array], D: Sequence[Array]) -> Listed:
-    """The model with C, D and the drift of the noise; the model itself if there are none."""
-    if not any(noise.drifts) and all(len(p) == 1 for p in (*C, *D)):
-        return model
-    return Coloured(model, tuple(C), tuple(D), noise.held, noise.drifts)
+            model = state_space_model(spec, plant, covariance)
+        case _:
+            message = "a regression has no dynamics to be estimated here"
+            hint = "ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1"
+            raise spec.complain("not-supported", message, hint=hint, key="plant")
+    if any(noise.drifts) or any(len(p) > 1 for p in (*C, *D)):
+        model = Coloured(model, C, D, noise.held, noise.drifts)
+    return reparametrised(spec, plant, model)
 
 
 def polynomial_model(
@@ -202,11 +184,7 @@ def build_experiment(spec: Spec) -> Experiment:
 
 
 def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
-    """Return the loop of a sampled model.
-
-    Raises:
-        SpecError: the loop is unstable or algebraic.
-    """
+    """Return the loop of a sampled model. It raises `SpecError`: the loop is unstable or algebraic."""
     C = controller_matrix(controller, spec.sample_time, (model.inputs, model.outputs))
     loop = close_loop(model, C)
     loop.check_stability()
@@ -225,14 +203,12 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
         lo, hi = spec.clip_band(band)
         return lo * spec.sample_time, min(hi * spec.sample_time, np.pi)
     if band is None or not np.isfinite(band[1]):
+        message = "in continuous time frequencies have no end: the band of the excitation is missing"
         limit = f"limits: {{band: [0, {0.5 * np.pi / spec.sample_time:.3g}]}}"
-        raise spec.complain(
-            "needs-band",
-            "in continuous time frequencies have no end: the band of the excitation is missing",
-            hint="add sample: zoh to the plant, whose input is then held for each sample_time; or, to stay "
-            f"in continuous time, {limit}, or a polynomial spectrum with its band",
-            key="spectrum" if spec.spectrum is not None else "limits",
-        )
+        stay = f"to stay in continuous time, {limit}, or a polynomial spectrum with its band"
+        hint = f"add sample: zoh to the plant, whose input is then held for each sample_time; or, {stay}"
+        key = "spectrum" if spec.spectrum is not None else "limits"
+        raise spec.complain("needs-band", message, hint=hint, key=key)
     return band
 
 
@@ -262,12 +238,8 @@ def _around(frequencies: Sequence[float]) -> tuple[float, float] | None:
 
 def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
     """Return the weights of the powers: of the sum over the channels, or one per channel."""
-    weights: dict[PowerKind, Weight] = {
-        "input": spec.cost.input_power,
-        "output": spec.cost.output_power,
-        "excitation": spec.cost.excitation_power,
-    }
-    return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
+    stated = (spec.cost.input_power, spec.cost.output_power, spec.cost.excitation_power)
+    return {kind: w for kind, w in zip(POWER_KINDS, stated, strict=True) if np.any(np.asarray(w) > 0)}
 
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
@@ -321,24 +293,17 @@ def record_step(spec: Spec) -> float:
         return 1.0
     _, hi = excitation_band(spec)
     if hi * spec.sample_time > np.pi * (1 + 1e-9):
-        raise spec.complain(
-            "beyond-nyquist",
-            f"samples {spec.sample_time:g} {spec.time_unit} apart cannot carry the band up to {hi:g} "
-            f"rad/{spec.time_unit}",
-            hint="if the input is held between samples, add sample: zoh to the plant and end the band at "
-            f"{_WITHIN * np.pi / spec.sample_time:.3g}; otherwise set sample_time to {0.5 * np.pi / hi:.3g} "
-            f"or less (at most {np.pi / hi:.3g})",
-            key="sample_time",
-        )
+        apart = f"samples {spec.sample_time:g} {spec.time_unit} apart"
+        message = f"{apart} cannot carry the band up to {hi:g} rad/{spec.time_unit}"
+        held = "if the input is held between samples, add sample: zoh to the plant and end the band at"
+        other = f"otherwise set sample_time to {0.5 * np.pi / hi:.3g} or less (at most {np.pi / hi:.3g})"
+        hint = f"{held} {_WITHIN * np.pi / spec.sample_time:.3g}; {other}"
+        raise spec.complain("beyond-nyquist", message, hint=hint, key="sample_time")
     return spec.sample_time
 
 
-def _arrays(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:
-    return tuple(tuple(np.array(entry, dtype=float) for entry in row) for row in rows)
-
-
-def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:
-    return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
+def _arrays(rows: Sequence[Sequence[Sequence[float]]], step: int = 1) -> tuple[tuple[Array, ...], ...]:
+    return tuple(tuple(np.array(entry, dtype=float)[::step] for entry in row) for row in rows)
 
 
 def per_output(value: tuple) -> tuple[Array, ...]:

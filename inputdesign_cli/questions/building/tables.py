@@ -13,7 +13,6 @@ from inputdesign_cli.questions.building.header import build_units
 from inputdesign_cli.records import read_sheet
 from inputdesign_cli.records.columns import columns_of
 from inputdesign_cli.records.signals import check_range
-from inputdesign_cli.records.text import BLANK, COMMENT
 from inputdesign_cli.specification import Spec
 
 _LARGEST = 1e40  # as of other numbers in a spec
@@ -48,12 +47,10 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
             `beyond-precision`.
     """
     sheet = read_sheet(path, key=key)
-    for line, kind in sheet.passed:
-        if kind != COMMENT:
-            what = "is blank" if kind == BLANK else "is commented out"
-            message = f"line {line} of {path.name} {what}: is a sample missing between the rows about it?"
-            row = int(np.searchsorted(sheet.lines, line)) - 1
-            raise sheet.error("data-not-a-number", message, "take the line out of the file", row)
+    for line in sheet.passed:
+        message = f"line {line} of {path.name} is blank or commented out: is a sample missing there?"
+        row = int(np.searchsorted(sheet.lines, line)) - 1
+        raise sheet.error("data-not-a-number", message, "take the line out of the file", row)
     found = read_columns(path, wanted, key=key)
     for role, numbers in found.items():
         check_range(sheet, wanted[role], numbers)

@@ -19,7 +19,7 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.questions.building.header import build_units
-from inputdesign_cli.questions.common.reach import Reach
+from inputdesign_cli.questions.common.infeasible import Reach
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import matrices
 
@@ -36,8 +36,8 @@ _DISTANCES = np.geomspace(1e-2, 1e-4, 9)
 _GROWS, _EARLIER = 2.5, 4
 # Lines and poles nearer to a frequency than this share of the band are on it.
 _ON = 1e-6
-# Shares of the band that are left out: around a free frequency in a hint, and at an end for the bound.
-_MARGIN, _OFF = 0.01, 1e-6
+# The share of the band that is left out at a free end for the bound.
+_OFF = 1e-6
 _OUTCOMES = {
     "cost": "with power ever nearer to it the accuracy costs as little as you like",
     "factor": "with power ever nearer to it the accuracy grows without end",
@@ -88,8 +88,13 @@ def check_reach(spec: Spec, question: Question) -> Reach:
     keys = dict.fromkeys(limit.key for limit in question.limits if limit.upper)
     uncounted = "costs nothing" if question.goal == "cost" else f"is not limited by {', '.join(keys)}"
     free = f"excitation at {places} informs about the parameters and {uncounted}"
-    others, band = _others(spec, question), _band(spec, question, found)
-    lo, hi = question.experiment.band
+    section = "cost" if question.goal == "cost" else "limits"
+    others, (lo, hi) = f"{section}.excitation_power", question.experiment.band
+    if spec.experiment.controller is None:
+        others = f"{section}.input_power"
+    elif "output" not in {kind for kind, _, _ in priced_powers(question) or []}:
+        others = f"{section}.output_power or {others}"  # at a pole in the loop only outputs have power
+    avoid = "leave it out by limits.band"
     off = 2.0 * _OFF * hi
     ends = [any(abs(w - end) < off for w in found.frequencies) for end in (lo, hi)]
     # Lines are kept off an end of the band; they close in on a frequency inside it from both sides.
@@ -98,12 +103,12 @@ def check_reach(spec: Spec, question: Question) -> Reach:
     approached = "the best is approached with power ever nearer to it"
     outcome = _OUTCOMES[question.goal] if found.unbounded else approached
     if found.reached and (found.unbounded or inside or on_it):
-        section = "cost" if question.goal == "cost" else "limits"
-        add = "give a weight, however small, to" if section == "cost" else "add"
-        avoid = f"leave it out by {band}" if question.basis.free else "choose other lines"
-        code = "no-cost" if section == "cost" else "needs-limits"
+        add, code = "add", "needs-limits"
+        if section == "cost":
+            add, code = "give a weight, however small, to", "no-cost"
         message = f"{free}: {outcome}, and no spectrum is the best"
-        raise spec.complain(code, message, hint=f"{add} {others}; or {avoid}", key=section)
+        hint = f"{add} {others}; or {avoid if question.basis.free else 'choose other lines'}"
+        raise spec.complain(code, message, hint=hint, key=section)
     if found.unbounded or inside:
         return Reach(
             bounded=False,
@@ -113,30 +118,8 @@ def check_reach(spec: Spec, question: Question) -> Reach:
     inner = (lo + ends[0] * _OFF * hi, hi - ends[1] * _OFF * hi)
     if not question.basis.free:
         return Reach(attained=False, band=inner)
-    note = f"{free}: {approached}, which no record can follow; add {others}, or leave it out by {band}"
+    note = f"{free}: {approached}, which no record can follow; add {others}, or {avoid}"
     return Reach(attained=False, band=inner, note=note)
-
-
-def _others(spec: Spec, question: Question) -> str:
-    """What else to pay for or to limit."""
-    section = "cost" if question.goal == "cost" else "limits"
-    if spec.experiment.controller is None:
-        return f"{section}.input_power"
-    priced = {kind for kind, _, _ in priced_powers(question) or []}
-    # At a pole in the loop the output has power where the input has none.
-    output = "" if "output" in priced else f"{section}.output_power or "
-    return f"{output}{section}.excitation_power"
-
-
-def _band(spec: Spec, question: Question, found: FreeInformation) -> str:
-    """The widest band that keeps off the frequencies, as its key."""
-    lo, hi = question.experiment.band
-    margin, inner = _MARGIN * hi, np.array(sorted(found.frequencies))
-    starts, ends = np.append(lo, inner + margin), np.append(inner - margin, hi)
-    widest = int(np.argmax(ends - starts))
-    unit = build_units(spec).frequency
-    start = "0" if starts[widest] == 0.0 else f"{starts[widest] / unit:.3g}"
-    return f"limits: {{band: [{start}, {ends[widest] / unit:.6g}]}}"
 
 
 @dataclass(frozen=True)

@@ -23,12 +23,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.outcome import OutcomeError, read_plain, write_plain
+from inputdesign_cli.outcome import OutcomeError, plain, read_plain
 from inputdesign_cli.outcome.campaign import Campaign
-from inputdesign_cli.outcome.locks import locked
 from inputdesign_cli.outcome.record import RESULT, SIGNAL, SPEC, load_result, unreadable
+from inputdesign_cli.outcome.replacing import locked
 from inputdesign_cli.outcome.run_directory import output_errors, read_run
-from inputdesign_cli.outcome.text_formats import plain
 from inputdesign_cli.regular_file import read_regular
 
 VERSION = 1
@@ -130,7 +129,7 @@ def digests(campaign: Campaign, files: Mapping[str, bytes]) -> dict[str, str]:
     """
     found = {name: _sha256(content) for name, content in files.items() if _READ.fullmatch(name)}
     records = {name: digest for name, digest in campaign.digests.items() if name.startswith("record")}
-    return {**found, RESULT: _decisions(write_plain(campaign)), **records}
+    return {**found, RESULT: _decisions(plain(campaign)), **records}
 
 
 def _changed(directory: Path, name: str, campaign: Campaign) -> DataError:
@@ -154,7 +153,7 @@ def _changed(directory: Path, name: str, campaign: Campaign) -> DataError:
 def _decisions(campaign: Mapping[str, object]) -> str:
     """Return the digest of all but the digests, whatever the order of the keys."""
     kept = {key: value for key, value in campaign.items() if key != _DIGESTS}
-    return _sha256(json.dumps(plain(kept), sort_keys=True).encode())
+    return _sha256(json.dumps(kept, sort_keys=True).encode())
 
 
 def _sha256(content: bytes) -> str:

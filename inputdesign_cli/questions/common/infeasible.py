@@ -1,13 +1,12 @@
-"""Why nothing meets the requirements within the limits, and what would."""
+"""Why nothing meets the requirements within the limits, or no record was found that does, and what would."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inputdesign_cli.arrays import Array
 from inputdesign_cli.compute.time_limit import OutOfTimeError, time_for_hints
 from inputdesign_cli.design.convex.demands import Asked
 from inputdesign_cli.design.convex.designs import solve_design
@@ -17,8 +16,11 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
-from inputdesign_cli.outcome.rounding import rounded_down, rounded_up
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.outcome.shares import rounded_down, rounded_up
 from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.record import RecordRequest
+from inputdesign_cli.signal.selection import Record
 from inputdesign_cli.spectrum import LinesBasis
 
 _TOLERANCE, _EXACT = 1e-5, 1e-6
@@ -29,6 +31,25 @@ _NO_SHARE = 1e-5
 # A limit takes part in the conflict when its share of the proof's weight is above this.
 _TAKES_PART = 1e-4
 _MOST_PLACES = 3
+# The cost beyond that of the design, relative to it, from which on a record has nothing to do with it.
+_HOPELESS = 1e3
+# The share of the record from which on the dead time is the reason.
+_SHARE = 0.8
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far spectra reach: whether all of them have a bound, and whether it is attained.
+
+    Where it is only approached, at ends of the `band` of all spectra, that stays off them by so little that
+    nothing is lost to the tolerance. `note` says what the reader of a result must know of it; None if
+    there is nothing to say.
+    """
+
+    bounded: bool = True
+    attained: bool = True
+    band: tuple[float, float] | None = None
+    note: str | None = None
 
 
 @dataclass(frozen=True)
@@ -95,11 +116,6 @@ class Bought:
         return f"the limits buy {buys}{worst}"
 
     @property
-    def involved(self) -> list[PowerLimit]:
-        """The limits that take part in the proof."""
-        return [limit for limit, _ in self._shares]
-
-    @property
     def details(self) -> dict[str, object]:
         """Return this as data, with frequencies in the user's unit."""
         return {
@@ -110,11 +126,19 @@ class Bought:
                 for bound in self.stated
             ],
             "worst": [self._listed(asked, w) for asked, w in self._binding],
-            "limits": [_entry(limit, share) for limit, share in self._shares],
+            "limits": [
+                {
+                    "name": limit.key.removeprefix("limits."),
+                    **({} if limit.channel is None else {"channel": limit.channel + 1}),
+                    "max" if limit.upper else "min": limit.bound,
+                    "share": share,
+                }
+                for limit, share in self.shares
+            ],
         }
 
     @property
-    def _shares(self) -> list[tuple[PowerLimit, float]]:
+    def shares(self) -> list[tuple[PowerLimit, float]]:
         """Each limit of the spec with its share of the weight of the proof."""
         listed = self.problem.limits
         weights = self.nearest.certificate.limits * np.array([limit.bound for limit in listed])
@@ -128,25 +152,23 @@ class Bought:
         """Where the requirements bind, the place of the largest multiplier first."""
         return [(self.problem.demands.asked[index], w) for index, w in self.nearest.active]
 
+    def _entry(self, asked: Asked) -> str:
+        """Return the entry of G that a requirement is about; empty of a single one."""
+        entry = asked.requirement.entry
+        return "" if entry is None or self.units.single else self.units.entry(*entry)
+
     def _place(self, place: tuple[Asked, float | None]) -> str:
-        requirement, w = place[0].requirement, place[1]
-        parts = []
-        if requirement.entry is not None and not self.units.single:
-            parts.append(f"in entry {self.units.entry(*requirement.entry)}")
-        if w is not None:
-            parts.append(f"at {self.units.named(w)}")
-        return " ".join(parts)
+        entry, w = self._entry(place[0]), place[1]
+        parts = (f"in entry {entry}" if entry else "", "" if w is None else f"at {self.units.named(w)}")
+        return " ".join(filter(None, parts))
 
     def _listed(self, asked: Asked, w: float | None) -> dict[str, object]:
-        requirement = asked.requirement
-        item: dict[str, object] = {"name": requirement.name}
-        if requirement.entry is not None and not self.units.single:
-            item["entry"] = self.units.entry(*requirement.entry)
-        if w is not None:
-            item["frequency"] = w / self.units.frequency
+        requirement, entry = asked.requirement, self._entry(asked)
         at = np.array([0.0 if w is None else w])
-        item["worst_ratio"] = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
-        return item
+        ratio = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
+        item: dict[str, object] = {"name": requirement.name, "worst_ratio": ratio}
+        item |= {"entry": entry} if entry else {}
+        return item | ({} if w is None else {"frequency": w / self.units.frequency})
 
 
 def named(limit: PowerLimit) -> str:
@@ -155,68 +177,40 @@ def named(limit: PowerLimit) -> str:
     return f"power of the moves of input{number}" if limit.kind == "moves" else f"{limit.kind}{number} power"
 
 
-def _entry(limit: PowerLimit, share: float) -> dict[str, object]:
-    entry: dict[str, object] = {"name": limit.key.removeprefix("limits.")}
-    if limit.channel is not None:
-        entry["channel"] = limit.channel + 1
-    return entry | {"max" if limit.upper else "min": limit.bound, "share": share}
-
-
 def explain(
-    units: Units,
-    question: Question,
-    unreachable: UnreachableError,
-    stated: Sequence[StatedBound],
-    samples_of_record: Callable[[int], int | None],
+    units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound]
 ) -> InfeasibleError:
-    """Say the proof that came with the failure, by the numbers of the spec that can be loosened.
-
-    Args:
-        samples_of_record: maps the samples that a spectrum takes to the length of a record, None if unknown.
-    """
+    """Say the proof that came with the failure, by the numbers of the spec that can be loosened."""
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
-    involved = bought.involved
+    involved = [limit for limit, _ in bought.shares]
     if unreachable.limits_alone:
         times = f"{nearest.certificate.bound:.4g} times as large for the lower ones to be reached"
         why = f"contradict each other: the upper ones would have to be {times}"
         return contradictory(sorted(involved, key=lambda limit: limit.upper), why)
     missed = (problem.demands.requirement(index) for index, _ in nearest.active)
     names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
-    hint = (
+    parts = [f"{names} cannot be met within the limits: {bought.sentence}"]
+    remedies = [
         "raise the limit, or loosen the accuracy: a spectrum can keep errors "
         f"{rounded_up(bought.factor * _ROOM, 4)} times as large as asked, a record somewhat larger ones"
-    )
-    parts: list[str] = []
-    remedies = [hint]
+    ]
+    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
+        # Within the same limits information grows in proportion to the length.
+        longer = int(np.ceil(question.experiment.samples * nearest.objective))
+        remedies.append(f"with {longer} samples a spectrum can, and a record with somewhat more")
     try:  # that it is infeasible is proved, whatever else is found out
         with time_for_hints():
             parts += _what_would_do(unreachable, question, involved)
-            remedies += _remedies(units, question, nearest.objective, samples_of_record)
+            remedies += ["spectrum: {type: free} can meet it"] if _within_reach_of_any(question) else []
     except OutOfTimeError:
         remedies.append("what else would do was not looked for further")
-    message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
-    hint = "; ".join(remedies)
     if problem.densities and question.limits:
-        hint += "; limits.spectrum takes part"
+        remedies.append("limits.spectrum takes part")
     key = involved[0].key if involved else "limits"
-    return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
-
-
-def _remedies(
-    units: Units, question: Question, times: float, samples_of_record: Callable[[int], int | None]
-) -> Iterator[str]:
-    """Yield what meets the accuracy within the limits; what takes longest to find out comes last."""
-    longer = None
-    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(times):
-        # Within the same limits information grows in proportion to the length.
-        longer = int(np.ceil(question.experiment.samples * times))
-        yield f"with {longer} samples a spectrum can"
-    if _within_reach_of_any(question):
-        yield "spectrum: {type: free} can meet it"
-    enough = None if longer is None else samples_of_record(longer)
-    if enough is not None:
-        yield f"with {units.length(enough)} (and signal.samples, if stated) a record can"
+    return InfeasibleError(
+        Diagnostic("infeasible", "; ".join(parts), "; ".join(remedies), key, details=bought.details)
+    )
 
 
 def _what_would_do(
@@ -227,42 +221,35 @@ def _what_would_do(
     for limit in involved:
         factor = needed_factor(unreachable, [limit]) if limit.upper else None
         if factor is not None:
-            alone = True
-            parts.append(_needed(limit, factor * limit.bound))
+            alone, least = True, factor * limit.bound
+            needs, peak = f"needs {named(limit)} >= {rounded_up(least)}", np.sqrt(limit.bound)
+            if limit.implied:
+                needs += (
+                    f", so {limit.of_samples} of {rounded_up(float(np.sqrt(least)))} at least; the limit, "
+                )
+                needs += f"{limit.of_samples} of {peak:.6g}, allows {limit.bound:.6g}"
+            else:
+                needs += f", limit is {limit.bound:.6g}"
+            parts.append(needs)
         elif limit.upper:
             parts.insert(0, f"the {named(limit)} is exhausted")
     return parts if alone else [*parts, _together(unreachable, question)]
 
 
-def _needed(limit: PowerLimit, least: float) -> str:
-    needs = f"needs {named(limit)} >= {rounded_up(least)}"
-    if not limit.implied:
-        return f"{needs}, limit is {limit.bound:.6g}"
-    peak, sample = np.sqrt(limit.bound), limit.of_samples
-    return (
-        f"{needs}, so {sample} of {rounded_up(float(np.sqrt(least)))} at least; the limit, {sample} of "
-        f"{peak:.6g}, allows {limit.bound:.6g}"
-    )
-
-
 def _together(unreachable: UnreachableError, question: Question) -> str:
     """Return what all upper limits would have to be; the square root of the factor if they bound samples."""
     raised = [limit for limit in question.limits if limit.upper]
-    upper = {limit.key: limit.implied for limit in raised}
     densities = [density.key for density in question.densities if density.upper]
     # The optimum of the goal "factor" meets the accuracy if limits and densities are multiplied by it.
     factor = unreachable.nearest.objective if densities else needed_factor(unreachable, raised)
     if factor is None:
         return "no change of the upper limits is enough"
-    times = f"would have to be {rounded_up(factor)} times as large"
-    if not upper:
-        return f"limits.spectrum {times}"
-    if any(upper.values()):
-        own = {key: float(np.sqrt(factor)) if implied else factor for key, implied in upper.items()}
-        own |= dict.fromkeys(densities, factor)
-        listed = " and ".join(f"{key} {rounded_up(each)} times" for key, each in own.items())
-        times = f"would have to be as large as a spectrum needs, {listed}, and larger for a record"
-    return f"no change of a single limit is enough; all of them together {times}"
+    own = {limit.key: float(np.sqrt(factor)) if limit.implied else factor for limit in raised}
+    own |= dict.fromkeys(densities, factor)
+    times = " and ".join(f"{key} would have to be {rounded_up(each)} times" for key, each in own.items())
+    alone = "no change of a single limit is enough; " if raised else ""
+    more = ", and larger for a record" if any(limit.implied for limit in raised) else ""
+    return f"{alone}{times} as large{more}"
 
 
 def _within_reach_of_any(question: Question) -> bool:
@@ -314,12 +301,14 @@ def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -
             return low
         if at >= high:
             at = float(np.sqrt(low * high))
-        problem = _raised(unreachable.problem.on(found.basis), bounds, at)
+        problem, within = _raised(unreachable.problem.on(found.basis), bounds, at), unreachable.within
+        if within is not None:
+            within = np.pad(within, (0, problem.basis.size - within.size))
         found = exchange(
             problem,
             found.x,
             tolerance=0.3 * _EXACT,
-            interior=_padded(unreachable.within, problem.basis.size),
+            interior=within,
             enough=lambda objective, _: objective < 1.0 - 1e-3,
         )
     return low if np.isfinite(high) else None
@@ -332,5 +321,24 @@ def _raised(problem: Problem, bounds: Mapping[int, float], factor: float) -> Pro
     return replace(problem, limits=tuple(limits), finer=None)
 
 
-def _padded(x: Array | None, size: int) -> Array | None:
-    return None if x is None else np.pad(x, (0, size - x.size))
+def refuse_too_short(request: RecordRequest, experiment: Experiment, record: Record) -> None:
+    """Raise `InfeasibleError` (`record-too-short`) if dead times take nearly all of a record."""
+    size = len(record.samples)
+    late = experiment.memory > _SHARE * size * request.step
+    undetermined = not np.isfinite(record.worst_ratio)
+    if not (request.meets and late and (undetermined or record.extra_power > _HOPELESS)):
+        return
+    times = f"costs {1.0 + record.extra_power:.2g} times what the designed spectrum does"
+    what = "determines all parameters" if undetermined else f"meets the accuracy at a fair price: one {times}"
+    message = f"no record of {size} samples {what}; the dead time takes too many of them"
+    key = "experiment.samples" if request.samples is None else "signal.samples"
+    section = key.partition(".")[0]
+    hint = f"take more samples, {request.units.length(2 * size, section)} or more; or look at time_unit"
+    raise InfeasibleError.because("record-too-short", message, hint, key)
+
+
+def no_record(request: RecordRequest, samples: int, best: str, hint: str) -> InfeasibleError:
+    """Return the error `limits-too-tight`: what the best record of this length that was tried reaches."""
+    keys = request.limit_keys
+    message = f"no record of {samples} samples within {' and '.join(keys)} was found that {best}"
+    return InfeasibleError.because("limits-too-tight", message, hint, keys[0])

@@ -14,9 +14,10 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.outcome import Signal
 from inputdesign_cli.outcome.curves import PredictedPanel, SignalCurves
-from inputdesign_cli.outcome.results import Table
+from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.signal_files import WRITERS
 from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.delivery import adding
 from inputdesign_cli.questions.common.record import Delivery, RecordRequest
 from inputdesign_cli.signal.lines import DesignedSpectrum, Lines
 from inputdesign_cli.signal.selection import Record
@@ -80,43 +81,38 @@ def _channels(values: Array) -> tuple[float, ...]:
     return tuple(values.tolist())
 
 
-def signal_curves(
-    request: RecordRequest, units: Units, experiment: Experiment, record: Record
-) -> tuple[dict[str, Table], SignalCurves]:
-    """signal.csv and predicted_output.csv, with time stamps in the unit of the spec, and their plot."""
+def with_record(
+    results: Results,
+    request: RecordRequest,
+    units: Units,
+    experiment: Experiment,
+    record: Record,
+    signal: Signal,
+) -> Results:
+    """Return the results with a record: signal.csv, predicted_output.csv, their plot, and other files."""
     columns = applied_columns(request, units, record)
     time, *signals = columns.values()
-    predicted, panels = predicted_output(units, experiment, record.samples, request.bounds.output)
-    points = request.delivery.operating_points
+    around, most, n = request.delivery.operating_points, request.bounds.output, len(time)
+    y = FiniteRecord(experiment, n, units.step).signals("output", record.samples)
+    noise = noise_deviation(experiment, n, units.step)
+    panels, predicted = [], {units.time_header: time}
+    for i in range(units.outputs):
+        name, limits = f"y{i + 1}", None if most is None else (-float(most[i]), float(most[i]))
+        panels.append(PredictedPanel(name, y[:, i], noise[:, i], limits, units.label(name)))
+        predicted |= {units.header(name): y[:, i], f"{name}_noise_deviation": noise[:, i]}
     curves = SignalCurves(
         time,
         dict(zip(units.excitations, signals, strict=True)),
         _limits(request, units, record),
         {name: units.label(name) for name in units.excitations},
-        panels,
+        tuple(panels),
         held=units.sampled,
         moves=_moves(request, units, record),
-        levels=points is not None and bool(np.any(points)),
+        levels=around is not None and bool(np.any(around)),
     )
-    return {"signal": Table(columns), "predicted_output": predicted}, curves
-
-
-def predicted_output(
-    units: Units, experiment: Experiment, record: Array, output_limits: Array | None = None
-) -> tuple[Table, tuple[PredictedPanel, ...]]:
-    """What samples (n, r) cause from rest, and the standard deviation of the noise."""
-    n = len(record)
-    y = FiniteRecord(experiment, n, units.step).signals("output", record)
-    noise = noise_deviation(experiment, n, units.step)
-    columns: dict[str, Array] = {units.time_header: units.sample_time * np.arange(n, dtype=np.float64)}
-    panels = []
-    for i in range(units.outputs):
-        name = f"y{i + 1}"
-        most = None if output_limits is None else float(output_limits[i])
-        limits = None if most is None else (-most, most)
-        panels.append(PredictedPanel(name, y[:, i], noise[:, i], limits, units.label(name)))
-        columns |= {units.header(name): y[:, i], f"{name}_noise_deviation": noise[:, i]}
-    return Table(columns), tuple(panels)
+    tables = {"signal": Table(columns), "predicted_output": Table(predicted)}
+    results = replace(results, files=other_files(request, units, record, columns))
+    return adding(results, replace(results.outcome, signal=signal), (), tables, {"signal": curves})
 
 
 def noise_deviation(experiment: Experiment, samples: int, step: float) -> Array:
@@ -190,12 +186,14 @@ def applied(delivery: Delivery, record: Record) -> Array:
     return record.samples + points
 
 
-def other_files(request: RecordRequest, units: Units, record: Record) -> dict[str, bytes]:
+def other_files(
+    request: RecordRequest, units: Units, record: Record, columns: dict[str, Array]
+) -> dict[str, bytes]:
     """signal.mat, .npz and .h (time, u1 or r1, .., sample_time); signal.wav (32-bit float up to 1)."""
     delivery, files = request.delivery, {}
     for ending, made in WRITERS.items():
         if ending in delivery.also:
-            files[f"signal.{ending}"] = made(applied_columns(request, units, record), units.sample_time)
+            files[f"signal.{ending}"] = made(columns, units.sample_time)
     if "wav" in delivery.also:
         import scipy.io.wavfile
 

@@ -58,7 +58,9 @@ def exploration_of(
                 structure=_structure(taken),
                 delay=taken.orders.delays,
                 delay_range=ranges,
-                output_error_by_order={str(n): rms for n, rms in chosen.by_order.items()},
+                output_error_by_order={
+                    str(n): float(np.sqrt(one.loss)) for n, one in chosen.swept.by_order.items()
+                },
                 structures=tuple(map(_structure, chosen.candidates)),
                 not_estimated=chosen.dropped,
                 noise_integrates=wanders,

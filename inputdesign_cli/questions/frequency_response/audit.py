@@ -6,7 +6,6 @@ transforms.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,7 +14,7 @@ from inputdesign_cli.arrays import Array
 from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.outcome import MeasuredLines, Outcome, Signal, Spectrum, read_plain
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.text_formats import csv_columns, csv_text, json_text
+from inputdesign_cli.outcome.text_formats import csv_columns, csv_text
 from inputdesign_cli.questions.common.audit import APART, check_claims, of_bounds, of_cost, of_limit
 from inputdesign_cli.questions.frequency_response.terms import Planned, ResponseTerms
 
@@ -26,7 +25,7 @@ def audit_response(terms: ResponseTerms, plan: Planned, results: Results) -> Non
     Raises:
         InaccurateError: `internal-disagreement`.
     """
-    written = read_plain(Outcome, json.loads(json_text(results.result)))
+    written = read_plain(Outcome, results.result)
     spectrum, response, signal = written.spectrum, written.frequency_response, written.signal
     assert spectrum is not None
     assert response is not None

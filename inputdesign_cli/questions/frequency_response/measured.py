@@ -18,7 +18,7 @@ from inputdesign_cli.identification.nonlinearity import SilentLines
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.outcome import Assessment, Identification, MeasuredLines, Outcome, RequirementMet
 from inputdesign_cli.outcome.curves import Curves, ResponseCurves
-from inputdesign_cli.outcome.response import SilentLine
+from inputdesign_cli.outcome.estimate import SilentLine
 from inputdesign_cli.outcome.results import Array, Results, Table
 from inputdesign_cli.outcome.units import Header, Units
 from inputdesign_cli.questions.common.delivery import results_of

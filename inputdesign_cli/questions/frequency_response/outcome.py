@@ -24,12 +24,12 @@ from inputdesign_cli.outcome import (
     White,
 )
 from inputdesign_cli.outcome.curves import Curves, DeviationCurves, SpectrumCurves
-from inputdesign_cli.outcome.response import DetectionLines
+from inputdesign_cli.outcome.estimate import DetectionLines
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.outcome.simulation import Range, TriedInput
-from inputdesign_cli.questions.common.delivery import proof_status, results_of, with_record
+from inputdesign_cli.questions.common.delivery import proof_status, results_of
 from inputdesign_cli.questions.common.record import RecordRequest
-from inputdesign_cli.questions.common.signal_outcome import signal_of
+from inputdesign_cli.questions.common.signal_outcome import signal_of, with_record
 from inputdesign_cli.questions.common.spectrum import hermitian_columns
 from inputdesign_cli.questions.frequency_response.terms import Planned, ResponseTerms, deviation_curves
 

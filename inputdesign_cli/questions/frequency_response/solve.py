@@ -17,24 +17,20 @@ from inputdesign_cli.design.convex.response_lines import (
     cheapest,
     most_accurate,
 )
-from inputdesign_cli.errors import InfeasibleError, bad_spec
+from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
 from inputdesign_cli.identification.periodic_response import response_at
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.response import study_response
 from inputdesign_cli.outcome import Simulation as SimulationOutcome
 from inputdesign_cli.outcome.results import Results
-from inputdesign_cli.outcome.rounding import rounded_up
+from inputdesign_cli.outcome.shares import rounded_up
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.questions.common.delivery import timing, with_study
-from inputdesign_cli.questions.common.no_record import no_record, too_long, unreachable
+from inputdesign_cli.questions.common.infeasible import contradictory, named, no_record
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.simulation import Simulation
+from inputdesign_cli.questions.frequency_response import outcome
 from inputdesign_cli.questions.frequency_response.audit import audit_response
-from inputdesign_cli.questions.frequency_response.outcome import (
-    response_results,
-    studied_deviations,
-    tried_lines,
-)
 from inputdesign_cli.questions.frequency_response.terms import KEY, Planned, ResponseTerms
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.signal.kind import Draft
@@ -100,24 +96,24 @@ class ResponseTask:
     """
 
     terms: ResponseTerms
-    given: NDArray[np.float64] | None
+    given: Array | None
     record: RecordRequest
     simulation: Simulation
 
     def solve(self) -> Results:
-        """Return the powers of the lines, their proof, and a record."""
+        """Return the design, or what given lines buy, with its signal and its curves."""
         return self._solved()[1]
 
     def simulate(self, executor: Executor | None = None) -> Results:
         """Return the design, and beside its deviations the scatter of many simulated experiments."""
-        if self.simulation.runs < 2:
+        terms, study = self.terms, self.simulation
+        if study.runs < 2:
             raise bad_spec(
                 "out-of-range",
                 "a single run has no standard deviation",
                 hint="write simulation.runs: 1000, whose deviations are known to 2 %",
                 key="simulation.runs",
             )
-        terms, study = self.terms, self.simulation
         plan, results = self._solved()
         begun = time.perf_counter()
         records = {"design": (plan.applied, plan.record.samples)}
@@ -126,20 +122,15 @@ class ResponseTask:
         nominal, power = terms.experiment, results.outcome.power
         if study.truth is not None and power is not None:
             nominal = study.truth.experiment(nominal, power.output or ())
+        tried = partial(study_response, runs=study.runs, seed=study.seed, executor=executor)
         studies = {
-            name: study_response(
-                nominal.model,
-                u,
-                terms.periods,
-                terms.grid.excited,
-                runs=study.runs,
-                seed=study.seed,
-                executor=executor,
-            )
+            name: tried(nominal.model, u, terms.periods, terms.grid.excited)
             for name, (_, u) in records.items()
         }
-        inputs = {name: tried_lines(terms, plan, records[name][0], found) for name, found in studies.items()}
-        table, curves = studied_deviations(terms, plan, results, studies["design"])
+        inputs = {
+            name: outcome.tried_lines(terms, plan, records[name][0], found) for name, found in studies.items()
+        }
+        table, curves = outcome.studied_deviations(terms, plan, results, studies["design"])
         entry = SimulationOutcome(study.runs, study.seed, inputs, samples=plan.length)
         return with_study(results, entry, begun, tables={"deviations": table}, curves={"deviations": curves})
 
@@ -153,7 +144,7 @@ class ResponseTask:
         try:
             design = cheapest(problem) if terms.goal == "cost" else most_accurate(problem)
         except UnreachableError as error:
-            raise unreachable(terms.header.units, error, samples) from error
+            raise self._unreachable(error, samples) from error
         return design, self._whole(1.0 / design.value) if terms.goal == "samples" else samples
 
     def _whole(self, samples: float) -> int:
@@ -166,35 +157,27 @@ class ResponseTask:
         design, counted = self._designed()
         solved = time.perf_counter()
         plan = self._planned(design, counted)
-        experiment = replace(self.terms.experiment, samples=plan.counted)
-        terms = replace(self.terms, experiment=experiment)
-        results = response_results(terms, plan, self.record, timing(started, solved))
+        terms = replace(self.terms, experiment=replace(self.terms.experiment, samples=plan.counted))
+        results = outcome.response_results(terms, plan, self.record, timing(started, solved))
         audit_response(terms, plan, results)
         return plan, results
 
-    def _realised(self, design: ResponseDesign, counted: int) -> tuple[Array, float, int]:
-        """Return a record of the lines, the largest share of its limits, and the samples that count."""
-        terms = self.terms
+    def _planned(self, design: ResponseDesign, counted: int) -> Planned:
+        """Return the record of a design, scaled so that it meets the accuracy or keeps to the limits."""
+        terms, records = self.terms, self._records
         powers = design.powers.reshape(-1, terms.experiment.inputs)
-        samples = self._records.best(powers, self._length(counted))
-        beyond = self._records.beyond(samples)
+        samples = records.best(powers, self._length(counted))
+        beyond = records.beyond(samples)
         if terms.goal == "samples" and beyond > 1.0:
             # The lines are scaled into the limits, and more periods make up for it.
             counted = self._whole(beyond**2 / design.value)
-            samples = self._records.best(powers, self._length(counted))
-            beyond = self._records.beyond(samples)
-        return samples, beyond, counted
-
-    def _planned(self, design: ResponseDesign, counted: int) -> Planned:
-        """Return the record of a design, scaled so that it meets the accuracy or keeps to the limits."""
-        terms = self.terms
-        samples, beyond, counted = self._realised(design, counted)
-        problem, noise = self.terms.problem(counted), terms.lines.noise
+            samples = records.best(powers, self._length(counted))
+            beyond = records.beyond(samples)
+        problem, noise, periods = terms.problem(counted), terms.lines.noise, terms.periods
         if not terms.tabulated:
-            times = counted // (terms.periods.blocks * terms.periods.period)
+            times = counted // (periods.blocks * periods.period)
             spectrum = NoiseSpectrum.of(terms.experiment.model)
             noise = spectrum.averaged(terms.grid.period, terms.grid.excited, times)
-        powers = design.powers.reshape(-1, terms.experiment.inputs)
         exact = terms.lines.deviations(powers, counted, noise)
         worst, scale = float(np.max(terms.lines.ratios(exact))), 1.0
         if terms.goal == "cost" and self.record.meets:
@@ -205,7 +188,29 @@ class ResponseTask:
             scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
-        return Planned(design, problem, powers, counted, record, exact, self._shifted(samples, exact))
+        # The largest shift of G by the start, in standard deviations.
+        U, Y = (periods.means(x, terms.grid.excited) for x in (samples, records.answer(samples)))
+        shift = float(np.max(np.abs(response_at(U, Y) - terms.lines.G) / exact))
+        return Planned(design, problem, powers, counted, record, exact, shift)
+
+    def _unreachable(self, error: UnreachableError, samples: int) -> InfeasibleError:
+        """Return the error that limits exclude the accuracy, with the numbers of the spec that would do."""
+        factor, limits = error.factor, tuple(dict.fromkeys(error.limits))
+        if not np.isfinite(factor):
+            return contradictory(limits, "contradict each other: no powers of these lines keep all of them")
+        exhausted = " and ".join(dict.fromkeys(map(named, limits)))
+        raised = (factor * one.bound**0.5 if one.implied else factor**2 * one.bound for one in limits)
+        needed = (f"{one.key} to {rounded_up(to)}" for one, to in zip(limits, raised, strict=True))
+        more, times = int(np.ceil(samples * factor**2)), rounded_up(factor, 4)
+        message = (
+            f"the limits buy standard deviations {times} times those admitted; the {exhausted} is exhausted"
+        )
+        hint = (
+            f"raise {' and '.join(needed)}, count {more} samples in place of {samples} "
+            f"({self.record.units.length(more).split(':')[0]}), or admit {times} times as much"
+        )
+        details = {"factor": factor}
+        return InfeasibleError(Diagnostic("infeasible", message, hint, limits[0].key, details=details))
 
     def _too_tight(self, beyond: float, length: int) -> InfeasibleError:
         more, times = int(np.ceil(length * beyond**2)), rounded_up(beyond, 4)
@@ -221,10 +226,17 @@ class ResponseTask:
             InfeasibleError: the shortest experiment is longer than it may be.
             SpecError: `too-large`.
         """
-        terms = self.terms
-        length = counted + terms.periods.blocks * terms.periods.skip * terms.periods.period
-        if terms.goal == "samples" and terms.most_samples is not None and length > terms.most_samples:
-            raise too_long(terms.header.units, length, terms.most_samples)
+        periods, most = self.terms.periods, self.terms.most_samples
+        length = counted + periods.blocks * periods.skip * periods.period
+        if self.terms.goal == "samples" and most is not None and length > most:
+            limit = self.record.units.length(length, "limits")
+            raise InfeasibleError.because(
+                "too-long",
+                f"the shortest record of whole periods takes {length} samples, transient included, and "
+                f"{most} are allowed",
+                f"write {limit}, allow more power, or ask for less accuracy",
+                limit.split(":")[0],
+            )
         if length > self.record.longest:
             raise bad_spec(
                 "too-large",
@@ -238,9 +250,3 @@ class ResponseTask:
     def _records(self) -> LineRecords:
         settings, bounds = self.record.settings, self.record.bounds
         return LineRecords(self.terms.experiment, self.terms.grid, settings, bounds)
-
-    def _shifted(self, u: Array, deviations: NDArray[np.float64]) -> float:
-        """Return the largest shift of G by the start, in standard deviations."""
-        terms = self.terms
-        U, Y = (terms.periods.means(x, terms.grid.excited) for x in (u, self._records.answer(u)))
-        return float(np.max(np.abs(response_at(U, Y) - terms.lines.G) / deviations))

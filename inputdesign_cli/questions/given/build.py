@@ -30,7 +30,6 @@ from inputdesign_cli.questions.building.system import (
 )
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
-from inputdesign_cli.questions.common.delivery import Shown
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.given.solve import GivenAsked, GivenExcitation, GivenTask
 from inputdesign_cli.questions.least_cost.build import check_pairs, check_supported
@@ -81,13 +80,15 @@ def build_given(spec: Spec) -> GivenTask:
         _build_plants(spec, experiment),
     )
     return GivenTask(
-        experiment,
-        _excitation(spec, spec.spectrum, experiment),
-        asked,
-        build_record_request(spec, experiment.size),
-        Shown(build_header(spec), unstated_errors(spec, experiment), spec.report.ellipses),
-        build_simulation(spec, experiment),
-        build_foresight(spec, experiment),
+        experiment=experiment,
+        excitation=_excitation(spec, spec.spectrum, experiment),
+        asked=asked,
+        header=build_header(spec),
+        record=build_record_request(spec, experiment.size),
+        unstated=unstated_errors(spec, experiment),
+        ellipses=spec.report.ellipses,
+        simulation=build_simulation(spec, experiment),
+        foresight=build_foresight(spec, experiment),
     )
 
 

@@ -9,13 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, Requirement, model_errors, worst
+from inputdesign_cli.accuracy import Criterion, Requirement, worst
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.findings.designed_records import too_long
 from inputdesign_cli.findings.designs import StatedLimits, limits_not_kept, met_within_table
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
@@ -25,30 +25,12 @@ from inputdesign_cli.outcome.results import Results
 from inputdesign_cli.outcome.units import Units
 from inputdesign_cli.questions.common.bound import Informed
 from inputdesign_cli.questions.common.confidence import Confidence, SimulatedEstimates, Simulator
-from inputdesign_cli.questions.common.delivery import (
-    Delivered,
-    Shown,
-    adding,
-    begun_anywhere,
-    foreseeing,
-    record_findings,
-    results_of,
-    searching,
-    with_record,
-)
-from inputdesign_cli.questions.common.foresight import Foresight
-from inputdesign_cli.questions.common.record import (
-    RecordRequest,
-    as_long,
-    given_record,
-    least_period,
-    ratio_at,
-    worst_ratio,
-)
+from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
+from inputdesign_cli.questions.common.record import as_long, given_record, least_period, ratio_at, worst_ratio
 from inputdesign_cli.questions.common.robust import Plants
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.simulation import Simulation, simulate
 from inputdesign_cli.questions.common.spectrum import spectrum_curves
+from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.outcome import accuracy_of, information_of
 from inputdesign_cli.questions.least_cost.robust_outcome import AtPlants, given_robust, kept_of
 from inputdesign_cli.signal.generator import SignalGenerator
@@ -153,27 +135,16 @@ class GivenAsked:
     plants: Plants | None
 
 
-@dataclass(frozen=True)
-class GivenTask:
+@dataclass(frozen=True, kw_only=True)
+class GivenTask(SpectrumTask):
     """The analysis of an excitation: what is looked at, what is done with its record, what is reported."""
 
     experiment: Experiment
     excitation: GivenExcitation
     asked: GivenAsked
-    record: RecordRequest
-    shown: Shown
-    simulation: Simulation
-    foresight: Foresight | None = None
 
-    def solve(self) -> Results:
+    def delivered(self) -> Delivered:
         """Return r_u, information, predicted standard deviations and powers of the excitation."""
-        return self._delivered().results
-
-    def simulate(self, executor: Executor | None = None) -> Results:
-        """Return this with the excitation tried many times on the true system; see `common.simulation`."""
-        return simulate(self.simulation, self._delivered(), executor)
-
-    def _delivered(self) -> Delivered:
         started = time.perf_counter()
         excitation, asked = self.excitation, self.asked
         experiment = self.experiment.whitened(excitation.scale)
@@ -187,31 +158,24 @@ class GivenTask:
         requirements = with_alpha(requirements, confidence.alpha)
         informed, white = self._informed(experiment, requirements, information)
         results = self._report(experiment, informed, white, requirements, confidence)
-        record = self._record(experiment, worst_ratio(requirements))
-        findings = record_findings(self.record, experiment.samples, None) if record is None else []
-        if record is not None:
-            signal = signal_of(self.record, informed.units, experiment, record, requirements)
-            if np.isfinite(record.worst_ratio):
-                step = self.record.step
-                signal, start = begun_anywhere(signal, experiment, record.samples, step, requirements)
-                findings += start
-            results = with_record(results, self.record, informed.units, experiment, record, signal)
+        record, signal = self._record(experiment, worst_ratio(requirements)), None
+        if record is None:
+            found = too_long(self.record.length(experiment.samples), self.record.longest)
+        else:
+            signal, found = signal_of(self.record, informed.units, experiment, record, requirements), []
         power = Powers.of(excitation.power)
-        findings += limits_not_kept(asked.limits, experiment.samples, power, results.outcome.signal)
-        results = adding(results, results.outcome, findings)
-        if record is not None:
-            results = foreseeing(results, self.foresight, record.samples, requirements)
+        found += limits_not_kept(asked.limits, experiment.samples, power, signal)
+        if record is None or signal is None:
+            results = adding(results, results.outcome, found)
+        else:
+            results = self.applied(results, experiment, record, signal, requirements, found)
         seconds = {"analysis": time.perf_counter() - started}
         results = adding(results, replace(results.outcome, timing_s=seconds))
         if record is None:
             return Delivered(results, None, None, confidence.alpha)
-        return Delivered(
-            results,
-            record.samples,
-            self._renewed(len(record.samples)),
-            confidence.alpha,
-            partial(informed.of_length, experiment, self.shown.ellipses),
-            searching(self.foresight, record.samples, requirements),
+        renewed = self._renewed(len(record.samples))
+        return self.to_be_tried(
+            results, record.samples, renewed, confidence.alpha, informed, experiment, requirements
         )
 
     def _informed(
@@ -221,14 +185,11 @@ class GivenTask:
         cost = weighted_sum(self.asked.cost, self.excitation.power)
         level = cost / weighted_sum(self.asked.cost, GivenExcitation.even(self.experiment, 1.0).power)
         white = GivenExcitation.even(self.experiment, level).information(experiment)
-        stated, units = model_errors(requirements), self.shown.header.units
-        errors = stated or [replace(error, experiment=experiment) for error in self.shown.unstated]
+        errors, stated = self.errors(experiment, requirements)
         found = White(cost=cost, excitation_power=level)
         kind = None if self.asked.criterion is None else self.asked.criterion(experiment).letter
-        labels = white_labels(kind, found, experiment.samples)
-        known = (units, errors, information, bool(stated))
-        informed = Informed(*known, white=white, white_labels=labels, label="given")
-        return informed, found
+        labels, known = white_labels(kind, found, experiment.samples), (errors, information, stated)
+        return Informed(self.header.units, *known, white=white, white_labels=labels, label="given"), found
 
     def _report(
         self,
@@ -243,10 +204,14 @@ class GivenTask:
         beyond, of_table = self._beyond(experiment, requirements, informed.information)
         met = beyond <= max(_ROUNDING, of_table)
         error, listed = accuracy_of(units, confidence, requirements, informed.information, np.zeros(0))
+        objective = None
+        if self.asked.criterion is not None:
+            criterion = self.asked.criterion(experiment)
+            objective = Objective(criterion.letter, criterion.value(criterion.level(informed.information)))
         outcome = Outcome(
-            title=self.shown.header.title,
+            title=self.header.title,
             status="given" if not requirements else "met" if met else "missed",
-            objective=self._objective(experiment, informed.information),
+            objective=objective,
             cost=white.cost,
             samples=experiment.samples,
             power=Powers.of(excitation.power),
@@ -258,7 +223,7 @@ class GivenTask:
         )
         if met and of_table:
             outcome = outcome.saying([met_within_table(of_table)])
-        tables, curves = informed.curves(experiment, self.shown.ellipses)
+        tables, curves = informed.curves(experiment, self.ellipses)
         if excitation.basis is not None and excitation.x is not None:
             level = white.excitation_power if units.inputs == 1 else None
             tables["spectrum"], drawn = spectrum_curves(
@@ -273,14 +238,7 @@ class GivenTask:
             status = "missed" if found.entry.missed else outcome.status
             outcome = replace(outcome, robust=found.entry, status=status).saying(found.findings)
             tables |= found.tables
-        return results_of(self.shown.header, outcome, tables, curves)
-
-    def _objective(self, experiment: Experiment, information: Array) -> Objective | None:
-        """Return the value of the criterion."""
-        if self.asked.criterion is None:
-            return None
-        criterion = self.asked.criterion(experiment)
-        return Objective(criterion.letter, criterion.value(criterion.level(information)))
+        return results_of(self.header, outcome, tables, curves)
 
     def _beyond(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array

@@ -6,7 +6,6 @@ its own: four Gauss points on intervals of the grid on which peaks are sought.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,8 +21,7 @@ from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.outcome import Objective, Outcome, read_plain, write_plain
-from inputdesign_cli.outcome.text_formats import json_text
+from inputdesign_cli.outcome import Objective, Outcome, plain, read_plain
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.questions.common.audit import APART, check_claims, of_bounds, of_cost, of_limit
 from inputdesign_cli.questions.common.robust import kept_by
@@ -55,7 +53,7 @@ def audit(done: Designed, outcome: Outcome, *, on_grid: bool, loose: float = 0.0
         InaccurateError: `internal-disagreement`.
     """
     apart = max(APART, loose)
-    reread = read_plain(_Written, json.loads(json_text(write_plain(outcome))))
+    reread = read_plain(_Written, plain(outcome))
     remedy = "rescale the signals, restrict the band, or look for poles near the unit circle"
     check_claims(_Audit(done, reread, apart).disagreements(on_grid), remedy)
 

@@ -26,7 +26,6 @@ from inputdesign_cli.questions.building.system import build_cost, build_experime
 from inputdesign_cli.questions.building.unbounded import check_every_direction_counts, check_reach
 from inputdesign_cli.questions.building.uncertainty import build_plants
 from inputdesign_cli.questions.building.unhandled import refuse_unhandled
-from inputdesign_cli.questions.common.delivery import Shown
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.solve import ConvexTask
 from inputdesign_cli.questions.least_cost.sought import FewColumns, GridMethod, Sought
@@ -75,7 +74,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     simulator = build_simulator(spec, experiment)
     exact = None if calibration is None else ExactConfidence(calibration, alpha, question, simulator)
     return ConvexTask(
-        Sought(
+        asked=Sought(
             build_header(spec),
             question,
             cost,
@@ -90,10 +89,12 @@ def build_convex(spec: Spec) -> ConvexTask:
             grid,
             _few_columns(spec, basis),
         ),
-        build_record_request(spec, experiment.size),
-        Shown(build_header(spec), unstated_errors(spec, experiment), spec.report.ellipses),
-        build_simulation(spec, experiment),
-        build_foresight(spec, experiment),
+        header=build_header(spec),
+        record=build_record_request(spec, experiment.size),
+        unstated=unstated_errors(spec, experiment),
+        ellipses=spec.report.ellipses,
+        simulation=build_simulation(spec, experiment),
+        foresight=build_foresight(spec, experiment),
     )
 
 

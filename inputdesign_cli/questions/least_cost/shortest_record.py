@@ -106,9 +106,9 @@ class ShortestRecord:
         Raises:
             OutOfTimeError: before one is found.
         """
-        self._low, self._lengths = low or len(misses[0].samples), 0
-        self.needed = min(map(self._reach, self._missed.values() or misses))
-        if self._low > LONG and not self._missed:
+        self._low = low or len(misses[0].samples)
+        self.needed = min(map(self._reach, misses))
+        if self._low > LONG:
             self._try_pilots(misses[0])
         try:
             self._lengthen()
@@ -222,11 +222,6 @@ class ShortestRecord:
 
     def _reach(self, record: Record) -> float:
         return reach(record, self.before)
-
-    @property
-    def tried(self) -> int:
-        """Samples of the longest record that was tried."""
-        return max((samples for _, samples in self._tried), default=0)
 
     def _rounded(self, length: float) -> int:
         """The next length of whole blocks; of a long record one with a fast transform if it is near."""

@@ -9,21 +9,20 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import OnModelError, model_errors
+from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.arrays import Array
-from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.finding import Finding
-from inputdesign_cli.findings.designed_records import less_accurate, requirement_missed
-from inputdesign_cli.findings.simulated_runs import confidence_missed
-from inputdesign_cli.findings.unfinished import (
-    ended_early,
-    no_record_in_time,
-    on_grid,
-    other_spectra_left_out,
-    uncounted_excitation,
+from inputdesign_cli.findings import unfinished
+from inputdesign_cli.findings.designed_records import (
+    accuracy_missed,
+    length_of_record,
+    less_accurate,
+    requirement_missed,
+    too_long,
 )
+from inputdesign_cli.findings.simulated_runs import confidence_missed
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.outcome import Outcome, Signal, White
 from inputdesign_cli.outcome.curves import Curves
@@ -31,29 +30,11 @@ from inputdesign_cli.outcome.objectives import white_labels
 from inputdesign_cli.outcome.results import Results, Table
 from inputdesign_cli.questions.common.bound import Informed, equal_white
 from inputdesign_cli.questions.common.confidence import covered
-from inputdesign_cli.questions.common.delivery import (
-    Delivered,
-    Shown,
-    adding,
-    begun_anywhere,
-    foreseeing,
-    record_findings,
-    results_of,
-    searching,
-    with_record,
-)
-from inputdesign_cli.questions.common.foresight import Foresight
-from inputdesign_cli.questions.common.record import (
-    Made,
-    RecordRequest,
-    designed_spectrum,
-    peak_at,
-    redrawn,
-    worst_ratio,
-)
+from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
+from inputdesign_cli.questions.common.record import Made, designed_spectrum, peak_at, redrawn, worst_ratio
 from inputdesign_cli.questions.common.signal_outcome import signal_of
-from inputdesign_cli.questions.common.simulation import Simulation, simulate
 from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
+from inputdesign_cli.questions.common.task import SpectrumTask
 from inputdesign_cli.questions.least_cost.audit import audit
 from inputdesign_cli.questions.least_cost.outcome import Designed, design_outcome
 from inputdesign_cli.questions.least_cost.record_search import fitting_record
@@ -62,38 +43,24 @@ from inputdesign_cli.questions.least_cost.sought import Sought
 from inputdesign_cli.signal.selection import Record
 
 
-@dataclass(frozen=True)
-class ConvexTask:
+@dataclass(frozen=True, kw_only=True)
+class ConvexTask(SpectrumTask):
     """A convex design: what is asked, what is done with its record, what is reported."""
 
     asked: Sought
-    record: RecordRequest
-    shown: Shown
-    simulation: Simulation
-    foresight: Foresight | None = None
-
-    def solve(self) -> Results:
-        """Return the design, its proof, its signal and its curves."""
-        return self._delivered().results
-
-    def simulate(self, executor: Executor | None = None) -> Results:
-        """Return this with the design tried many times on the true system; see `common.simulation`."""
-        delivered = self._delivered()
-        if delivered.record is None:
-            seconds_left()  # or else its time is the reason
-        return simulate(self.simulation, delivered, executor)
 
     def designed(self) -> Designed:
         """Return the design, see `Sought.designed`."""
         return self.asked.designed(self.record)
 
-    def _delivered(self) -> Delivered:
+    def delivered(self) -> Delivered:
+        """Return the design, its proof, its signal and its curves, with what a trial takes from it."""
         started = time.perf_counter()
         done = self.designed()
-        outcome = self._designed_outcome(done)
+        outcome = self._outcome(done)
         self.asked.check_length(done, of_record=self.record.bounds.hard)
         solved = time.perf_counter()
-        self._audited(done, outcome)
+        self._audit(done, outcome)
         checked = time.perf_counter()
         made = self._made(done)
         record, known = made.record, _known(done, made.record, self.record.step)
@@ -103,55 +70,48 @@ class ConvexTask:
             robust = robust_result(done, done.plants, peak)
             outcome = replace(results.outcome, robust=robust.entry)
             results = adding(results, outcome, robust.findings, robust.tables, robust.curves)
-        if record is not None:
-            signal, units = self._signal(done, made, record, known), self.shown.header.units
-            results = with_record(results, made.request, units, done.experiment, record, signal)
         if done.excites:
-            results = replace(results, outcome=self._of_record(done, results.outcome, made, known))
-            if record is not None:
-                results = foreseeing(results, self.foresight, record.samples, done.problem.requirements)
+            results = self._with_record(done, results, made, known)
         seconds = {
             "design": solved - started,
             "check": checked - solved,
             "signal": time.perf_counter() - checked,
         }
-        results, alpha = adding(results, replace(results.outcome, timing_s=seconds)), done.confidence.alpha
+        results = replace(results, outcome=replace(results.outcome, timing_s=seconds))
         if record is None:
-            return Delivered(results, None, None, alpha)
-        samples, inputs = record.samples.shape
-        return Delivered(
+            return Delivered(results, None, None, done.confidence.alpha)
+        return self.to_be_tried(
             results,
             record.samples,
-            redrawn(made.request, made.design, inputs, samples),
-            alpha,
-            partial(
-                self._informed(done).of_length,
-                done.experiment,
-                self.shown.ellipses,
-                flat=done.design.problem.demands.definite,
-            ),
-            searching(self.foresight, record.samples, done.problem.requirements),
+            redrawn(made.request, made.design, record.samples.shape[1], len(record.samples)),
+            done.confidence.alpha,
+            self._informed(done),
+            done.experiment,
+            done.problem.requirements,
+            flat=done.problem.demands.definite,
         )
 
-    def _designed_outcome(self, done: Designed) -> Outcome:
+    def _outcome(self, done: Designed) -> Outcome:
         """Return the outcome of the design with what was left out of its proof."""
-        outcome = design_outcome(done)
-        columns, reach, grid = self.asked.columns, self.asked.reach, self.asked.grid
+        outcome, columns, reach = design_outcome(done), self.asked.columns, self.asked.reach
         if columns is not None and outcome.spectrum is not None:
             details = {**outcome.spectrum.details, "factor_columns": columns.columns}
             outcome = replace(outcome, spectrum=replace(outcome.spectrum, details=details))
+        if not done.excites:
+            return outcome
         found: list[Finding] = []
         if done.answer.solver.ended_by is not None and outcome.objective is not None:
-            found += ended_early(done.answer.status, outcome.objective)
+            found += unfinished.ended_early(done.answer.status, outcome.objective)
         elif not (done.design.any_spectrum or reach.note):
-            found.append(other_spectra_left_out())
+            found.append(unfinished.other_spectra_left_out())
         if reach.note:
-            found.append(uncounted_excitation(reach.note, bounded=reach.bounded))
-        if grid is not None and outcome.model_error is not None:
-            found.append(on_grid(grid.lines, outcome.model_error.worst_ratio or 0.0))
-        return outcome.saying(found) if done.excites else outcome
+            found.append(unfinished.uncounted_excitation(reach.note, bounded=reach.bounded))
+        if self.asked.grid is not None and outcome.model_error is not None:
+            worst = outcome.model_error.worst_ratio or 0.0
+            found.append(unfinished.on_grid(self.asked.grid.lines, worst))
+        return outcome.saying(found)
 
-    def _audited(self, done: Designed, outcome: Outcome) -> None:
+    def _audit(self, done: Designed, outcome: Outcome) -> None:
         """Evaluate what is about to be written by other means, see `audit`."""
         reach = self.asked.reach
         loose = 0.0 if reach.attained else self.asked.tolerance
@@ -173,18 +133,19 @@ class ConvexTask:
                 made = exact.recorded(done, made, request, partial(_known, done, step=request.step))
             return made
         except OutOfTimeError:
-            missing = no_record_in_time(request.settings.candidates)
+            missing = unfinished.no_record_in_time(request.settings.candidates)
             return Made(None, request, done.design, findings=(missing,))
 
     def _informed(self, done: Designed) -> Informed:
         """Return what curves show of the design: r_u of every entry if no model error is bounded."""
-        design, stated = done.design, model_errors(done.asked)
+        design = done.design
+        errors, stated = self.errors(done.experiment, done.asked)
         white = design.white.informations[0] / (design.white.s if design.problem.goal == "factor" else 1.0)
         return Informed(
-            self.shown.header.units,
-            stated or [replace(error, experiment=done.experiment) for error in self.shown.unstated],
+            self.header.units,
+            errors,
             done.information,
-            bool(stated),
+            stated,
             [design.result.active_at(i) for i, r in enumerate(done.asked) if isinstance(r, OnModelError)],
             np.asarray(white),
             of_several=done.plants is not None,
@@ -194,18 +155,19 @@ class ConvexTask:
         self, done: Designed, outcome: Outcome, record: Record | None, known: Array | None
     ) -> Results:
         """Return the outcome with tables and curves; of a design without excitation the spectrum alone."""
-        units, design = self.shown.header.units, done.design
-        found, problem = design.result, design.problem
+        units, design, problem = self.header.units, done.design, done.problem
         level = design.white_power if units.inputs == 1 else None
-        spectrum = spectrum_curves(units, found.basis, found.x, problem.experiment.band, white=level)
+        spectrum = spectrum_curves(
+            units, problem.basis, design.result.x, problem.experiment.band, white=level
+        )
         if record is not None:
             spectrum = with_periodogram(units, *spectrum, record.samples)
         tables: dict[str, Table] = {"spectrum": spectrum[0]}
         curves: dict[str, Curves] = {"spectrum": spectrum[1]}
         if not done.excites:
-            return results_of(self.shown.header, outcome, tables, curves)
+            return results_of(self.header, outcome, tables, curves)
         informed = self._informed(done)
-        white = White() if outcome.baseline is None else outcome.baseline.white or White()
+        white = (None if outcome.baseline is None else outcome.baseline.white) or White()
         if not informed.stated:
             known = _known(done, record, self.record.step, own_length=False)
         kind = None if outcome.objective is None else outcome.objective.kind
@@ -215,18 +177,46 @@ class ConvexTask:
             equal=equal_white(design, done.experiment.samples, white.ratio or 0.0),
             white_labels=white_labels(kind, white, done.experiment.samples),
         )
-        more = informed.curves(done.experiment, self.shown.ellipses, flat=problem.demands.definite)
+        more = informed.curves(done.experiment, self.ellipses, flat=problem.demands.definite)
         tables, curves = tables | more[0], curves | more[1]
         optimality = optimality_curves(units, design)
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
-        return results_of(self.shown.header, outcome, tables, curves)
+        return results_of(self.header, outcome, tables, curves)
+
+    def _with_record(self, done: Designed, results: Results, made: Made, known: Array | None) -> Results:
+        """Return the results with the record, and what a user should know before applying it."""
+        request, record, problem = made.request, made.record, done.problem
+        error = results.outcome.model_error
+        coverage = None if error is None else error.confidence
+        if record is None:
+            missing = too_long(request.length(done.experiment.samples), request.longest)
+            found = [*confidence_missed(coverage, None), *made.findings, *missing]
+            return adding(results, results.outcome, found)
+        signal = self._signal(done, made, record, known)
+        shares, block = signal.of_limits or {}, request.settings.block
+        limited = any(limit.upper for limit in problem.limits) or bool(shares)
+        held = limited or request.bounds.hard or request.settings.level is not None
+        asked = request.samples or done.experiment.samples
+        findings = [
+            *confidence_missed(coverage, signal.confidence),
+            *made.findings,
+            *accuracy_missed(record, held=held),
+            *length_of_record(record, asked, block, shares),
+        ]
+        if known is not None:
+            if problem.goal == "factor" and problem.demands.criterion is None:
+                designed = float(np.sqrt(done.design.result.objective))
+                findings += less_accurate(record.worst_ratio, designed)
+            names = list(dict.fromkeys(requirement.name for requirement in problem.side))
+            findings += requirement_missed(names, worst_ratio(problem.side)(known))
+        return self.applied(results, done.experiment, record, signal, problem.requirements, findings)
 
     def _signal(self, done: Designed, made: Made, record: Record, known: Array | None) -> Signal:
         design, exact = made.design, self.asked.exact
         signal = signal_of(
             made.request,
-            self.shown.header.units,
+            self.header.units,
             replace(design.problem.experiment, samples=done.experiment.samples),
             record,
             design.problem.requirements,
@@ -239,21 +229,6 @@ class ConvexTask:
             return signal
         return replace(signal, spectrum_of={"input_power": made.input_power})
 
-    def _of_record(self, done: Designed, outcome: Outcome, made: Made, known: Array | None) -> Outcome:
-        """Return the outcome with what a user should know before applying the record."""
-        signal, record = outcome.signal, made.record
-        designed = None if outcome.model_error is None else outcome.model_error.confidence
-        shares, recorded = (None, None) if signal is None else (signal.of_limits, signal.confidence)
-        findings = [*confidence_missed(designed, recorded), *made.findings]
-        limited = any(limit.upper for limit in done.design.problem.limits)
-        findings += record_findings(made.request, done.experiment.samples, record, shares, of_powers=limited)
-        if record is not None and known is not None and signal is not None:
-            findings += _shortfall(done, record, known)
-            requirements, step = done.problem.requirements, self.record.step
-            signal, start = begun_anywhere(signal, done.experiment, record.samples, step, requirements)
-            findings += start
-        return replace(outcome, signal=signal).saying(findings)
-
 
 def _known(done: Designed, record: Record | None, step: float, *, own_length: bool = True) -> Array | None:
     """Return the information (k, k) of the record, or of its spectrum over the length of the design.
@@ -265,12 +240,3 @@ def _known(done: Designed, record: Record | None, step: float, *, own_length: bo
     plant = FiniteRecord(done.experiment, len(record.samples), step)
     inform: Callable[[Array], Array] = plant.information if own_length else plant.information_of_experiment
     return inform(record.samples)
-
-
-def _shortfall(done: Designed, record: Record, information: Array) -> list[Finding]:
-    """Return what a record of information (k, k) misses of the best accuracy, and what else it misses."""
-    problem, found = done.design.problem, list[Finding]()
-    if problem.goal == "factor" and problem.demands.criterion is None:
-        found += less_accurate(record.worst_ratio, float(np.sqrt(done.design.result.objective)))
-    names = list(dict.fromkeys(requirement.name for requirement in problem.side))
-    return found + requirement_missed(names, worst_ratio(problem.side)(information))

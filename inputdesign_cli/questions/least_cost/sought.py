@@ -24,13 +24,11 @@ from inputdesign_cli.outcome import Solver
 from inputdesign_cli.outcome.units import Header
 from inputdesign_cli.questions.common.confidence import Confidence
 from inputdesign_cli.questions.common.delivery import proof_status
-from inputdesign_cli.questions.common.infeasible import Bought, StatedBound, explain
-from inputdesign_cli.questions.common.reach import Reach
+from inputdesign_cli.questions.common.infeasible import Bought, Reach, StatedBound, explain
 from inputdesign_cli.questions.common.record import RecordRequest
 from inputdesign_cli.questions.common.robust import Plants, delivered_samples, without_dearest
 from inputdesign_cli.questions.least_cost.exact_confidence import ExactConfidence
 from inputdesign_cli.questions.least_cost.outcome import Answer, Designed
-from inputdesign_cli.questions.least_cost.record_search import samples_of_record
 from inputdesign_cli.questions.least_cost.worst_case import with_worst_plants
 from inputdesign_cli.spectrum import PolynomialBasis, flat_basis, hvec, svec
 
@@ -48,13 +46,11 @@ class GridMethod:
 
     def design(self, question: Question, *, tolerance: float, any_spectrum_tolerance: float | None) -> Answer:
         """Return the design. The baseline and the bound over every spectrum are exact."""
-        white = replace(question, basis=flat_basis(question.experiment))
+        basis, white = question.basis, replace(question, basis=flat_basis(question.experiment))
         baseline = solve_design(white, tolerance=tolerance, any_spectrum_tolerance=any_spectrum_tolerance)
-        basis = question.basis
         problem = replace(baseline.problem, basis=basis)
         stated = [r for r in problem.requirements if isinstance(r, ModelError)]
-        frequencies = self.frequencies(*stated[0].band)
-        start = baseline.white_power * basis.even
+        frequencies, start = self.frequencies(*stated[0].band), baseline.white_power * basis.even
         answer = solve_on_grid(problem, stated, frequencies, start, positivity=self.positivity)
         on_grid = replace(
             baseline.result,
@@ -87,13 +83,11 @@ class FewColumns:
 
         The bound of the design over all factors stays: it is the upper bound of [mohan-spectral].
         """
-        design = answer.design
-        problem, x = design.problem, design.result.x
+        design, problem = answer.design, answer.design.problem
         basis, criterion = problem.basis, problem.demands.criterion
         if not isinstance(basis, PolynomialBasis) or criterion is None:
             raise ValueError("a factor of few columns is for a criterion and a polynomial spectrum")
-        columns = min(self.columns, basis.gram_order)
-        values, vectors = np.linalg.eigh(basis.matrix(x))
+        values, vectors = np.linalg.eigh(basis.matrix(design.result.x))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         functionals = zip(problem.limits, problem.limit_functionals, strict=True)
         maps = np.moveaxis(problem.information_map, 0, -1)
@@ -104,17 +98,15 @@ class FewColumns:
             criterion.letter,
             criterion.scaling,
         )
-        rng = np.random.default_rng(self.seed)
+        columns, rng = min(self.columns, basis.gram_order), np.random.default_rng(self.seed)
         found = hill_climb(quadratic, columns, starts=_STARTS, rng=rng, guesses=[root])
         S = found.factor @ found.factor.conj().T
-        climbed = hvec(S) if basis.hermitian else svec(S.real)
-        informations = problem.informations(climbed)
-        objective = 1.0 / criterion.level(informations[0])
-        result = replace(
-            design.result, x=climbed, informations=informations, objective=objective, s=objective
-        )
-        reached = [history[-1] for history in found.histories]
-        solver = replace(answer.solver, method="hill_climb", details={"starts": reached})
+        x = hvec(S) if basis.hermitian else svec(S.real)
+        informations = problem.informations(x)
+        level = 1.0 / criterion.level(informations[0])
+        result = replace(design.result, x=x, informations=informations, objective=level, s=level)
+        starts = {"starts": [history[-1] for history in found.histories]}
+        solver = replace(answer.solver, method="hill_climb", details=starts)
         return Answer(replace(design, result=result), "lower_bound", solver)
 
 
@@ -156,17 +148,16 @@ class Sought:
             InaccurateError: the proof did not close, or nothing that meets everything was found in time.
         """
         if self.exact is None:
-            return self._designed(request, self.question, Confidence(self.alpha, self.alpha))
-        return self.exact.designed(partial(self._designed, request), request)
+            return self._designed(self.question, Confidence(self.alpha, self.alpha))
+        return self.exact.designed(self._designed, request)
 
-    def _designed(self, request: RecordRequest, question: Question, confidence: Confidence) -> Designed:
+    def _designed(self, question: Question, confidence: Confidence) -> Designed:
         solve = partial(
-            partial(self._by_exchange, request) if self.grid is None else self.grid.design,
+            self._by_exchange if self.grid is None else self.grid.design,
             tolerance=self.tolerance,
             any_spectrum_tolerance=self.any_spectrum_tolerance,
         )
-        answer = solve(question)
-        plants, kept = self.plants, list(range(len(question.others)))
+        answer, plants, kept = solve(question), self.plants, list(range(len(question.others)))
         if plants is not None and plants.discard:
             kept = without_dearest(question, answer.design, plants.discard)
             question = replace(question, others=[question.others[number] for number in kept])
@@ -180,12 +171,7 @@ class Sought:
         return Designed(self.header, question, answer, experiment, self.cost, confidence, kept, plants)
 
     def _by_exchange(
-        self,
-        request: RecordRequest,
-        question: Question,
-        *,
-        tolerance: float,
-        any_spectrum_tolerance: float | None,
+        self, question: Question, *, tolerance: float, any_spectrum_tolerance: float | None
     ) -> Answer:
         ended = None
         try:
@@ -193,8 +179,7 @@ class Sought:
                 question, tolerance=tolerance, any_spectrum_tolerance=any_spectrum_tolerance
             )
         except UnreachableError as unreachable:
-            enough = partial(samples_of_record, request, question)
-            raise explain(self.header.units, question, unreachable, self.stated, enough) from unreachable
+            raise explain(self.header.units, question, unreachable, self.stated) from unreachable
         except UnfinishedDesignError as unfinished:
             if self.exact is not None:  # it need not keep the confidence that alpha is sought for
                 raise

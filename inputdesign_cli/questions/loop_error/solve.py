@@ -13,7 +13,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.findings.simulated_runs import unstable_runs
-from inputdesign_cli.identification.least_squares import is_arx
+from inputdesign_cli.identification.polynomial_rows import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.outcome import Signal, Simulation
 from inputdesign_cli.outcome.results import Results

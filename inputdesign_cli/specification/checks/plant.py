@@ -1,26 +1,23 @@
-"""Check that noise, spectrum, weights, true system and regression fit the plant, and that it is stable."""
+"""Check that the plant is stable, and that noise, spectrum, weights, loops and true system fit it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import cast
 
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.fields import check_no_growth
+from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.section import PathDiagnostic
-from inputdesign_cli.specification.models.shapes import check_each, check_per_output
 from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.transfer import check_each, check_per_output, size_of
 from inputdesign_cli.specification.models.wording import count
 
 
-def stable_unless_controlled(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A is stable in open loop, integrators aside; under a controller the loop must be (see `plant`)."""
-    yield from check_stable(spec, spec.plant, "plant")
-
-
 def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnostic]:
-    """A of the plant at `path` is stable unless a controller acts on it."""
+    """A of the plant at `path` is stable, integrators aside, unless a controller acts on it."""
     if spec.closed_loop or plant.kind != "polynomial":
         return
     for found in check_each(plant.A, check_no_growth, *path, "A"):
@@ -37,11 +34,6 @@ _WEIGHTS = (
 )
 SAMPLED = "add sample: zoh to the plant"
 """The hint for keys that a plant in s cannot have unless it is sampled."""
-
-
-def noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
-    """The noise has as many channels as the plant has outputs."""
-    yield from check_noise(spec, spec.noise, "noise")
 
 
 def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagnostic]:
@@ -135,13 +127,10 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
         hint = "describe the true system as the plant is described"
         yield PathDiagnostic("regression-mismatch", message, hint, path)
         return
-    if true.sampled and not plant.sampled:
-        message = "{key} is in discrete time, but the plant is not sampled"
-        hint = f"{SAMPLED} as well, or describe the true system in s without it"
-        yield PathDiagnostic("wrong-shape", message, hint, path)
-    if plant.sampled and not true.sampled:
-        message = "{key} is not sampled, but the plant is in discrete time"
-        yield PathDiagnostic("wrong-shape", message, "add sample: zoh to it", path)
+    if true.sampled != plant.sampled:
+        one, other = ("is", "is not") if true.sampled else ("is not", "is")
+        hint = f"write sample: zoh in {'both' if true.sampled else 'it, too'}, or in none of the two"
+        yield PathDiagnostic("wrong-shape", f"{{key}} {one} sampled, but the plant {other}", hint, path)
     if (true.inputs, true.outputs) != (plant.inputs, plant.outputs):
         message = (
             f"{{key}} has {count(true.inputs, 'input')} and {count(true.outputs, 'output')}, "
@@ -176,3 +165,84 @@ def regression_fits(spec: Spec) -> Iterator[PathDiagnostic]:
             message = f"{{key}} holds {count(len(given), 'weight')}, but {size} regressors are {name}"
             hint = "write one weight per regressor; plant.regression says how many there are"
             yield PathDiagnostic("wrong-shape", message, hint, (*path, name))
+
+
+_SENSITIVITY = ("accuracy", "model_error", "sensitivity")
+_LOOP = ("accuracy", "loop")
+
+
+def controllers_fit(spec: Spec) -> Iterator[PathDiagnostic]:
+    """Controllers work in discrete time, with a row per input and a column per output of the plant."""
+    for path in (("experiment", "controller"), (*_SENSITIVITY, "controller"), (*_LOOP, "controller")):
+        controller = cast(Controller | None, spec.at(*path))
+        if controller is not None and spec.plant.kind != "regression":
+            yield from _controller(spec.plant, controller, *path)
+    if spec.closed_loop and spec.plant.kind == "regression":
+        message, path = "{key} does not go with a regression", ("experiment", "controller")
+        yield PathDiagnostic("unsuitable-key", message, "remove the controller", path)
+
+
+def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
+    """A bound on a sensitivity needs a loop."""
+    tuned = spec.at(*_LOOP, "tuning") is not None
+    for path, where in ((_SENSITIVITY, "there"), (_LOOP, "or tuning: {simc: {}} there")):
+        stated, own = spec.at(*path), spec.at(*path, "controller")
+        if stated is not None and own is None and not spec.closed_loop and not (path == _LOOP and tuned):
+            message = "{key} needs a control loop, but there is no controller"
+            hint = f"add experiment.controller, or a controller {where} for the loop to be kept"
+            yield PathDiagnostic("needs-controller", message, hint, path)
+
+
+def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[PathDiagnostic]:
+    if not plant.sampled:
+        message = "{key} works in discrete time, but the plant is not sampled"
+        yield PathDiagnostic("unsuitable-key", message, SAMPLED, path)
+    channels = (plant.inputs, plant.outputs)
+    has = f"but the plant has {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
+    if controller.kind == "loops":
+        for n, one in enumerate(controller.loops):
+            ends = ("input", one.input, plant.inputs), ("output", one.output, plant.outputs)
+            for key, place, most in ends:
+                if place > most:
+                    message = f"{{key}} is {place}, {has}"
+                    hint = f"count them from 1 to {most}"
+                    yield PathDiagnostic("wrong-shape", message, hint, (*path, "loops", n, key))
+    elif controller.kind != "discrete_matrix":
+        if channels != (1, 1):
+            message = f"{{key}} is a single transfer function, {has}"
+            rows = "write loops: [{output: 1, input: 1, controller: {..}}, ..], or numerator as rows (inputs)"
+            hint = f"{rows} of columns (outputs) of coefficients, and denominator likewise or one for all"
+            yield PathDiagnostic("wrong-shape", message, hint, path)
+    elif channels == (1, 1):
+        message = "{key} is a matrix, but the plant has one input and one output"
+        hint = "write numerator: [..] and denominator: [..]"
+        yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
+    elif (shape := size_of(controller.numerator)) != channels:
+        message = f"{{key}} is {shape[0]} x {shape[1]}, {has}"
+        hint = "write a row for each input u and in it a column for each output y"
+        yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
+
+
+def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """The controller inverts the plant, so that plant and desired loop are square and of one size."""
+    error, plant = spec.accuracy.closed_loop_error, spec.plant
+    if error is None or plant.kind == "regression":
+        return
+    path = ("accuracy", "closed_loop_error", "control")
+    if plant.inputs != plant.outputs:
+        message = (
+            f"{{key}} designs a controller that inverts the plant, but the plant has "
+            f"{count(plant.outputs, 'output')} and {count(plant.inputs, 'input')}"
+        )
+        yield PathDiagnostic("not-square", message, "choose as many inputs as outputs", path)
+        return
+    target = error.control.model_reference
+    if target is None or target.kind == "discrete" or target.kind == "continuous":
+        return
+    matrix, step = (target, ()) if target.kind == "discrete_matrix" else (target.continuous, ("continuous",))
+    rows, columns = size_of(matrix.numerator)
+    if (rows, columns) != (plant.outputs, plant.outputs):
+        square = f"the loop from reference to output is square, {plant.outputs} x {plant.outputs}"
+        message = f"{{key}} is {rows} x {columns}: {square}"
+        hint = "write one transfer function t for t I, or a square matrix"
+        yield PathDiagnostic("not-square", message, hint, (*path, "model_reference", *step, "numerator"))

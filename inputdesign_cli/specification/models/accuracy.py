@@ -8,31 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.controller import Controller
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.experiment import check_names
-from inputdesign_cli.specification.models.fields import (
-    AtLeastTwo,
-    Band,
-    Count,
-    Denominator,
-    FileName,
-    Flag,
-    Fraction,
-    Frequencies,
-    Index,
-    Names,
-    NonNegative,
-    Numbers,
-    Numerator,
-    Positive,
-    SemidefiniteMatrix,
-    SymmetricMatrix,
-)
-from inputdesign_cli.specification.models.loop import ClosedLoopError, LoopMargin
+from inputdesign_cli.specification.models.loop import ClosedLoopError, Controller, LoopMargin
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Shorthand, Wording, optional
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
-from inputdesign_cli.specification.models.units import FRACTION
 
 DEFAULT_CONFIDENCE = 0.95
 # The least number of draws on the rarer side of a probability.
@@ -41,7 +22,7 @@ _PROBABILITY = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 _NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
 
 Deviations = Annotated[
-    Mapping[str, Positive],
+    Mapping[str, fields.Positive],
     Field(min_length=1),
     Wording("a mapping", "write parameter names and numbers: {b1: 0.01}"),
 ]
@@ -50,19 +31,18 @@ Deviations = Annotated[
 _NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_error")
 
 
-class Sensitivity(Section):
+class Sensitivity(Section, one_of=(("numerator", "max_db"),)):
     """An admissible error that keeps |W S| <= 1, or |S| below a peak, for the sensitivity S of a loop."""
 
-    numerator: Numerator | None = optional("Numerator of W in q^-1.")
-    denominator: Denominator | None = optional("Denominator of W (default 1), or its factors.")
-    max_db: Positive | None = optional("Largest |S| in dB; stands for a constant W.")
+    numerator: fields.Numerator | None = optional("Numerator of W in q^-1.")
+    denominator: fields.Denominator | None = optional("Denominator of W (default 1), or its factors.")
+    max_db: fields.Positive | None = optional("Largest |S| in dB; stands for a constant W.")
     controller: Controller | None = optional(
         "C of the loop to be kept (default: the controller of the experiment)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """W is given once, and whole."""
-        yield from self.exactly_one("numerator", "max_db")
+        """W is given as a whole."""
         if self.denominator is not None and self.numerator is None:
             message = "{key} stands without a numerator"
             yield PathDiagnostic("missing-key", message, 'add "numerator: [..]"', ("denominator",))
@@ -75,24 +55,25 @@ class Sensitivity(Section):
         return DiscreteTransfer(numerator=self.numerator, denominator=self.denominator or (1.0,))
 
 
-class Confidence(Section):
+class Confidence(Section, one_of=(("ellipsoid", "exact"),)):
     """The probability that fixes r_u: of an ellipsoid of parameters, or of the error itself."""
 
-    ellipsoid: Fraction | None = optional("Probability that fixes alpha by the chi-squared distribution.")
-    exact: Fraction | None = optional("Probability that |G(theta) - G| <= r_adm at all frequencies.")
-    draws: Annotated[Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
+    ellipsoid: fields.Fraction | None = optional(
+        "Probability that fixes alpha by the chi-squared distribution."
+    )
+    exact: fields.Fraction | None = optional("Probability that |G(theta) - G| <= r_adm at all frequencies.")
+    draws: Annotated[fields.Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
         default=4000,
         description="Estimates drawn by asymptotic theory that fix alpha for exact, and as many that check.",
     )
-    runs: Annotated[Index, SIZES["accuracy.model_error.confidence.runs"]] = Field(
+    runs: Annotated[fields.Index, SIZES["accuracy.model_error.confidence.runs"]] = Field(
         default=4000,
         description="Simulated experiments that correct alpha for records this short, and as many that check "
         "(0: none, asymptotic theory alone).",
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """One probability is given, with enough draws and runs to estimate it."""
-        yield from self.exactly_one("ellipsoid", "exact")
+        """There are enough draws and runs to estimate the probability."""
         rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
         least = math.ceil(_LEAST_TELLING / rare - 1e-9)
         for key, count, none in (("draws", self.draws, ""), ("runs", self.runs, ", or 0 for none")):
@@ -101,19 +82,21 @@ class Confidence(Section):
                 yield PathDiagnostic("out-of-range", message, f"write {least} or more{none}", (key,))
 
 
-class ModelError(Section):
+class ModelError(
+    Section, one_of=(("relative", "absolute", "table", "sensitivity"),), not_both=(("confidence", "alpha"),)
+):
     """r_u(w) <= r_adm(w) at every frequency of the band."""
 
-    relative: Annotated[Positive, FRACTION] | None = optional("r_adm = this fraction of |G|.")
-    absolute: Positive | None = optional("r_adm = this value at every frequency.")
-    table: FileName | None = optional("CSV file with columns frequency and r_adm.")
+    relative: fields.Positive | None = optional("r_adm = this fraction of |G|.")
+    absolute: fields.Positive | None = optional("r_adm = this value at every frequency.")
+    table: fields.FileName | None = optional("CSV file with columns frequency and r_adm.")
     sensitivity: Sensitivity | None = optional("r_adm from a bound on a sensitivity.")
     confidence: Annotated[Confidence, Shorthand("ellipsoid", _PROBABILITY)] | None = optional(
         "Probability that fixes alpha by the chi-squared distribution (default 0.95), or "
         "{exact: 0.95}: alpha calibrated by simulated estimates."
     )
-    alpha: Positive | None = optional("Size of the confidence region, in place of confidence.")
-    band: Band | None = optional("Frequencies [low, high] (default: all).")
+    alpha: fields.Positive | None = optional("Size of the confidence region, in place of confidence.")
+    band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
     weight: Transfer | None = optional("Weight on the model error (default 1).")
     norm: Literal["entry", "frobenius"] | None = optional(
         "Of several channels: entry, each entry of G for itself (default), or frobenius, the "
@@ -124,9 +107,7 @@ class ModelError(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """r_adm and the size of the confidence region are given once."""
-        yield from self.exactly_one("relative", "absolute", "table", "sensitivity")
-        yield from self.at_most_one("confidence", "alpha")
+        """Norm and region go with the bound and its probability."""
         if self.sensitivity is not None and self.norm == "entry":
             message = "{key} is entry, but a sensitivity depends on all entries of the error together"
             yield PathDiagnostic("conflicting-keys", message, "remove norm, or write frobenius", ("norm",))
@@ -154,8 +135,8 @@ class ModelError(Section):
 class InformationTarget(Section):
     """The information matrix must exceed this one."""
 
-    matrix: SymmetricMatrix = Field(description="Symmetric matrix, a row per parameter.")
-    parameters: Names | None = optional("Names that order its rows (default: of the model).")
+    matrix: fields.SymmetricMatrix = Field(description="Symmetric matrix, a row per parameter.")
+    parameters: fields.Names | None = optional("Names that order its rows (default: of the model).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row has a name."""
@@ -165,10 +146,14 @@ class InformationTarget(Section):
 class Application(Section):
     """Application-oriented accuracy: M >= (chi2 gamma / 2) V'', V the degradation of the application."""
 
-    parameters: Names = Field(description="Names of the parameters, in the order of the hessian's rows.")
-    hessian: SemidefiniteMatrix = Field(description="V'' of the application cost at the nominal parameters.")
-    gamma: Positive = Field(description="Accuracy: V may reach 1/gamma.")
-    confidence: Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
+    parameters: fields.Names = Field(
+        description="Names of the parameters, in the order of the hessian's rows."
+    )
+    hessian: fields.SemidefiniteMatrix = Field(
+        description="V'' of the application cost at the nominal parameters."
+    )
+    gamma: fields.Positive = Field(description="Accuracy: V may reach 1/gamma.")
+    confidence: fields.Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row has a name."""
@@ -179,9 +164,9 @@ class WeightedVariance(Section):
     """|W|^2 Lambda^* P Lambda <= max at every frequency of the band."""
 
     weight: Transfer | None = optional("The weight W (default 1).")
-    max: Positive = Field(description="Largest admissible weighted variance.")
-    band: Band | None = optional("Frequencies [low, high] (default: all).")
-    relative: Flag = Field(
+    max: fields.Positive = Field(description="Largest admissible weighted variance.")
+    band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
+    relative: fields.Flag = Field(
         default=False, description="Whether the variance is of G relative to its nominal value."
     )
 
@@ -189,47 +174,49 @@ class WeightedVariance(Section):
 class MeanSquaredError(Section):
     """Mean-squared error of an estimated quantity when some regressors are neglected."""
 
-    estimated: Numbers = Field(description="Weights of the estimated parameters in the quantity of interest.")
-    neglected: Numbers | None = optional("Weights of the neglected ones (default 0).")
+    estimated: fields.Numbers = Field(
+        description="Weights of the estimated parameters in the quantity of interest."
+    )
+    neglected: fields.Numbers | None = optional("Weights of the neglected ones (default 0).")
     neglected_norm: Annotated[
-        NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
+        fields.NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
     ] = Field(description="Bound on the norm of the neglected parameters.")
-    target: Annotated[Positive, Wording("a number", _NO_TARGET)] | None = optional(
+    target: Annotated[fields.Positive, Wording("a number", _NO_TARGET)] | None = optional(
         "Largest admissible error; absent: the least that limits.energy allows."
     )
 
 
-class FrequencyResponse(Section):
+class FrequencyResponse(Section, one_of=(("relative", "absolute", "table"), ("frequencies", "band"))):
     """The standard deviation of a nonparametric frequency response, line by line, for periodic excitation."""
 
-    relative: Annotated[Positive, FRACTION] | None = optional("r_adm = this fraction of |G|.")
-    absolute: Positive | None = optional("r_adm = this value at every line.")
-    table: FileName | None = optional("CSV file with columns frequency and r_adm.")
-    frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+    relative: fields.Positive | None = optional("r_adm = this fraction of |G|.")
+    absolute: fields.Positive | None = optional("r_adm = this value at every line.")
+    table: fields.FileName | None = optional("CSV file with columns frequency and r_adm.")
+    frequencies: Annotated[fields.Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "The lines, increasing; each moves to the nearest harmonic of the period."
     )
-    band: Band | None = optional("In place of frequencies: lines in [low, high], even in the logarithm.")
-    lines: Annotated[Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+    band: fields.Band | None = optional(
+        "In place of frequencies: lines in [low, high], even in the logarithm."
+    )
+    lines: Annotated[fields.Count, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "Number of lines in the band (default: every harmonic of the period)."
     )
-    period: Annotated[Count, SIZES["signal.samples"]] | None = optional(
+    period: Annotated[fields.Count, SIZES["signal.samples"]] | None = optional(
         "Samples of a period (default: the record in signal.periods equal ones, or in five)."
     )
-    transient: Annotated[Index, SIZES["signal.samples"]] = Field(
+    transient: Annotated[fields.Index, SIZES["signal.samples"]] = Field(
         default=1, description="Periods that are left to the transient and not counted (default 1)."
     )
-    detection: Annotated[AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = optional(
+    detection: Annotated[fields.AtLeastTwo, SIZES["accuracy.frequency_response.lines"]] | None = optional(
         "Only odd harmonics are excited, and in a band one of each group of this size is "
         "left out at random: power at the others shows nonlinearity."
     )
-    noise: FileName | None = optional(
+    noise: fields.FileName | None = optional(
         "CSV file with columns frequency and noise_spectrum (of explore) in place of the model."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """r_adm and the lines are given once."""
-        yield from self.exactly_one("relative", "absolute", "table")
-        yield from self.exactly_one("frequencies", "band")
+        """A number of lines has a band."""
         if self.lines is not None and self.band is None:
             message = "{key} is the number of lines in a band, and there is none"
             yield PathDiagnostic(
@@ -237,7 +224,7 @@ class FrequencyResponse(Section):
             )
 
 
-class Accuracy(Section):
+class Accuracy(Section, not_both=(("model_error", "loop"),)):
     """Requirements on the model; several may stand together. A criterion asks for the best instead."""
 
     model_error: ModelError | None = optional("Bound on the model error over frequency.")
@@ -264,10 +251,6 @@ class Accuracy(Section):
         "Error of the loop with the controller designed on the model."
     )
     mean_squared_error: MeanSquaredError | None = optional("Mean-squared error with neglected regressors.")
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """A loop is kept by a bound on the model error, so that only one of them is stated."""
-        yield from self.at_most_one("model_error", "loop")
 
     @property
     def error(self) -> ModelError | None:

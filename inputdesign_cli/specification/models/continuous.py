@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from inputdesign_cli.expressions import Expression, product_of
-from inputdesign_cli.specification.models.fields import (
-    ContinuousDenominator,
-    GainMatrix,
-    NonNegativeGrid,
-    NumberGrid,
-    PolynomialMatrix,
-    PositiveGrid,
-    check_no_growth_in_s,
-    depth,
-)
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTerms,
@@ -30,9 +20,13 @@ from inputdesign_cli.specification.models.named import (
     matrix,
 )
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
-from inputdesign_cli.specification.models.shapes import check_each, check_gain, check_shapes
-from inputdesign_cli.specification.models.transfer import TransferMatrix, check_each_proper
-from inputdesign_cli.specification.models.units import FREQUENCY, TIME
+from inputdesign_cli.specification.models.transfer import (
+    TransferMatrix,
+    check_each,
+    check_each_proper,
+    check_gain,
+    check_shapes,
+)
 from inputdesign_cli.specification.yaml.plain import Plain
 
 QUANTITIES = ("gain", "time_constant", "damping", "natural_frequency", "dead_time")
@@ -50,30 +44,29 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     common: ClassVar[bool] = False
     common_delay: ClassVar[bool] = False
 
-    gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = optional(
+    gain: Annotated[fields.NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
+    time_constant: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Time constant, in time_unit, of a plant of first order."
     )
-    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = optional(
+    damping: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Damping ratio of a plant of second order."
     )
-    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = optional(
+    natural_frequency: Annotated[fields.PositiveGrid, EXPRESSIONS] | None = optional(
         "Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = optional(
+    dead_time: Annotated[fields.NonNegativeGrid, EXPRESSIONS] | None = optional(
         "Dead time, in time_unit; 0 where there is none."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """It is of first or second order, and all quantities have the shape of the gain."""
-        if not self.stated("damping"):
-            yield from self.exactly_one("time_constant", "natural_frequency")
-        for one, other in (("damping", "natural_frequency"), ("natural_frequency", "damping")):
-            if self.stated(one) and not self.stated(other) and not self.stated("time_constant"):
-                message = f'{{key}} of second order needs "{other}"'
-                yield PathDiagnostic("missing-key", message, f"add {other}", keys=(other,))
-        if self.stated("time_constant") and self.stated("damping"):
-            yield from self.at_most_one("time_constant", "damping")
+        second = ("damping", "natural_frequency")
+        missing = tuple(key for key in second if not self.stated(key))
+        if missing and not self.stated("time_constant"):
+            message = "{key} needs time_constant, or damping and natural_frequency"
+            yield PathDiagnostic("missing-key", message, f"add {missing[0]}", keys=missing)
+        for key in second:
+            yield from self.at_most_one("time_constant", key)
         size = [len(row) for row in self.grid("gain")]
         for name in self.stated(*QUANTITIES):
             if [len(row) for row in self.grid(name)] != size or len(set(size)) > 1:
@@ -82,44 +75,41 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
 
     def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
         """Some gain is present."""
-        if not any(one.present for row in terms.numerator for entry in row for one in entry):
-            message = "{key} is zero: the input has no effect"
-            yield PathDiagnostic("zero-polynomial", message, "", ("continuous", "gain"))
+        yield from check_gain(terms.numerator, "continuous", "gain")
 
     def grid(self, name: str) -> Grid:
-        """Return a quantity as rows of columns."""
+        """Return a quantity as rows of columns; a dead time that is not stated is zero."""
         value = self.at(name)
+        if value is None:
+            return tuple(tuple(0.0 for _ in row) for row in self.grid("gain"))
         return value if isinstance(value, tuple) else ((float(str(value)),),)
 
     @property
-    def numerator_matrix(self) -> PolynomialMatrix:
+    def numerator_matrix(self) -> fields.PolynomialMatrix:
         """The numerators as rows of columns, descending in s."""
-        return self._numbers(0)
+        return self._numbers("numerator")
 
     @property
-    def denominator_matrix(self) -> PolynomialMatrix:
+    def denominator_matrix(self) -> fields.PolynomialMatrix:
         """The denominators in the same form."""
-        return self._numbers(1)
+        return self._numbers("denominator")
 
     @property
     def delays(self) -> Grid:
         """Dead times as rows of columns; 0 where there is none."""
-        if self.dead_time is None:
-            return tuple(tuple(0.0 for _ in row) for row in self.grid("gain"))
         return self.grid("dead_time")
 
     def own_parameters(self) -> tuple[NamedParameter, ...]:
         """Return the quantities, entry by entry, without entries of gain zero and dead times of zero."""
-        single = depth(self.gain) == 0
+        single = fields.depth(self.gain) == 0
         found = []
         for name in self.stated(*QUANTITIES):
-            for i, row in enumerate(self.grid(name)):
-                for j, value in enumerate(row):
-                    if self.grid("gain")[i][j] == 0.0 or (name == "dead_time" and value == 0.0):
-                        continue
-                    label = name if single else f"{name}[{i + 1},{j + 1}]"
-                    place = ("continuous", name) if single else ("continuous", name, i, j)
-                    found.append(NamedParameter(label, self._symbol(name, i, j), value, place))
+            for (i, j), value in np.ndenumerate(self.grid(name)):
+                if self.grid("gain")[i][j] == 0.0 or (name == "dead_time" and value == 0.0):
+                    continue
+                label = name if single else f"{name}[{i + 1},{j + 1}]"
+                place = ("continuous", name) if single else ("continuous", name, i, j)
+                found.append(NamedParameter(label, f"{name}_{i + 1}_{j + 1}", float(value), place))
         return tuple(found)
 
     def terms(self, written: Mapping[str, Plain] | None = None) -> CoefficientTerms:
@@ -130,53 +120,37 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         """
 
         def of(name: str, i: int, j: int) -> Expression:
+            if not self.stated(name) or (written is None and self.grid(name)[i][j] == 0.0):
+                return Expression("0.0")
             if written is None:
-                return Expression(self._symbol(name, i, j))
+                return Expression(f"{name}_{i + 1}_{j + 1}")
             value = written[name]
             return expressed(value[i][j] if isinstance(value, list | tuple) else value)
 
-        def there(name: str, i: int, j: int) -> bool:
-            if not self.stated(name):
-                return False
-            return self.grid(name)[i][j] != 0.0 if written is None else of(name, i, j).present
+        return self._composed(of)
 
-        none, entries = Expression("0.0"), self._entries(of)
-        above = (
-            tuple(entry[0] if there("gain", i, j) else (none,) for j, entry in enumerate(row))
-            for i, row in enumerate(entries)
+    def _composed(self, of: Callable[[str, int, int], Expression]) -> CoefficientTerms:
+        """The coefficients, descending in s, from an expression for each entry of each quantity."""
+        one, two, none = (Expression(number) for number in ("1.0", "2.0", "0.0"))
+
+        def entry(i: int, j: int) -> tuple[Terms, Terms, Expression]:
+            gain, delay = of("gain", i, j), of("dead_time", i, j)
+            if self.time_constant is not None:
+                return (gain,), (of("time_constant", i, j), one), delay
+            damping, w = of("damping", i, j), of("natural_frequency", i, j)
+            return (gain * (w * w) if gain.present else none,), (one, two * damping * w, w * w), delay
+
+        rows = [[entry(i, j) for j in range(len(row))] for i, row in enumerate(self.grid("gain"))]
+        above, below, delays = (tuple(tuple(one[k] for one in row) for row in rows) for k in range(3))
+        return CoefficientTerms(above, below, delays)
+
+    def _numbers(self, part: Literal["numerator", "denominator"]) -> fields.PolynomialMatrix:
+        """The numerators or the denominators at the values of the quantities."""
+        terms = self._composed(lambda name, i, j: Expression(repr(self.grid(name)[i][j])))
+        rows = getattr(terms, part)
+        return tuple(
+            tuple(tuple(one.at((), np.zeros(0))[0] for one in entry) for entry in row) for row in rows
         )
-        below = (tuple(entry[1] for entry in row) for row in entries)
-        delays = (
-            tuple(of("dead_time", i, j) if there("dead_time", i, j) else none for j in range(len(row)))
-            for i, row in enumerate(entries)
-        )
-        return CoefficientTerms(tuple(above), tuple(below), tuple(delays))
-
-    def _entries(self, of: Callable[[str, int, int], Expression]) -> list[list[tuple[Terms, Terms]]]:
-        return [[self._entry(of, i, j) for j in range(len(row))] for i, row in enumerate(self.grid("gain"))]
-
-    def _entry(self, of: Callable[[str, int, int], Expression], i: int, j: int) -> tuple[Terms, Terms]:
-        """Numerator and denominator of an entry, descending in s."""
-        one, two = Expression("1.0"), Expression("2.0")
-        if self.time_constant is not None:
-            return (of("gain", i, j),), (of("time_constant", i, j), one)
-        gain, damping, w = (of(name, i, j) for name in ("gain", "damping", "natural_frequency"))
-        return (gain * (w * w),), (one, two * damping * w, w * w)
-
-    def _numbers(self, part: int) -> PolynomialMatrix:
-        """The numerators (0) or the denominators (1) at the values of the quantities."""
-
-        def of(name: str, i: int, j: int) -> Expression:
-            return Expression(repr(self.grid(name)[i][j]))
-
-        def worth(terms: Terms) -> tuple[float, ...]:
-            return tuple(term.at((), np.zeros(0))[0] for term in terms)
-
-        return tuple(tuple(worth(entry[part]) for entry in row) for row in self._entries(of))
-
-    @staticmethod
-    def _symbol(name: str, i: int, j: int) -> str:
-        return f"{name}_{i + 1}_{j + 1}"
 
 
 class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matrix in s"):
@@ -184,20 +158,20 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
 
     kind: ClassVar[Literal["rational"]] = "rational"
 
-    numerator: Annotated[GainMatrix, EXPRESSIONS] = Field(
+    numerator: Annotated[fields.GainMatrix, EXPRESSIONS] = Field(
         description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
     )
-    denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
+    denominator: Annotated[fields.ContinuousDenominator, EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = optional(
+    delay: Annotated[fields.NonNegativeGrid, EXPRESSIONS] | None = optional(
         "Dead time in time_unit: a number, common to all entries, or rows of columns.", examples=[25]
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
         yield from check_shapes(self.numerator, self.denominator)
-        yield from check_each(self.denominator, check_no_growth_in_s, "denominator")
+        yield from check_each(self.denominator, fields.check_no_growth_in_s, "denominator")
         sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
         if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
@@ -205,16 +179,16 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
 
     def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
         """Some coefficient of the numerators is present, and every entry is proper."""
-        for found in (
-            *check_gain(terms.numerator, "numerator"),
-            *check_each_proper(terms.numerator, self.denominator_matrix, depth(self.numerator)),
-        ):
-            yield replace(found, path=("continuous", *found.path))
+        path = ("continuous", "numerator")
+        yield from check_gain(terms.numerator, *path)
+        yield from check_each_proper(
+            terms.numerator, self.denominator_matrix, fields.depth(self.numerator), *path
+        )
 
     @property
     def common(self) -> bool:
         """Whether all entries share one denominator."""
-        return depth(self.denominator) != 3
+        return fields.depth(self.denominator) != 3
 
     @property
     def common_delay(self) -> bool:
@@ -235,10 +209,10 @@ class DelayedMatrix(TransferMatrix, family="continuous", phrase="a transfer matr
         )
         rows = matrix(above)
         denominators: TermMatrix
-        if depth(below) == 3:
+        if fields.depth(below) == 3:
             denominators = matrix(below)
         else:
-            common = product_of(below if depth(below) == 2 else [below])
+            common = product_of(below if fields.depth(below) == 2 else [below])
             denominators = tuple(tuple(common for _ in row) for row in rows)
         delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
         return CoefficientTerms(rows, denominators, delays)

@@ -9,26 +9,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, Strict
 
-from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.specification.models.fields import (
-    Count,
-    CovarianceMatrix,
-    FileOr,
-    Flag,
-    MonicPerOutput,
-    Names,
-    NonNegative,
-    Number,
-    PerChannel,
-    Positive,
-    SemidefiniteMatrix,
-    Several,
-    StablePerOutput,
-    Time,
-    Variance,
-    check_delay_stable,
-    depth,
-)
+from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models.loop import Controller
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -39,23 +21,22 @@ from inputdesign_cli.specification.models.section import (
     optional,
     tag,
 )
-from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.units import FRACTION
+from inputdesign_cli.specification.models.transfer import with_paths
 from inputdesign_cli.specification.models.wording import count
 
 # This factor moves roots on the unit circle inside, whatever the rounding of decimals.
 _INSIDE = 1.0 - 1e-7
 
-InformationSource = FileOr[SemidefiniteMatrix]
+InformationSource = fields.FileOr[fields.SemidefiniteMatrix]
 
 Values = Annotated[
-    Mapping[str, Number],
+    Mapping[str, fields.Number],
     Field(min_length=1),
     Wording("a mapping", "write parameter names and values: {b1: 3.6, f1: -0.7}"),
 ]
 PriorParameters = Annotated[
-    Annotated[Values, tag("values")] | Annotated[Names, tag("names")],
+    Annotated[Values, tag("values")] | Annotated[fields.Names, tag("names")],
     by_tag(lambda value: "values" if isinstance(value, Mapping) else "names"),
 ]
 
@@ -63,16 +44,20 @@ PriorParameters = Annotated[
 class NoiseShape(Section):
     """The filter C(q)/D(q) that colours the noise; one polynomial, or one per output."""
 
-    C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
-    D: MonicPerOutput = Field(
+    C: fields.StablePerOutput = Field(
+        default=(1.0,), description="Monic, stable numerator in q^-1 (default 1)."
+    )
+    D: fields.MonicPerOutput = Field(
         default=(1.0,),
         description="Monic denominator in q^-1 (default 1), stable; on the unit circle where it is known.",
     )
-    drift: PerChannel[Flag] = Field(
+    drift: fields.PerChannel[fields.Flag] = Field(
         default=False, description="Whether the noise integrates as well; one for all outputs, or a list."
     )
-    variance: Variance | None = optional("Variance of e, or its covariance matrix.")
-    known: Names | None = optional("Names of coefficients of C and D that are known and not estimated.")
+    variance: fields.Variance | None = optional("Variance of e, or its covariance matrix.")
+    known: fields.Names | None = optional(
+        "Names of coefficients of C and D that are known and not estimated."
+    )
 
     def covariance(self, outputs: int) -> np.ndarray:
         """Return the covariance (outputs, outputs) of e; a number is a multiple of I, no variance is I."""
@@ -83,21 +68,19 @@ class NoiseShape(Section):
     @property
     def coefficients(self) -> tuple[str, ...]:
         """The names of the coefficients of C and D."""
-        return tuple(
-            f"{letter}{power}{'' if depth(rows) == 1 else f'[{place[0] + 1}]'}"
-            for letter, rows in (("c", self.C), ("d", self.D))
-            for place, polynomial in with_paths(rows)
-            for power in range(1, len(polynomial))
-        )
+        return tuple(name for letter in "CD" for names in self._named(letter) for name in names)
+
+    def _named(self, letter: str) -> list[tuple[str, ...]]:
+        """The names of the coefficients of each polynomial C, or D."""
+        return [
+            tuple(f"{letter.lower()}{k}{f'[{at[0] + 1}]' if at else ''}" for k in range(1, len(polynomial)))
+            for at, polynomial in with_paths(self.C if letter == "C" else self.D)
+        ]
 
     @property
     def held(self) -> tuple[bool, ...]:
         """Whether all coefficients are known, for each D."""
-        known, single = self.known or (), depth(self.D) == 1
-        return tuple(
-            len(p) > 1 and all(f"d{k}" + ("" if single else f"[{i + 1}]") in known for k in range(1, len(p)))
-            for i, (_, p) in enumerate(with_paths(self.D))
-        )
+        return tuple(bool(names) and set(names) <= set(self.known or ()) for names in self._named("D"))
 
     @property
     def drifts(self) -> tuple[bool, ...]:
@@ -108,7 +91,7 @@ class NoiseShape(Section):
         """D is stable where it is estimated, and does not grow where it is known."""
         for (place, polynomial), held in zip(with_paths(self.D), self.held, strict=True):
             shrunk = tuple(c * _INSIDE**k for k, c in enumerate(polynomial)) if held else polynomial
-            if found := check_delay_stable(shrunk):
+            if found := fields.check_delay_stable(shrunk):
                 instead = "; write drift: true, or list all its coefficients in noise.known"
                 yield replace(found, path=("D", *place), hint=found.hint + ("" if held else instead))
 
@@ -116,20 +99,17 @@ class NoiseShape(Section):
 class Noise(NoiseShape):
     """C(q)/D(q) e(t) with white e."""
 
-    variance: Variance = Field(description="Variance of e, or its covariance matrix (outputs x outputs).")
-
-
-class SimulationNoise(NoiseShape):
-    """The noise of a simulation: its variance, or its size relative to the outputs."""
-
-    relative_std: Annotated[Positive, FRACTION] | None = optional(
-        "Standard deviation as a fraction of the smallest output rms."
+    variance: fields.Variance = Field(
+        description="Variance of e, or its covariance matrix (outputs x outputs)."
     )
 
-    def check(self) -> Iterator[PathDiagnostic]:
-        """Its size is given once."""
-        yield from super().check()
-        yield from self.exactly_one("variance", "relative_std")
+
+class SimulationNoise(NoiseShape, one_of=(("variance", "relative_std"),)):
+    """The noise of a simulation: its variance, or its size relative to the outputs."""
+
+    relative_std: fields.Positive | None = optional(
+        "Standard deviation as a fraction of the smallest output rms."
+    )
 
 
 class Prior(Section):
@@ -149,8 +129,7 @@ class Prior(Section):
         if isinstance(self.information, tuple):
             yield from check_names(self.names, len(self.information), "information")
         elif self.parameters is not None:
-            of = "names its parameters itself" if self.names_a_model else "holds samples, not a matrix"
-            message = f"{{key}} stands beside {self.information}, which {of}"
+            message = f"{{key}} stands beside the file {self.information}, which has no rows to be named"
             hint = "remove it, or write the matrix under information in numbers"
             yield PathDiagnostic("conflicting-keys", message, hint, ("parameters",), at_key=True)
 
@@ -174,7 +153,7 @@ class Estimated(Section):
     """The estimate of plant and noise by identify, with its covariance; it changes no design."""
 
     parameters: Values = Field(description="The parameters and their values.")
-    covariance: CovarianceMatrix = Field(description="Their covariance, in the same order.")
+    covariance: fields.CovarianceMatrix = Field(description="Their covariance, in the same order.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row of the matrix has a name."""
@@ -184,8 +163,12 @@ class Estimated(Section):
 class Experiment(Section):
     """How the data will be collected."""
 
-    samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
-    duration: Time | None = optional("In place of samples: how long it lasts, in time_unit.", examples=[3600])
+    samples: fields.Count = Field(
+        default=1, description="Number of samples (default 1: criteria are per sample)."
+    )
+    duration: fields.Positive | None = optional(
+        "In place of samples: how long it lasts, in time_unit.", examples=[3600]
+    )
     controller: Controller | None = optional(
         "C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
         "closed loop. With several channels: loops, or numerator and denominator as rows of columns."
@@ -196,13 +179,13 @@ class Experiment(Section):
 class Cost(Section):
     """Weights of the powers that the design pays for; a number, or one per channel."""
 
-    input_power: PerChannel[NonNegative] = Field(
+    input_power: fields.PerChannel[fields.NonNegative] = Field(
         default=0.0, description="Weight of the power of u that r causes."
     )
-    output_power: PerChannel[NonNegative] = Field(
+    output_power: fields.PerChannel[fields.NonNegative] = Field(
         default=0.0, description="Weight of the power of y that r causes."
     )
-    excitation_power: PerChannel[NonNegative] = Field(
+    excitation_power: fields.PerChannel[fields.NonNegative] = Field(
         default=0.0, description="Weight of the power of r itself."
     )
 
@@ -217,23 +200,18 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
     """Parameter names are distinct, and there is one for each row of the matrix."""
     if names is None:
         return
-    repeated = sorted({n for n in names if names.count(n) > 1})
-    if repeated:
-        message = f"{{key}} names {repeated[0]} more than once"
-        yield PathDiagnostic("wrong-shape", message, path=("parameters",))
+    for repeated in sorted({n for n in names if names.count(n) > 1})[:1]:
+        yield PathDiagnostic("wrong-shape", f"{{key}} names {repeated} more than once", path=("parameters",))
     if len(names) != size:
         message = f"{{key}} holds {count(len(names), 'name')}, but {matrix_key} is {size} x {size}"
         hint = "write one name per row, in the order of the rows"
         yield PathDiagnostic("wrong-shape", message, hint, ("parameters",))
 
 
-_LONGEST = 40
-
-
 def _one_line(text: str) -> str:
     """A text that may stand in the header of a table."""
-    if any(c in '",;\t\r\n' for c in text) or len(text) > _LONGEST:
-        message = f"{{key}} must be one line of at most {_LONGEST} characters without commas and quotes"
+    if any(c in '",;\t\r\n' for c in text) or len(text) > 40:
+        message = "{key} must be one line of at most 40 characters without commas and quotes"
         raise fail("bad-name", message, "shorten it: it stands in headers of tables")
     return text
 
@@ -253,23 +231,23 @@ class Channel(Section):
 Channels = Mapping[str, Channel]
 
 
-Samples = Annotated[Count, SIZES["signal.samples"]]
+Samples = Annotated[fields.Count, SIZES["signal.samples"]]
 
 
 class Pilot(Section):
     """The first part, while little is known of the plant."""
 
     samples: Samples = Field(description="Its length.")
-    power: Positive | None = optional(
+    power: fields.Positive | None = optional(
         "Power of white noise in place of the first plan, for a plant of which next to nothing is known."
     )
 
 
-class Campaign(Section):
+class Campaign(Section, not_both=(("stages", "block"), ("stages", "pilot"))):
     """An experiment in parts, planned anew after each of them until the data say stop."""
 
     block: Samples | None = optional("Samples of each part (default: a tenth of the experiment).")
-    stages: Annotated[Several[Samples], SIZES["campaign.stages"]] | None = optional(
+    stages: Annotated[fields.Several[Samples], SIZES["campaign.stages"]] | None = optional(
         "In place of block: the samples of the parts, one by one."
     )
     pilot: (
@@ -281,7 +259,7 @@ class Campaign(Section):
     max_samples: Samples | None = optional(
         "Where the experiment ends at the latest (default: three times its samples)."
     )
-    power_cap: Positive | None = optional(
+    power_cap: fields.Positive | None = optional(
         "Largest cost of a sample, relative to the first plan; a plan beyond it is made longer, "
         "a part weaker (default: 10)."
     )
@@ -294,8 +272,3 @@ class Campaign(Section):
         default="data",
         description="data: as soon as the data meet the accuracy (default); never: at experiment.samples.",
     )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """The parts are stated once."""
-        yield from self.at_most_one("stages", "block")
-        yield from self.at_most_one("stages", "pilot")

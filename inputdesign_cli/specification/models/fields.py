@@ -15,7 +15,6 @@ from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 
 from inputdesign_cli.specification.models.section import PathDiagnostic, Wording, by_tag, carry, fail, tag
 from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
-from inputdesign_cli.specification.models.units import FRACTION, FREQUENCY, SIGNAL, TIME
 from inputdesign_cli.specification.models.wording import show
 
 Polynomial = tuple[float, ...]
@@ -78,18 +77,10 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
         where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
         place = f"radius {where} at {abs(float(np.angle(worst))):.4g} rad/sample"
         message = f"{{key}} has a root of {place}; all roots (in z) must lie inside the unit circle"
-        hint = "check the signs, and that the coefficients ascend in q^-1 and begin with 1"
-        return PathDiagnostic("unstable-polynomial", message, hint + _decimal_comma(polynomial))
+        hint = "check the signs, decimal points for commas, and that the coefficients ascend in q^-1"
+        return PathDiagnostic("unstable-polynomial", message, hint)
 
     return _check_roots(polynomial, np.abs, refuse)
-
-
-def _decimal_comma(polynomial: Polynomial) -> str:
-    """Return the hint on 0,7 in place of 0.7, for whole numbers with a zero before another."""
-    whole = all(float(c).is_integer() for c in polynomial)
-    if whole and 0.0 in polynomial[1:-1]:
-        return "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
-    return ""
 
 
 def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:
@@ -282,11 +273,8 @@ Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0), QUANTITY]
 NonNegative = Annotated[float, Strict(), AllowInfNan(False), Field(ge=0), QUANTITY]
 Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
-Time = Annotated[Positive, TIME]
-Level = Annotated[Cap, SIGNAL]
-"""A bound on samples of a signal, in its unit."""
-Fraction = Annotated[Number, Field(ge=1e-9, lt=1), FRACTION]  # a smaller probability is no requirement
-Tolerance = Annotated[Number, Field(gt=0, lt=1e-2), FRACTION]
+Fraction = Annotated[Number, Field(ge=1e-9, lt=1)]  # a smaller probability is no requirement
+Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]
 Count = Annotated[int, Strict(), Field(ge=1, le=2**53), _WHOLE]
 AtLeastTwo = Annotated[int, Strict(), Field(ge=2, le=2**53), _WHOLE]
 Index = Annotated[int, Strict(), Field(ge=0, le=2**53), _WHOLE]
@@ -316,12 +304,8 @@ Numbers = Annotated[Several[Number], Wording("a list of numbers")]
 Names = Annotated[Several[Name], Wording("a list of parameter names")]
 PerChannel = Annotated[Annotated[T, tag("one")] | Annotated[Several[T], tag("list")], _LIST_OR_NOT]
 """One value, or a list with one per channel."""
-Band = Annotated[
-    tuple[NonNegative, NonNegative], BeforeValidator(two_frequencies), AfterValidator(ascending), FREQUENCY
-]
-Frequencies = Annotated[
-    Several[NonNegative], AfterValidator(rising), Wording("a list of frequencies"), FREQUENCY
-]
+Band = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(two_frequencies), AfterValidator(ascending)]
+Frequencies = Annotated[Several[NonNegative], AfterValidator(rising), Wording("a list of frequencies")]
 Harmonics = Annotated[
     Annotated[Count, tag("count")]
     | Annotated[Literal["odd"], Wording("odd", "write odd, a number of harmonics, or a list"), tag("word")]

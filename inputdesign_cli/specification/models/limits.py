@@ -8,16 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import (
-    Band,
-    Cap,
-    Count,
-    FileName,
-    Level,
-    NonNegative,
-    PerChannel,
-    Time,
-)
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -27,21 +18,21 @@ from inputdesign_cli.specification.models.section import (
     tag,
 )
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
-from inputdesign_cli.specification.models.units import MOVE
 from inputdesign_cli.specification.yaml.plain import Plain
 
 _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 
 
-class PowerLimit(Section):
+class PowerLimit(Section, some_of=(("max", "min"),)):
     """Bounds on a power: of the sum over the channels, or with a list of each channel."""
 
-    max: PerChannel[Cap] | None = optional("Largest power; a number or one per channel.")
-    min: PerChannel[NonNegative] | None = optional("Smallest power; a number or one per channel.")
+    max: fields.PerChannel[fields.Cap] | None = optional("Largest power; a number or one per channel.")
+    min: fields.PerChannel[fields.NonNegative] | None = optional(
+        "Smallest power; a number or one per channel."
+    )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A bound is given, and the lower one is below the upper one."""
-        yield from _some(self, "max", "min", "{max: 1}")
+        """The lower bound is below the upper one."""
         if self.max is not None and self.min is not None and np.shape(self.max) == np.shape(self.min):
             yield from _ordered(bool(np.any(np.array(self.min) > np.array(self.max))))
 
@@ -51,7 +42,7 @@ class TableFile(Section, family="curve", phrase="table"):
 
     kind: ClassVar[Literal["table"]] = "table"
 
-    table: FileName = Field(description="CSV file with frequency and value.")
+    table: fields.FileName = Field(description="CSV file with frequency and value.")
 
 
 def _kind(value: dict[str, Plain]) -> str:
@@ -60,23 +51,22 @@ def _kind(value: dict[str, Plain]) -> str:
 
 _PICK = pick(_kind, plain="number")
 Curve = Annotated[
-    Annotated[NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
+    Annotated[fields.NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
 ]
 UpperCurve = Annotated[
-    Annotated[Cap, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
+    Annotated[fields.Cap, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer, _PICK
 ]
 """A level, a tabulated curve, or |numerator/denominator|^2."""
 
 
-class SpectrumLimit(Section):
+class SpectrumLimit(Section, some_of=(("max", "min"),)):
     """Bounds on the spectrum of the excitation at every frequency."""
 
     max: UpperCurve | None = optional("Largest density: a number, {table: file}, or a filter W for |W|^2.")
     min: Curve | None = optional("Smallest density, in the same forms.")
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A bound is given, and the lower one is below the upper one."""
-        yield from _some(self, "max", "min", "{max: 1}")
+        """The lower bound is below the upper one."""
         if isinstance(self.max, float) and isinstance(self.min, float):
             yield from _ordered(self.max < self.min)
 
@@ -84,17 +74,13 @@ class SpectrumLimit(Section):
 Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 
 
-class AmplitudeLimit(Section):
+class AmplitudeLimit(Section, some_of=(("input", "output"),)):
     """Bounds on single samples, about the operating point and without noise."""
 
-    input: PerChannel[Level] | None = optional("Largest |u|; a number or one per input.")
-    output: PerChannel[Level] | None = optional(
+    input: fields.PerChannel[fields.Cap] | None = optional("Largest |u|; a number or one per input.")
+    output: fields.PerChannel[fields.Cap] | None = optional(
         "Largest |y| of the simulated output; a number or one per output."
     )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """A bound is given."""
-        yield from _some(self, "input", "output", "{input: 1, output: 2}")
 
 
 class Limits(Section):
@@ -103,16 +89,16 @@ class Limits(Section):
     input_power: Power | None = optional("Power of u that r causes: number, list, {min, max}.")
     output_power: Power | None = optional("Power of y that r causes: number, list, {min, max}.")
     excitation_power: Power | None = optional("Power of r: number, list, {min, max}.")
-    samples: Count | None = optional("Largest number of samples.")
-    duration: Time | None = optional("In place of samples: the longest experiment, in time_unit.")
+    samples: fields.Count | None = optional("Largest number of samples.")
+    duration: fields.Positive | None = optional("In place of samples: the longest experiment, in time_unit.")
     amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = optional(
         "Largest |u|: a number or one per input; or {input, output}."
     )
-    rate: PerChannel[Annotated[Level, MOVE]] | None = optional(
+    rate: fields.PerChannel[fields.Cap] | None = optional(
         "Largest change of u from one sample to the next; a number or one per input."
     )
-    energy: Cap | None = optional("Power summed over the samples (trace R).")
-    band: Band | None = optional("The excitation vanishes outside these frequencies.")
+    energy: fields.Cap | None = optional("Power summed over the samples (trace R).")
+    band: fields.Band | None = optional("The excitation vanishes outside these frequencies.")
     spectrum: Annotated[SpectrumLimit, Shorthand("max", {"type": "number", "exclusiveMinimum": 0})] | None = (
         optional("Bounds on the density at every frequency: a number, or {max, min}.")
     )
@@ -124,12 +110,6 @@ class Limits(Section):
         return bool(self.stated("amplitude", "energy")) or any(
             p is not None and p.max is not None for p in powers
         )
-
-
-def _some(limit: Section, first: str, second: str, example: str) -> Iterator[PathDiagnostic]:
-    if not limit.stated(first, second):
-        message, hint = f"{{key}} needs {first} or {second}", f"write a number, or {example}"
-        yield PathDiagnostic("missing-key", message, hint, keys=(first, second))
 
 
 def _ordered(crossed: bool) -> Iterator[PathDiagnostic]:

@@ -1,17 +1,135 @@
-"""`accuracy.loop:` and `accuracy.closed_loop_error:`, the control loops that the model is for."""
+"""`controller:` in its forms, and the loops of `accuracy.loop:` and `accuracy.closed_loop_error:`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.controller import Controller, Rule
-from inputdesign_cli.specification.models.fields import Band, Fraction, PerChannel, Positive, Time
-from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional
-from inputdesign_cli.specification.models.transfer import Target, Transfer, check_stable
+from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
+from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.transfer import (
+    ContinuousRatio,
+    DiscreteMatrix,
+    DiscreteTransfer,
+    Target,
+    Transfer,
+    check_stable,
+)
+
+Rule = Literal["tustin", "backward", "zoh"]
+_RULE = "How s becomes q^-1: tustin (trapezoids), backward (backward differences) or zoh (a hold on y)."
+_Delay = Annotated[fields.Index, SIZES["controller.delay"]]
+_Channel = Annotated[fields.Count, SIZES["inputs or outputs"]]
+_DELAY = "Samples that computing takes: u(t) answers y(t - delay)."
+
+
+class Pid(Section):
+    """Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)), times in time_unit."""
+
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {"Ki": "write Ti: Kp / Ki", "Kd": "write Td: Kd / Kp"}
+
+    Kp: fields.Number = Field(
+        description="Gain; negative where more input means less output.", examples=[2.0]
+    )
+    Ti: fields.Positive | None = optional("Integral time; absent: no integral action.")
+    Td: fields.NonNegative = Field(default=0.0, description="Derivative time (default 0).")
+    Tf: fields.NonNegative | None = optional(
+        "Time constant of the filter of the derivative (default Td / 10)."
+    )
+    sample: Rule = Field(default="tustin", description=_RULE)
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Its gain is not zero, and the rule of sampling admits its derivative."""
+        if self.Kp == 0.0:
+            message = "{key} is zero: the controller does nothing"
+            yield PathDiagnostic("out-of-range", message, "remove the controller", ("Kp",))
+        if self.Td > 0.0 and self.Tf == 0.0 and self.sample != "backward":
+            message = f"{{key}} is zero, and {self.sample} has no derivative without a filter"
+            hint = "write Tf: a tenth of Td, or sample: backward"
+            yield PathDiagnostic("improper-transfer", message, hint, ("Tf",))
+
+    @property
+    def filter_time(self) -> float:
+        """Tf, by default Td / 10."""
+        return self.Td / 10.0 if self.Tf is None else self.Tf
+
+
+class PidController(Section, family="controller", phrase="a PID controller"):
+    """A PID controller, run by a computer."""
+
+    kind: ClassVar[Literal["pid"]] = "pid"
+
+    pid: Pid = Field(description="Gain and times.", examples=[{"Kp": 2, "Ti": 180}])
+    delay: _Delay = Field(default=0, description=_DELAY)
+
+
+class ContinuousController(Section, family="controller", phrase="a controller in s"):
+    """A transfer function in s, run by a computer."""
+
+    kind: ClassVar[Literal["continuous"]] = "continuous"
+
+    continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
+    sample: Rule = Field(description=_RULE)
+    delay: _Delay = Field(default=0, description=_DELAY)
+
+
+_WORDING = Wording(
+    "a mapping of keys",
+    "write {numerator: [..], denominator: [..]} in q^-1, {pid: {Kp: 2, Ti: 180}} or {continuous: .., "
+    "sample: tustin}; with several channels {loops: [..]}, or rows of columns in q^-1",
+)
+
+
+def _single(value: dict[str, object]) -> str:
+    if "pid" in value:
+        return PidController.phrase
+    return (ContinuousController if "continuous" in value else DiscreteTransfer).phrase
+
+
+SingleController = Annotated[DiscreteTransfer | PidController | ContinuousController, pick(_single), _WORDING]
+"""From one output to one input."""
+
+
+class SingleLoop(Section):
+    """The controller between an output and an input, counted from one."""
+
+    output: _Channel = Field(description="The output that it reads: 1 for y1.")
+    input: _Channel = Field(description="The input that it drives: 1 for u1.")
+    controller: SingleController = Field(description="From this output to this input.")
+
+
+class LoopsController(Section, family="controller", phrase="a list of single loops"):
+    """Controllers loop by loop; what is not listed is zero."""
+
+    kind: ClassVar[Literal["loops"]] = "loops"
+
+    loops: fields.Several[SingleLoop] = Field(description="One controller for each loop.")
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """No loop is listed twice."""
+        places = [(one.output, one.input) for one in self.loops]
+        for n, place in enumerate(places):
+            if place in places[:n]:
+                message = f"{{key}} is that of y{place[0]} and u{place[1]}, as one before"
+                yield PathDiagnostic("conflicting-keys", message, "put the two into one", ("loops", n))
+
+
+def _kind(value: dict[str, object]) -> str:
+    if "loops" in value:
+        return LoopsController.phrase
+    return DiscreteMatrix.phrase if fields.depth(value.get("numerator")) > 1 else _single(value)
+
+
+Controller = Annotated[
+    DiscreteTransfer | DiscreteMatrix | PidController | ContinuousController | LoopsController,
+    pick(_kind),
+    _WORDING,
+]
+"""C of a loop u = r - C y: from outputs (columns) to inputs (rows)."""
 
 
 class Control(Section):
@@ -37,7 +155,9 @@ class Control(Section):
 class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
-    variance: PerChannel[Positive] = Field(default=1.0, description="Variance; a number or one per output.")
+    variance: fields.PerChannel[fields.Positive] = Field(
+        default=1.0, description="Variance; a number or one per output."
+    )
     filter: Transfer | None = optional("Filter that colours it (default 1).")
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -66,7 +186,9 @@ MOST_DECIBELS = 100.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: Time | None = optional("Time constant of the closed loop, in time_unit (default: the dead time).")
+    tau_c: fields.Positive | None = optional(
+        "Time constant of the closed loop, in time_unit (default: the dead time)."
+    )
 
 
 class Amigo(Section):
@@ -75,29 +197,31 @@ class Amigo(Section):
     type: Literal["pi", "pid"] = Field(default="pi", description="With or without derivative action.")
 
 
-class Tuning(Section):
+class Tuning(Section, one_of=(("simc", "amigo"),)):
     """How the controller follows from gain, time constant and dead time of the nominal plant."""
 
     simc: Simc | None = optional("{tau_c: 25}, or {} for the dead time.")
     amigo: Amigo | None = optional("{type: pi} or {type: pid}.")
     sample: Rule = Field(default="tustin", description="How s becomes q^-1 (default tustin).")
 
-    def check(self) -> Iterator[PathDiagnostic]:
-        """There is one rule."""
-        yield from self.exactly_one("simc", "amigo")
-
 
 _Peak = Annotated[
-    Positive, Field(le=MOST_DECIBELS), Wording("a number", "beyond it no margin is left; write 6, say")
+    fields.Positive, Field(le=MOST_DECIBELS), Wording("a number", "beyond it no margin is left; write 6, say")
 ]
 # A phase margin of 60 degrees takes a peak of |S| of one, and every peak is above.
 _Degrees = Annotated[
-    Positive, Field(lt=60.0), Wording("a number", "write degrees between 0 and 60: 45, for example")
+    fields.Positive, Field(lt=60.0), Wording("a number", "write degrees between 0 and 60: 45, for example")
 ]
-_Factor = Annotated[Positive, Field(gt=1.0), Wording("a number", "write a factor above 1: 2, for example")]
+_Factor = Annotated[
+    fields.Positive, Field(gt=1.0), Wording("a number", "write a factor above 1: 2, for example")
+]
 
 
-class LoopMargin(Section):
+class LoopMargin(
+    Section,
+    one_of=(("max_sensitivity_db", "phase_margin", "gain_margin"),),
+    not_both=(("controller", "tuning"),),
+):
     """For every plant within r_u the loop is stable, with |S| below a peak at every frequency."""
 
     controller: Controller | None = optional("C of the loop (default: the controller of the experiment).")
@@ -109,13 +233,10 @@ class LoopMargin(Section):
     gain_margin: _Factor | None = optional(
         "Least gain margin, a factor above 1, kept by the peak of |S| for it."
     )
-    confidence: Fraction | None = optional("Probability that fixes alpha by chi-squared (default 0.95).")
-    band: Band | None = optional("Frequencies [low, high] (default: all).")
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """There are one margin and one controller."""
-        yield from self.exactly_one("max_sensitivity_db", "phase_margin", "gain_margin")
-        yield from self.at_most_one("controller", "tuning")
+    confidence: fields.Fraction | None = optional(
+        "Probability that fixes alpha by chi-squared (default 0.95)."
+    )
+    band: fields.Band | None = optional("Frequencies [low, high] (default: all).")
 
     @property
     def peak(self) -> float:

@@ -116,7 +116,7 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
         expression = Expression.of(value)
     except ExpressionError as error:
         message = f"{{key}} {error.message}: {clip(value)}"
-        hint = without_unit(value, None, None) or error.hint
+        hint = without_unit(value, None) or error.hint
         found.append(PathDiagnostic("bad-expression", message, hint, path))
         return 1.0
     unknown = sorted(expression.names - parameters.keys())

@@ -9,24 +9,8 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from inputdesign_cli.expressions import Expression
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.continuous import Continuous
-from inputdesign_cli.specification.models.fields import (
-    Count,
-    GainMatrix,
-    Index,
-    Matrix,
-    MonicPerOutput,
-    Names,
-    NonNegative,
-    Number,
-    Numbers,
-    PolynomialMatrix,
-    Several,
-    StableMatrix,
-    depth,
-    nested,
-    same_columns,
-)
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTerms,
@@ -49,15 +33,14 @@ from inputdesign_cli.specification.models.section import (
     optional,
     pick,
 )
-from inputdesign_cli.specification.models.shapes import (
+from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.transfer import (
     as_matrix,
     check_gain,
     check_per_output,
     shape_words,
     size_of,
 )
-from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
@@ -66,21 +49,23 @@ class NamedPlant(Section):
 
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ()
 
-    parameters: Annotated[Mapping[str, Number], SIZES["plant.parameters"]] | None = Field(
+    parameters: Annotated[Mapping[str, fields.Number], SIZES["plant.parameters"]] | None = Field(
         default=None,
         min_length=1,
         description="Named parameters and their values. Coefficients may then be expressions in them, and "
         "these alone are estimated.",
         examples=[{"K": 2.1, "T": 180}],
     )
-    known: Names | None = optional("Names of parameters that are known and not estimated.", examples=[["b1"]])
+    known: fields.Names | None = optional(
+        "Names of parameters that are known and not estimated.", examples=[["b1"]]
+    )
 
     _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="wrap")
     @classmethod
-    def _worth(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Validate the values of the expressions, and keep the section as it was written."""
+    def _checked(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Validate the values of the expressions, keep the section as it was written, and check both."""
         if not isinstance(data, dict):
             return handler(data)
         numbers = dict(data)
@@ -97,13 +82,9 @@ class NamedPlant(Section):
                 raise carry(*found)
         made = handler(numbers)
         made._written = dict(data)
-        if wrong := tuple(made.check_written()):
+        if wrong := tuple(made.check()):
             raise carry(*wrong)
         return made
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """Return what is wrong with the coefficients, whatever the values of the parameters."""
-        return iter(())
 
     @property
     def written(self) -> dict[str, Plain]:
@@ -132,12 +113,12 @@ class NamedPlant(Section):
         return tuple(NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
 
 
-_Row = Annotated[Several[Number], SIZES["states"]]
+_Row = Annotated[fields.Several[fields.Number], SIZES["states"]]
 Rows = Annotated[
-    Several[_Row],
+    fields.Several[_Row],
     SIZES["states"],
-    nested(2, "a matrix", "write rows: [[0, 1], [0, -2]]"),
-    AfterValidator(same_columns),
+    fields.nested(2, "a matrix", "write rows: [[0, 1], [0, -2]]"),
+    AfterValidator(fields.same_columns),
     Wording("a matrix", "write rows: [[0, 1], [0, -2]]"),
     EXPRESSIONS,
 ]
@@ -158,7 +139,7 @@ class StateSpace(Section):
         "Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
         "noise is added to the outputs)."
     )
-    delay: Annotated[NonNegative, EXPRESSIONS, TIME] = Field(
+    delay: Annotated[fields.NonNegative, EXPRESSIONS] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
     )
     time: Literal["continuous", "discrete"] = Field(
@@ -169,7 +150,7 @@ class StateSpace(Section):
     def check(self) -> Iterator[PathDiagnostic]:
         """The matrices fit each other."""
         n, r, p = len(self.A), len(self.B[0]), len(self.C)
-        sizes: tuple[tuple[str, Matrix | None, tuple[int, int], str], ...] = (
+        sizes: tuple[tuple[str, fields.Matrix | None, tuple[int, int], str], ...] = (
             ("A", self.A, (n, n), "states by states"),
             ("B", self.B, (n, r), "states by inputs"),
             ("C", self.C, (p, n), "outputs by states"),
@@ -193,26 +174,25 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         "the leading zeros of B are the delay: B: [0, 0, 0, 1] is one of three samples",
     )
 
-    A: Annotated[MonicPerOutput, EXPRESSIONS] = Field(
+    A: Annotated[fields.MonicPerOutput, EXPRESSIONS] = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."
     )
-    B: Annotated[GainMatrix, EXPRESSIONS] = Field(
+    B: Annotated[fields.GainMatrix, EXPRESSIONS] = Field(
         description="Leading zeros are the delay. MIMO: rows (outputs) of columns (inputs) of polynomials.",
         examples=[[0, 3.6]],
     )
-    F: Annotated[StableMatrix, EXPRESSIONS] | None = optional(
+    F: Annotated[fields.StableMatrix, EXPRESSIONS] | None = optional(
         "Monic and stable, in the shape of B (default 1)."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """A and F have the shape of B."""
+        """A and F have the shape of B, of which some coefficient is present."""
         yield from check_per_output(self.A, self.outputs, "A")
-        if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
+        if self.F is not None and (
+            fields.depth(self.F) != fields.depth(self.B) or size_of(self.F) != size_of(self.B)
+        ):
             message = "{key} must have the shape of B: " + shape_words(self.B)
             yield PathDiagnostic("wrong-shape", message, "write [1] where an entry has no poles", ("F",))
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """Some coefficient of B is present."""
         yield from check_gain(matrix(expressed(self.written["B"])), "B")
 
     @property
@@ -231,16 +211,16 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         """A, B or F of an entry as expressions in the named parameters."""
         written = expressed(self.written[letter.upper()])
         if letter == "a":
-            return written[output] if depth(written) == 2 else written
+            return written[output] if fields.depth(written) == 2 else written
         return matrix(written)[output][input]
 
     @property
-    def B_matrix(self) -> PolynomialMatrix:  # noqa: N802 (the paper's symbol)
+    def B_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (the paper's symbol)
         """B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
         return as_matrix(self.B)
 
     @property
-    def F_matrix(self) -> PolynomialMatrix:  # noqa: N802 (likewise)
+    def F_matrix(self) -> fields.PolynomialMatrix:  # noqa: N802 (likewise)
         """F in the same form; absent polynomials are 1."""
         ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
         return ones if self.F is None else as_matrix(self.F)
@@ -276,7 +256,7 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
             return self.continuous.own_parameters()
         return super().named_parameters
 
-    def check_written(self) -> Iterator[PathDiagnostic]:
+    def check(self) -> Iterator[PathDiagnostic]:
         """Some coefficient of a numerator is present, and every entry is proper."""
         yield from self.continuous.check_present(self.stated_terms)
 
@@ -306,7 +286,7 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Some parameter is named, and matrices in continuous time are sampled."""
+        """Some parameter is named, and sampling and dead time are those of the time of the matrices."""
         if self.parameters is None:
             message = "{key} needs parameters: numbers in its matrices are not estimated"
             hint = "write parameters: {k: 2.0}, and k in the matrices"
@@ -318,18 +298,15 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         elif not continuous and self.sample is not None:
             message = "{key} is for matrices in continuous time, and time is discrete here"
             yield PathDiagnostic("unsuitable-key", message, "remove it", ("sample",), at_key=True)
+        if not continuous and self.term("delay", 0, 0).present:
+            message = "{key} is in continuous time, but time is discrete here"
+            path = ("state_space", "delay")
+            yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
 
     @property
     def shape(self) -> tuple[int, int]:
         """The numbers of outputs and inputs."""
         return len(self.state_space.C), len(self.state_space.B[0])
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """Matrices in discrete time have no dead time, whatever its value."""
-        if self.state_space.time == "discrete" and self.term("delay", 0, 0).present:
-            message = "{key} is in continuous time, but time is discrete here"
-            path = ("state_space", "delay")
-            yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
 
     def term(self, letter: str, row: int, column: int) -> Expression:
         """An entry of a matrix, or the dead time, as an expression in the named parameters."""
@@ -341,10 +318,10 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
 class RegressionSize(Section):
     """The numbers of regressors."""
 
-    estimated: Annotated[Count, SIZES["plant.regression"]] = Field(
+    estimated: Annotated[fields.Count, SIZES["plant.regression"]] = Field(
         description="How many regressors the model has."
     )
-    neglected: Annotated[Index, SIZES["plant.regression"]] = Field(
+    neglected: Annotated[fields.Index, SIZES["plant.regression"]] = Field(
         default=0, description="How many regressors act on the output but are not modelled."
     )
 
@@ -369,7 +346,9 @@ class TrueParameters(Section, family="plant", phrase="a list of true parameters"
 
     kind: ClassVar[Literal["parameters"]] = "parameters"
 
-    parameters: Numbers = Field(description="True values of all regression parameters, estimated ones first.")
+    parameters: fields.Numbers = Field(
+        description="True values of all regression parameters, estimated ones first."
+    )
 
 
 _FORMS = Wording(

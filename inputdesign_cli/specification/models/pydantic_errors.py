@@ -7,7 +7,7 @@ import types
 import typing
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from typing import Annotated, Any, Union
 
 import yaml
@@ -22,7 +22,7 @@ from inputdesign_cli.specification.models.section import (
     Section,
     Wording,
 )
-from inputdesign_cli.specification.models.units import Measure, without_unit
+from inputdesign_cli.specification.models.units import SECONDS, without_unit
 from inputdesign_cli.specification.models.wording import choices, describe, nearest, show, unknown_word
 from inputdesign_cli.specification.yaml.places import Path, format_key
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -31,14 +31,10 @@ from inputdesign_cli.specification.yaml.scalars import clip, why_not_number
 
 @dataclass(frozen=True)
 class Declared:
-    """A type without its annotations, and the annotations; the outermost one stands last.
-
-    `measure` is the unit of numbers inside: the innermost annotation within its section.
-    """
+    """A type without its annotations, and the annotations; the outermost one stands last."""
 
     type: Any
     metadata: tuple[object, ...] = ()
-    measure: Measure | None = None
 
     @property
     def wording(self) -> Wording:
@@ -65,17 +61,14 @@ class Declared:
     def at(self, step: str | int) -> Declared:
         """The type one step down: at a key, at an index, or behind the tag of an alternative."""
         if isinstance(step, str) and step.startswith(TAG):
-            return self.alternatives.get(step, _UNKNOWN)
+            return self.alternatives.get(step, Declared(object))
         if self.section is not None:
             field = self.section.model_fields.get(str(step))
-            return declared(field.annotation, tuple(field.metadata)) if field else _UNKNOWN
+            return declared(field.annotation, tuple(field.metadata)) if field else Declared(object)
         parts = typing.get_args(self.type)
         if isinstance(step, int) and len(parts) > step and ... not in parts:
             return declared(parts[step])
-        return declared(parts[-1 if isinstance(step, str) else 0]) if parts else _UNKNOWN
-
-
-_UNKNOWN = Declared(object)
+        return declared(parts[-1 if isinstance(step, str) else 0]) if parts else Declared(object)
 
 
 def declared(annotation: Any, metadata: tuple[object, ...] = ()) -> Declared:
@@ -92,12 +85,7 @@ def declared(annotation: Any, metadata: tuple[object, ...] = ()) -> Declared:
 
 def declared_at(root: type[Section], location: Sequence[str | int]) -> Declared:
     """Return the type at the location of a pydantic error, tags included."""
-    found = Declared(root)
-    for step in location:
-        inner = found.at(step)
-        own = next((m for m in reversed(inner.metadata) if isinstance(m, Measure)), None)
-        found = replace(inner, measure=own or (None if inner.section else found.measure))
-    return found
+    return reduce(Declared.at, location, Declared(root))
 
 
 def sections_in(annotation: Any) -> set[type[Section]]:
@@ -181,8 +169,8 @@ def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> li
         return [_unknown_type(path, types, error["input"])]
     code, message, hint = _wrong_value(kind, error["input"], context, declared)
     if kind in ("float_type", "int_type") and isinstance(error["input"], str):
-        known = time_unit if isinstance(time_unit, str) else None
-        hint = without_unit(error["input"], declared.measure, known) or hint
+        unit = "s" if path[0] == "solver" else time_unit
+        hint = without_unit(error["input"], unit if unit in SECONDS else None) or hint
     return [PathDiagnostic(code, message, hint, path)]
 
 
@@ -268,21 +256,16 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
         hint = f'"{key}" belongs to {choices(list(dict.fromkeys(others)))}; remove it, or change to that'
         return PathDiagnostic("unsuitable-key", message, hint, path, at_key=True)
     near, homes = nearest(key, known), _homes(root).get(key, [])
-    inside = [f"under {name}" for name in known if model and key in _keys_below(model, name)]
+    homes = [home for home in homes if home.startswith(f"under {owner}.")] or homes
     hint = f"the keys of {owner} are {', '.join(known)}" if known else "remove it"
     if model is not None and key in model.ELSEWHERE:
         hint = model.ELSEWHERE[key]
-    elif inside or (0 < len(homes) <= 3 and not (near and near.lower() == key.lower())):
-        hint = f"{key} belongs {choices(inside or homes)}"
+    elif 0 < len(homes) <= 3 and not (near and near.lower() == key.lower()):
+        hint = f"{key} belongs {choices(homes)}"
     elif near:
         hint = f'did you mean "{near}"?'
     message = f"{clip(key)} is not a key of {owner}"
     return PathDiagnostic("unknown-key", message, hint, path, at_key=True, meant=near or "")
-
-
-def _keys_below(model: type[Section], name: str) -> set[str]:
-    """The keys of the sections at a key."""
-    return {key for part in sections_in(model.model_fields[name].annotation) for key in part.model_fields}
 
 
 @cache

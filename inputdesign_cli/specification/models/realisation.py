@@ -8,50 +8,36 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from inputdesign_cli.plugins import names
+from inputdesign_cli.plugins import names, own
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.experiment import SimulationNoise
-from inputdesign_cli.specification.models.fields import (
-    Count,
-    Flag,
-    Harmonics,
-    Index,
-    Name,
-    Number,
-    PerChannel,
-    Positive,
-    RegisterLength,
-    Several,
-    Tolerance,
-)
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, fail, optional
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
+from inputdesign_cli.specification.models.wording import unknown_word
 
-Samples = Annotated[Count, SIZES["signal.samples"]]
+Samples = Annotated[fields.Count, SIZES["signal.samples"]]
 _GROUP = "idesign.signals"
 
 
-class _Added:
-    """Lets names of kinds that other packages add stand in a spec and its schema as well."""
+class _Registered:
+    """Admits the names of a group of `plugins`, as text and in the schema."""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        def known(value: object, inner: core_schema.ValidatorFunctionWrapHandler) -> object:
-            return value if isinstance(value, str) and value in names(_GROUP) else inner(value)
+        def known(value: str) -> str:
+            if value not in (words := [*own(_GROUP), *sorted(names(_GROUP))]):
+                raise fail("unknown-word", *unknown_word(value, words))
+            return value
 
-        return core_schema.no_info_wrap_validator_function(known, handler(source))
+        return core_schema.no_info_before_validator_function(known, handler(source))
 
     def __get_pydantic_json_schema__(
         self, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, object]:
-        found = handler(core)
-        return {**found, "enum": [*found["enum"], *sorted(names(_GROUP))]}
+        return {**handler(core), "enum": [*own(_GROUP), *sorted(names(_GROUP))]}
 
 
-SignalType = Annotated[
-    Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white", "chirp", "steps"],
-    _Added(),
-]
+SignalType = Annotated[str, _Registered()]
 
 # Settings that mean something for some types of signal only.
 _ONLY_FOR = {
@@ -66,8 +52,8 @@ _ONLY_FOR = {
 class Quantisation(Section):
     """The digital-to-analogue converter that applies the signal."""
 
-    bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
-    range: PerChannel[Annotated[Positive, SIGNAL]] = Field(
+    bits: fields.RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
+    range: fields.PerChannel[fields.Positive] = Field(
         description="They span [-range, range), in the unit of u, the offset included; a number or one per "
         "input.",
         examples=[10.0],
@@ -79,31 +65,33 @@ class Signal(Section):
 
     type: SignalType | None = optional("Kind of signal (default: what suits the spectrum).")
     samples: Samples | None = optional("Length (default: experiment.samples).")
-    seed: Index | None = optional("Seed of the random numbers.")
+    seed: fields.Index | None = optional("Seed of the random numbers.")
     phases: Literal["random", "schroeder", "optimised"] | None = optional(
         "Phases of a multisine; optimised: for a low crest factor."
     )
     periods: Samples | None = optional("Number of equal periods.")
     hold: Samples | None = optional("Samples for which each value is held.")
-    lines: Annotated[Harmonics, SIZES["signal.lines"]] | None = optional(
+    lines: Annotated[fields.Harmonics, SIZES["signal.lines"]] | None = optional(
         "Harmonics of a period that are used: their number, odd, or a list."
     )
-    amplitudes: PerChannel[Annotated[Positive, SIGNAL]] | None = optional(
+    amplitudes: fields.PerChannel[fields.Positive] | None = optional(
         "Amplitude (level) to scale to, whatever it buys; a number or one per input."
     )
-    offset: PerChannel[Annotated[Number, SIGNAL]] | None = optional(
+    offset: fields.PerChannel[fields.Number] | None = optional(
         "Operating point added; a number or one per input."
     )
-    ramp: Annotated[Index, SIZES["signal.samples"]] | None = optional(
+    ramp: Annotated[fields.Index, SIZES["signal.samples"]] | None = optional(
         "Samples over which the signal fades in and out."
     )
-    order: Annotated[Count, SIZES["signal.order"]] | None = optional(
+    order: Annotated[fields.Count, SIZES["signal.order"]] | None = optional(
         "States for each input of a rational filter for filtered_noise (default: a long filter)."
     )
     start: Literal["steady", "zero"] | None = optional(
         "Past of a regression's input: its periodic continuation (default), or zero."
     )
-    bits: RegisterLength | None = optional("Length of the shift register of a prbs (default: no repetition).")
+    bits: fields.RegisterLength | None = optional(
+        "Length of the shift register of a prbs (default: no repetition)."
+    )
     quantisation: Quantisation | None = optional("The converter: {bits, range}.")
     scale: Literal["target", "design"] | None = optional(
         "target: the least power with which the record itself meets the accuracy (default); "
@@ -112,7 +100,7 @@ class Signal(Section):
     also: tuple[Literal["mat", "npz", "h", "wav"], ...] | None = optional(
         "Other files of the signal beside signal.csv: mat (MATLAB), npz (numpy), h (C), wav."
     )
-    candidates: Annotated[Count, SIZES["signal.candidates"]] | None = optional(
+    candidates: Annotated[fields.Count, SIZES["signal.candidates"]] | None = optional(
         "Number of random realisations to choose the best of."
     )
 
@@ -133,19 +121,19 @@ class Solver(Section):
         default="exchange",
         description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
     )
-    tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
-    any_spectrum: Flag = Field(
+    tolerance: fields.Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
+    any_spectrum: fields.Flag = Field(
         default=True,
         description="Whether to bound what other spectra reach (default true; may take as long again).",
     )
-    any_spectrum_tolerance: Tolerance = Field(
+    any_spectrum_tolerance: fields.Tolerance = Field(
         default=1e-4,
         description="Relative gap of the bound over every spectrum (default 1e-4; no less than tolerance).",
     )
-    time_limit: Annotated[Positive, SECONDS_ONLY] = Field(
+    time_limit: fields.Positive = Field(
         default=600.0, description="Seconds that a design may take (default 600)."
     )
-    grid: Annotated[Count, SIZES["solver.grid"]] = Field(
+    grid: Annotated[fields.Count, SIZES["solver.grid"]] = Field(
         default=1000, description="Number of frequencies of the lmi method (default 1000)."
     )
     positivity: Literal["kyp", "gram"] = Field(default="gram", description="Positivity in the lmi method.")
@@ -154,10 +142,10 @@ class Solver(Section):
 class Simulation(Section):
     """The Monte Carlo study on the true system."""
 
-    runs: Annotated[Count, SIZES["simulation.runs"]] = Field(
+    runs: Annotated[fields.Count, SIZES["simulation.runs"]] = Field(
         default=100, description="Number of runs (default 100)."
     )
-    seed: Index = Field(default=0, description="Seed of the random numbers (default 0).")
+    seed: fields.Index = Field(default=0, description="Seed of the random numbers (default 0).")
     plant: TruePlant | None = optional("The true system (default: the nominal plant).")
     noise: SimulationNoise | None = optional("The true noise (default: the nominal noise).")
     excitation: Literal["new", "record"] = Field(
@@ -178,13 +166,15 @@ def _pair(value: object) -> object:
     return value
 
 
-Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of two parameter names")]
+Pair = Annotated[
+    tuple[fields.Name, fields.Name], BeforeValidator(_pair), Wording("a list of two parameter names")
+]
 
 
 class Report(Section):
     """The contents of the figures."""
 
-    ellipses: Annotated[Several[Pair], SIZES["report.ellipses"]] | None = optional(
+    ellipses: Annotated[fields.Several[Pair], SIZES["report.ellipses"]] | None = optional(
         "Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
         "the most correlated ones; with one: none)."
     )

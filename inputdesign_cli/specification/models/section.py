@@ -80,6 +80,7 @@ class Wording:
     hint: str = ""
 
 
+_Keys = tuple[str, ...]
 TAG = "\x00"
 """Marks the tags that pydantic puts into the path of an error inside a union; they are not keys."""
 
@@ -92,18 +93,29 @@ class Section(BaseModel):
 
     A subclass that is one of several alternatives names its `family` as a class argument and calls itself
     by a `phrase` in diagnostics ("type: fir"); the phrase is its tag in the union of the alternatives.
+    Further class arguments are groups of keys: exactly one, one or more, at most one of each is given.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     phrase: ClassVar[str] = ""
     family: ClassVar[str] = ""
+    groups: ClassVar[tuple[tuple[_Keys, ...], ...]] = ((), (), ())
 
-    def __init_subclass__(cls, family: str = "", phrase: str = "", **kwargs: Plain) -> None:
+    def __init_subclass__(
+        cls,
+        family: str = "",
+        phrase: str = "",
+        one_of: tuple[_Keys, ...] = (),
+        some_of: tuple[_Keys, ...] = (),
+        not_both: tuple[_Keys, ...] = (),
+        **kwargs: Plain,
+    ) -> None:
         super().__init_subclass__(**kwargs)
         if family:
             cls.family, cls.phrase = family, phrase
             FAMILIES.setdefault(family, []).append(cls)
+        cls.groups = (one_of, some_of, not_both)
 
     @classmethod
     def __get_pydantic_core_schema__(
@@ -133,10 +145,14 @@ class Section(BaseModel):
 
     def exactly_one(self, *keys: str) -> Iterator[PathDiagnostic]:
         """Exactly one of the keys is given."""
+        yield from self.at_least_one(*keys)
+        yield from self.at_most_one(*keys)
+
+    def at_least_one(self, *keys: str) -> Iterator[PathDiagnostic]:
+        """One or more of the keys are given."""
         if not self.stated(*keys):
             needs = f"{{key}} needs one of {choices(keys)}"
             yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
-        yield from self.at_most_one(*keys)
 
     def at_most_one(self, *keys: str) -> Iterator[PathDiagnostic]:
         """No two of the keys are given."""
@@ -147,7 +163,12 @@ class Section(BaseModel):
 
     @model_validator(mode="after")
     def _checked(self) -> Self:
-        if found := tuple(self.check()):
+        found = [*self.check()]
+        for rule, groups in zip(
+            (self.exactly_one, self.at_least_one, self.at_most_one), self.groups, strict=True
+        ):
+            found += [one for keys in groups for one in rule(*keys)]
+        if found:
             raise carry(*found)
         return self
 

@@ -21,7 +21,7 @@ from inputdesign_cli.specification.models.experiment import (
     Experiment,
     Noise,
 )
-from inputdesign_cli.specification.models.fields import Text, Time
+from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.realisation import Report, Signal, Simulation, Solver
@@ -61,7 +61,7 @@ class Spec(Section):
     """
 
     title: Text = Field(default="", description="What this experiment is about.")
-    sample_time: Time = Field(default=1.0, description="Sampling interval in time_unit (default 1).")
+    sample_time: Positive = Field(default=1.0, description="Sampling interval in time_unit (default 1).")
     time_unit: Literal["s", "ms", "us", "min", "h", "d"] = Field(
         default="s", description="Unit of time; frequencies are in rad per this unit (default s)."
     )

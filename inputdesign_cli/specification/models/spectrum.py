@@ -7,18 +7,7 @@ from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import (
-    Band,
-    Count,
-    FileName,
-    Frequencies,
-    Index,
-    Number,
-    PerChannel,
-    Positive,
-    Several,
-    depth,
-)
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -47,25 +36,23 @@ class FirSpectrum(Section, family="spectrum", phrase="type: fir"):
     """The spectrum of filtered white noise: autocovariances c_0..c_m."""
 
     type: Literal["fir"] = Field(description="A trigonometric polynomial.")
-    order: Annotated[Index, SIZES["spectrum.order of fir"]] = Field(
+    order: Annotated[fields.Index, SIZES["spectrum.order of fir"]] = Field(
         default=20, description="m: the last designed autocovariance (default 20)."
     )
 
 
-class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
+class MultisineSpectrum(
+    Section, family="spectrum", phrase="type: multisine", one_of=(("lines", "frequencies"),)
+):
     """Lines, either evenly spaced or at given frequencies."""
 
     type: Literal["multisine"] = Field(description="Sinusoids.")
-    lines: Annotated[Count, SIZES["spectrum.lines"]] | None = optional(
+    lines: Annotated[fields.Count, SIZES["spectrum.lines"]] | None = optional(
         "Number of evenly spaced candidate frequencies."
     )
-    frequencies: Annotated[Frequencies, SIZES["spectrum.frequencies"]] | None = optional(
+    frequencies: Annotated[fields.Frequencies, SIZES["spectrum.frequencies"]] | None = optional(
         "The candidate frequencies, increasing."
     )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """The lines are given once."""
-        yield from self.exactly_one("lines", "frequencies")
 
 
 class FreeSpectrum(Section, family="spectrum", phrase="type: free"):
@@ -81,14 +68,14 @@ class PolynomialSpectrum(Section, family="spectrum", phrase="type: polynomial"):
     basis: Literal["legendre", "chebyshev", "monomial"] = Field(
         default="chebyshev", description="Basis of the polynomial (default chebyshev)."
     )
-    order: Annotated[Index, SIZES["spectrum.order of polynomial"]] = Field(
+    order: Annotated[fields.Index, SIZES["spectrum.order of polynomial"]] = Field(
         description="Degree of the polynomial factor."
     )
-    band: Band = Field(description="The band [low, high] outside of which the spectrum vanishes.")
+    band: fields.Band = Field(description="The band [low, high] outside of which the spectrum vanishes.")
     coefficients: Literal["real", "complex"] = Field(
         default="real", description="Kind of coefficients (default real)."
     )
-    factor_columns: Annotated[Count, SIZES["spectrum.factor_columns"]] | None = optional(
+    factor_columns: Annotated[fields.Count, SIZES["spectrum.factor_columns"]] | None = optional(
         "Columns of the spectral factor: the rank of the spectrum (default: full)."
     )
 
@@ -97,7 +84,7 @@ class PointwiseSpectrum(Section, family="spectrum", phrase="type: pointwise"):
     """A spectrum designed frequency by frequency."""
 
     type: Literal["pointwise"] = Field(description="Frequency by frequency.")
-    grid: Annotated[Count, SIZES["spectrum.grid"]] = Field(
+    grid: Annotated[fields.Count, SIZES["spectrum.grid"]] = Field(
         default=512, description="Number of frequencies (default 512)."
     )
 
@@ -115,13 +102,13 @@ class GivenWhite(Section, family="given", phrase="type: white"):
     """White noise of a given power."""
 
     type: Literal["white"] = Field(description="White noise.")
-    power: PerChannel[Positive] = Field(description="Its power; a number or one per channel.")
+    power: fields.PerChannel[fields.Positive] = Field(description="Its power; a number or one per channel.")
 
 
 Amplitudes = Annotated[
-    Annotated[Several[Number], Wording("a list of amplitudes, one per frequency"), tag("1")]
-    | Annotated[Several[Several[Number]], tag("2")],
-    by_tag(lambda value: str(depth(value))),
+    Annotated[fields.Several[fields.Number], Wording("a list of amplitudes, one per frequency"), tag("1")]
+    | Annotated[fields.Several[fields.Several[fields.Number]], tag("2")],
+    by_tag(lambda value: str(fields.depth(value))),
     Wording("a list of amplitudes, one per frequency, or one such list per input"),
 ]
 
@@ -130,7 +117,7 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
     """A sum of sinusoids."""
 
     type: Literal["multisine"] = Field(description="A sum of sinusoids.")
-    frequencies: Annotated[Frequencies, SIZES["spectrum.given.frequencies"]] = Field(
+    frequencies: Annotated[fields.Frequencies, SIZES["spectrum.given.frequencies"]] = Field(
         description="Their frequencies, increasing."
     )
     amplitudes: Amplitudes = Field(
@@ -140,14 +127,14 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
     @property
     def rows(self) -> tuple[tuple[float, ...], ...]:
         """The amplitudes of each input; with several inputs a single list holds for all of them."""
-        listed = self.amplitudes if depth(self.amplitudes) == 2 else (self.amplitudes,)
+        listed = self.amplitudes if fields.depth(self.amplitudes) == 2 else (self.amplitudes,)
         return cast(tuple[tuple[float, ...], ...], listed)
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every frequency has an amplitude."""
         wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
         if wrong is not None:
-            held, lists = count(len(wrong), "amplitude"), depth(self.amplitudes) == 2
+            held, lists = count(len(wrong), "amplitude"), fields.depth(self.amplitudes) == 2
             message = f"{{key}} holds {held}, and the number of frequencies is {len(self.frequencies)}"
             hint = f"write one {'list per input, with one ' if lists else ''}amplitude per frequency"
             yield PathDiagnostic("wrong-shape", message, hint, ("amplitudes",))
@@ -157,7 +144,7 @@ class GivenTable(Section, family="given", phrase="type: table"):
     """A spectrum read from a file."""
 
     type: Literal["table"] = Field(description="A tabulated spectrum.")
-    file: FileName = Field(description="CSV file with frequency and spectrum.")
+    file: fields.FileName = Field(description="CSV file with frequency and spectrum.")
 
 
 class GivenSignal(Section, family="given", phrase="signal"):
@@ -165,7 +152,7 @@ class GivenSignal(Section, family="given", phrase="signal"):
 
     type: ClassVar[Literal["signal"]] = "signal"
 
-    signal: FileName = Field(description="CSV file with the samples of the signal.")
+    signal: fields.FileName = Field(description="CSV file with the samples of the signal.")
 
 
 Given = Annotated[

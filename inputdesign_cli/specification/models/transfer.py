@@ -2,55 +2,114 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import (
-    ContinuousDenominator,
-    Denominator,
-    GainMatrix,
-    Numerator,
-    Polynomial,
-    PolynomialList,
-    PolynomialMatrix,
-    RowsMatrix,
-    check_delay_stable,
-    check_left_half_plane,
-    depth,
-    product,
-)
-from inputdesign_cli.specification.models.named import TermMatrix, expressed
+from inputdesign_cli.specification.models import fields
+from inputdesign_cli.specification.models.named import TermMatrix, Terms, expressed, leading
 from inputdesign_cli.specification.models.section import PathDiagnostic, Section, Wording, optional, pick
-from inputdesign_cli.specification.models.shapes import (
-    as_matrix,
-    check_each,
-    check_gain,
-    check_proper,
-    check_shapes,
-    denominators_of,
-)
+from inputdesign_cli.specification.models.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
+
+
+def as_matrix(value: tuple) -> fields.PolynomialMatrix:
+    """Return one polynomial as a 1 x 1 matrix, and a matrix unchanged."""
+    return value if fields.depth(value) == 3 else ((value,),)
+
+
+def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
+    """Denominators for each entry have the shape of the numerator."""
+    if fields.depth(denominator) == 3 and size_of(denominator) != size_of(as_matrix(numerator)):
+        message = "{key} must have the shape of the numerator: " + shape_words(numerator)
+        hint = "or write one polynomial, a denominator common to all entries"
+        yield PathDiagnostic("wrong-shape", message, hint, ("denominator",))
+
+
+def check_each(
+    value: tuple, check: Callable[[fields.Polynomial], PathDiagnostic | None], *path: str
+) -> Iterator[PathDiagnostic]:
+    """Yield the diagnostics of a check of each polynomial of the value at `path`."""
+    for indices, polynomial in with_paths(value):
+        if found := check(polynomial):
+            yield replace(found, path=(*path, *indices))
+
+
+def denominators_of(numerator: tuple, denominator: tuple) -> fields.PolynomialMatrix:
+    """Return denominators as rows of columns, common ones repeated and factors multiplied out."""
+    if fields.depth(denominator) == 3:
+        return as_matrix(denominator)
+    common = fields.product(factor for _, factor in with_paths(denominator))
+    return tuple(tuple(common for _ in row) for row in as_matrix(numerator))
+
+
+def with_paths(value: tuple) -> list[tuple[tuple[int, ...], fields.Polynomial]]:
+    """Return every polynomial of a nested value with its indices."""
+    if fields.depth(value) == 1:
+        return [((), value)]
+    return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
+
+
+def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDiagnostic]:
+    """A list of polynomials at `path` has one for each output."""
+    if fields.depth(value) == 2 and len(value) != outputs:
+        message = f"{{key}} holds {count(len(value), 'polynomial')} for {count(outputs, 'output')}"
+        hint = "write one polynomial for all outputs, or a list with one per output"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
+
+
+def check_gain(entries: TermMatrix, *path: str) -> Iterator[PathDiagnostic]:
+    """Some coefficient at `path` is present."""
+    if not any(one.present for row in entries for p in row for one in p):
+        message = "all coefficients of {key} are zero: the input has no effect"
+        yield PathDiagnostic("zero-polynomial", message, path=path)
+
+
+def size_of(value: tuple) -> tuple[int, int]:
+    """Return the numbers of rows and columns."""
+    entries = as_matrix(value)
+    return len(entries), len(entries[0])
+
+
+def shape_words(value: tuple) -> str:
+    """Return the shape in words."""
+    if fields.depth(value) == 1:
+        return "one list of coefficients"
+    rows, columns = size_of(value)
+    return f"{rows} x {columns} lists of coefficients"
+
+
+def check_proper(numerator: Terms, degree: int, *path: str | int) -> Iterator[PathDiagnostic]:
+    """In s, descending: the degree of the numerator is at most that of the denominator, `degree`."""
+    above = len(numerator) - leading(numerator) - 1
+    if above > degree:
+        message = f"{{key}} has degree {above} in s, more than its denominator ({degree}): it is not proper"
+        hint = "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other"
+        yield PathDiagnostic("improper-transfer", message, hint, path)
 
 
 class Ratio(Section):
     """numerator / denominator, in s or in q^-1."""
 
-    numerator: Numerator = Field(description="Coefficients of the numerator.")
-    denominator: Denominator = Field(
+    numerator: fields.Numerator = Field(description="Coefficients of the numerator.")
+    denominator: fields.Denominator = Field(
         default=(1.0,), description="Coefficients of the denominator, or a list of factors (default 1)."
     )
 
     @property
-    def denominator_factors(self) -> tuple[Polynomial, ...]:
+    def denominator_factors(self) -> tuple[fields.Polynomial, ...]:
         """The factors of the denominator as written."""
-        return cast(PolynomialList, self.denominator if depth(self.denominator) == 2 else (self.denominator,))
+        return cast(
+            fields.PolynomialList,
+            self.denominator if fields.depth(self.denominator) == 2 else (self.denominator,),
+        )
 
     @property
-    def denominator_polynomial(self) -> Polynomial:
+    def denominator_polynomial(self) -> fields.Polynomial:
         """The product of the factors."""
-        return product(self.denominator_factors)
+        return fields.product(self.denominator_factors)
 
 
 class DiscreteTransfer(Ratio, family="transfer", phrase="a transfer function in q^-1"):
@@ -79,8 +138,10 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 class TransferMatrix(Section):
     """numerator / denominator entry by entry, in s or in q^-1."""
 
-    numerator: GainMatrix = Field(description="Coefficients; a matrix is rows (outputs) of columns (inputs).")
-    denominator: ContinuousDenominator = Field(
+    numerator: fields.GainMatrix = Field(
+        description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
+    )
+    denominator: fields.ContinuousDenominator = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
 
@@ -90,12 +151,12 @@ class TransferMatrix(Section):
         yield from check_shapes(self.numerator, self.denominator)
 
     @property
-    def numerator_matrix(self) -> PolynomialMatrix:
+    def numerator_matrix(self) -> fields.PolynomialMatrix:
         """The numerators as rows (outputs) of columns (inputs)."""
         return as_matrix(self.numerator)
 
     @property
-    def denominator_matrix(self) -> PolynomialMatrix:
+    def denominator_matrix(self) -> fields.PolynomialMatrix:
         """The denominators in the same form, factors multiplied out."""
         return denominators_of(self.numerator, self.denominator)
 
@@ -105,32 +166,35 @@ class DiscreteMatrix(TransferMatrix, family="transfer", phrase="a transfer matri
 
     kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
 
-    numerator: RowsMatrix = Field(description="Rows of columns of coefficients.")
-    denominator: ContinuousDenominator = Field(
+    numerator: fields.RowsMatrix = Field(description="Rows of columns of coefficients.")
+    denominator: fields.ContinuousDenominator = Field(
         default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
     )
 
 
-def check_each_proper(above: TermMatrix, below: PolynomialMatrix, levels: int) -> Iterator[PathDiagnostic]:
+def check_each_proper(
+    above: TermMatrix, below: fields.PolynomialMatrix, levels: int, *path: str
+) -> Iterator[PathDiagnostic]:
     """Every entry of a matrix in s is proper; `levels` is the nesting of its numerator as written."""
     for i, row in enumerate(above):
         for j, entry in enumerate(row):
             where = (i, j) if levels == 3 else ()
-            yield from check_proper(entry, len(below[i][j]) - 1, "numerator", *where)
+            yield from check_proper(entry, len(below[i][j]) - 1, *path, *where)
 
 
 class ContinuousTarget(TransferMatrix):
     """A stable transfer matrix in s that is written as one, coefficients in descending powers."""
 
-    numerator: RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
+    numerator: fields.RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Numerator and denominator have one shape, the poles lie on the left, every entry is proper."""
         if shapes := list(super().check()):
             yield from shapes
             return
-        yield from check_each(self.denominator, check_left_half_plane, "denominator")
-        yield from check_each_proper(expressed(self.numerator_matrix), self.denominator_matrix, 3)
+        yield from check_each(self.denominator, fields.check_left_half_plane, "denominator")
+        above = expressed(self.numerator_matrix)
+        yield from check_each_proper(above, self.denominator_matrix, 3, "numerator")
 
 
 class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):
@@ -149,7 +213,7 @@ def transfer_kind(value: dict[str, Plain]) -> str:
 
 def _target_kind(value: dict[str, Plain]) -> str:
     inside = value.get("continuous", value)
-    if depth(inside.get("numerator") if isinstance(inside, dict) else None) < 2:
+    if fields.depth(inside.get("numerator") if isinstance(inside, dict) else None) < 2:
         return transfer_kind(value)
     return ContinuousMatrixTransfer.phrase if "continuous" in value else DiscreteMatrix.phrase
 
@@ -180,6 +244,6 @@ def check_stable(transfer: Target, *path: str) -> Iterator[PathDiagnostic]:
     """The poles of the transfer function at `path` are stable; a matrix in s has its own check."""
     if transfer.kind == "continuous":
         inside = (*path, "continuous", "denominator")
-        yield from check_each(transfer.continuous.denominator, check_left_half_plane, *inside)
+        yield from check_each(transfer.continuous.denominator, fields.check_left_half_plane, *inside)
     elif transfer.kind != "continuous_matrix":
-        yield from check_each(transfer.denominator, check_delay_stable, *path, "denominator")
+        yield from check_each(transfer.denominator, fields.check_delay_stable, *path, "denominator")

@@ -7,18 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
+from inputdesign_cli.specification.models import fields
 from inputdesign_cli.specification.models.experiment import InformationSource, Values, check_names
-from inputdesign_cli.specification.models.fields import (
-    Count,
-    CovarianceMatrix,
-    FileOr,
-    Fraction,
-    Index,
-    Names,
-    NonNegative,
-    Number,
-    Several,
-)
 from inputdesign_cli.specification.models.section import (
     PathDiagnostic,
     Section,
@@ -43,21 +33,23 @@ def _rising(ends: tuple[float, float]) -> tuple[float, float]:
 
 
 Intervals = Annotated[
-    Mapping[str, Annotated[tuple[Number, Number], AfterValidator(_rising), Wording("two numbers")]],
+    Mapping[
+        str, Annotated[tuple[fields.Number, fields.Number], AfterValidator(_rising), Wording("two numbers")]
+    ],
     Field(min_length=1),
     Wording("a mapping", "write parameter names and intervals: {K: [1.5, 2.7]}"),
 ]
 Scenarios = Annotated[
-    Annotated[Count, SIZES["uncertainty.scenarios"], tag("number")]
-    | Annotated[Several[Values], SIZES["uncertainty.scenarios"], tag("list")],
+    Annotated[fields.Count, SIZES["uncertainty.scenarios"], tag("number")]
+    | Annotated[fields.Several[Values], SIZES["uncertainty.scenarios"], tag("list")],
     by_tag(lambda value: "list" if isinstance(value, list | tuple) else "number"),
 ]
 
 
-class Uncertainty(Section):
+class Uncertainty(Section, not_both=(SOURCES,)):
     """How well the plant is known, and how the design takes this into account."""
 
-    covariance: FileOr[CovarianceMatrix] | None = optional(
+    covariance: fields.FileOr[fields.CovarianceMatrix] | None = optional(
         "Covariance of the parameters around the nominal ones: a matrix, or a model that "
         "identify wrote (.yaml)."
     )
@@ -68,25 +60,25 @@ class Uncertainty(Section):
     intervals: Intervals | None = optional(
         "Parameters drawn evenly from intervals: {K: [1.5, 2.7]}; others are known."
     )
-    parameters: Names | None = optional(
+    parameters: fields.Names | None = optional(
         "Names that order the rows of the matrix (default: the order of the model)."
     )
     scenarios: Scenarios | None = optional(
         "How many plants are drawn (default: 100, or what risk needs), or the plants one by one: "
         "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are nominal."
     )
-    risk: Fraction | None = optional(
+    risk: fields.Fraction | None = optional(
         "Share of plants that may be left out, with confidence 0.999: as many are drawn as it takes."
     )
-    discard: Annotated[NonNegative, Field(lt=0.5)] = Field(
+    discard: Annotated[fields.NonNegative, Field(lt=0.5)] = Field(
         default=0.0, description="Share of the drawn plants that the design may leave out, the dearest."
     )
-    worst_case: Fraction | None = optional(
+    worst_case: fields.Fraction | None = optional(
         "Confidence of the ellipsoid (of intervals: all of them) in which the worst plant is "
         "searched and added to the scenarios, until none is found that misses the accuracy. Never proved."
     )
-    seed: Index = Field(default=1, description="Seed of the draws.")
-    stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = optional(
+    seed: fields.Index = Field(default=1, description="Seed of the draws.")
+    stable_within: Annotated[fields.NonNegative, Field(gt=0, le=1)] | None = optional(
         "Plants with a pole (in closed loop: of the loop), or a zero of their noise model, "
         "beyond this radius are not drawn (default: 0.998, or halfway from the nominal ones to one)."
     )
@@ -94,14 +86,14 @@ class Uncertainty(Section):
         default="own",
         description="The admissible error of every plant: its own, or that of the nominal plant.",
     )
-    floor: Annotated[NonNegative, Field(lt=1)] = Field(
+    floor: Annotated[fields.NonNegative, Field(lt=1)] = Field(
         default=0.1, description="Least admissible error of a plant, as a share of that of the nominal plant."
     )
     cost: Literal["nominal", "mean", "worst"] | None = optional(
         "The powers that are paid for: of the nominal plant, their mean over all (default in "
         "closed loop), or of the plant where they cost most."
     )
-    fresh: Annotated[Index, SIZES["uncertainty.fresh"]] = Field(
+    fresh: Annotated[fields.Index, SIZES["uncertainty.fresh"]] = Field(
         default=3000, description="Plants drawn afresh that the finished design is tried on."
     )
 
@@ -116,7 +108,6 @@ class Uncertainty(Section):
             hint = "add one of them, or list the plants: scenarios: [{b1: 3.2}, {b1: 4.0}]"
             keys = (*SOURCES, "scenarios")
             yield PathDiagnostic("missing-key", "{key} does not say how the plant may vary", hint, keys=keys)
-        yield from self.at_most_one(*SOURCES)
         if not listed:
             yield from self.at_most_one("scenarios", "risk")
         for other in self.stated("worst_case", "risk") if self.discard else ():

@@ -24,9 +24,8 @@ def read_text(path: str | os.PathLike[str]) -> str:
     try:
         # The path may hold what the operating system cannot even name (a NUL): that is a ValueError.
         if Path(name).is_dir():
-            inside = sorted(p.name for p in Path(name).glob("*.y*ml"))[:3]
-            hint = f"it holds {', '.join(inside)}" if inside else "name the YAML file itself"
-            raise _error("file-unreadable", f"{name} is a folder, not a spec file", name, hint)
+            what = f"{name} is a folder, not a spec file"
+            raise _error("file-unreadable", what, name, "name the YAML file itself")
         raw = read_regular(name, MAX_BYTES + 1)
     except FileNotFoundError:
         raise _error("file-missing", f"there is no file {name}", name, _nearby(Path(name))) from None
@@ -91,8 +90,7 @@ def _nearby(path: Path) -> str:
     same_stem = [n for n in names if Path(n).stem == path.name or n.startswith(path.name + ".")]
     if near or same_stem:
         return f'did you mean "{folder / (near or same_stem)[0]}"?'
-    specs = [n for n in names if n.endswith((".yaml", ".yml"))][:4]
-    return f"the folder holds {', '.join(specs)}" if specs else "`idesign init` writes a spec to start from"
+    return "`idesign init` writes a spec to start from"
 
 
 def _error(code: str, message: str, file: str, hint: str) -> SpecError:

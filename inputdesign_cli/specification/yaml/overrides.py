@@ -39,20 +39,15 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
             location = tree.places.location(tree.places.mark(path, at_key=True))
             raise SpecError(outside(name, confine, format_key(path), location))
         included = _read(tree, path, folder, name)
-        what = ""
-        if not isinstance(included.data, dict):
-            what = "holds no blocks"
-        elif KEY in included.data:
-            what = "includes others itself"
-        elif not known & included.data.keys():
-            what = "holds no block of a spec"
-        if what:
+        found = included.data if isinstance(included.data, dict) else {}
+        if KEY in found or not known & found.keys():
+            what = "includes others itself" if KEY in found else "holds no blocks of a spec"
             raise _refused(tree, path, f"{name} {what}", "name a file with plant: and noise:")
         tree.included.append(name)
         tree.places.sources.append(included.places.sources[0])
         tree.diagnostics.extend(included.diagnostics)
         tree.broken |= included.broken
-        for key, value in included.data.items():
+        for key, value in found.items():
             _join(tree, included, (key,), value)
     tree.places.forget((KEY,))
 
@@ -60,19 +55,16 @@ def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], conf
 def _read(tree: Tree, path: Path, folder: FilePath, name: str) -> Tree:
     file = folder / name
     try:
-        text = read_text(file)
+        return read(read_text(file), str(file), source=len(tree.places.sources))
     except SpecError as error:
         found = error.diagnostics[0]
-        message = f"{name} is not UTF-8" if found.code == "file-encoding" else found.message
-        raise _refused(tree, path, message, found.hint) from error
-    try:
-        return read(text, str(file), source=len(tree.places.sources))
-    except SpecError as error:
-        if not is_outside(file, folder):
-            raise
-        place = error.diagnostics[0].location
-        line = f", line {place.line}," if place else ""
-        raise _refused(tree, path, f"{name}{line} is not YAML of a spec", "name a file of blocks") from error
+        if found.code.startswith("file-") and found.code != "file-encoding":
+            raise _refused(tree, path, found.message, found.hint) from error
+        if found.code == "file-encoding" or is_outside(file, folder):
+            line = f", line {found.location.line}," if found.location else ""
+            what = f"{name}{line} is not YAML of a spec"
+            raise _refused(tree, path, what, "name a file of blocks") from error
+        raise
 
 
 def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
@@ -85,8 +77,7 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
         for inner, item in value.items():
             _join(tree, included, (*path, inner), item)
     elif not (key in _CLOCK and holder[key] == value):
-        mark = included.places.mark(path, at_key=True)
-        where = tree.places.location(mark)
+        where = tree.places.location(included.places.mark(path, at_key=True))
         place = f"{where.file}, line {where.line}" if where else "the included file"
         message = f"{{key}} stands here and in {place}"
         hint = "remove one of them: the spec and what it includes are put together"
@@ -194,8 +185,7 @@ def _resolve(data: Plain, key: str, override: str) -> Path:
         if isinstance(data, list):
             index = int(step) if str(step).isascii() and str(step).isdecimal() else len(data)
             if index >= len(data):
-                has = f"entries 0 to {len(data) - 1}" if data else "no entries"
-                message = f"{above} is a list with {has}; there is no entry {step}"
+                message = f"{above} is a list of {len(data)}, counted from 0; there is no entry {step}"
                 raise _error(override, message, f"give the whole list: --set {above}=[..]")
             found.append(index)
             data = data[index]

@@ -29,12 +29,7 @@ _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000
 _MEANINGS = (
     ("',' or ']'", "a list is not closed, or a comma is missing", 'close it with "]"'),
     ("',' or '}'", "a mapping is not closed, or a comma is missing", 'close it with "}"'),
-    (
-        "mapping values are not allowed",
-        "a colon stands where no key can begin",
-        "start the key on its own line, at the indentation of its neighbours; put a text that contains "
-        '": " in quotes',
-    ),
+    ("mapping values are not", "a colon stands where no key can begin", 'put a text with ": " in quotes'),
     ("could not (find|found) expected ':'", "a key is not followed by a colon", 'write "key: value"'),
     (
         "did not find expected key|expected <block end>|did not find expected '-' indicator",
@@ -42,32 +37,12 @@ _MEANINGS = (
         "keys of one mapping begin in the same column; so do the dashes of one list",
     ),
     ("unexpected end of stream", "a quotation mark is not closed", "close it on the same line"),
-    (
-        "undefined alias",
-        "this alias (*name) refers to no anchor (&name) above it",
-        "write the value out; put a text that begins with * in quotes",
-    ),
+    ("undefined alias", "no anchor &name stands above this alias *name", "write the value out, or quote it"),
     ("duplicate anchor", "this anchor (&name) stands above already", "choose another name for one of them"),
-    (
-        "undefined tag handle",
-        "tags (!name) are not used in a spec",
-        'remove the tag; put a text that begins with "!" in quotes',
-    ),
-    (
-        "unknown escape character",
-        "this backslash is not a known escape",
-        "use single quotes, or double the \\",
-    ),
-    (
-        "expected the node content|did not find expected node content",
-        "a value is missing or begins with a character that YAML reserves",
-        "write a value; put a text that begins with a special character in quotes",
-    ),
-    (
-        "expected <document start>",
-        "the text goes on after the end of the spec",
-        "a spec is one mapping of keys; check the indentation of this line",
-    ),
+    ("undefined tag handle", "tags (!name) are not used in a spec", "remove the tag, or quote the text"),
+    ("unknown escape", "this backslash is not a known escape", "use single quotes, or double the \\"),
+    ("expected the node|node content", "a value is missing", "write a value; quote special characters"),
+    ("expected <document start>", "the text goes on after the end of the spec", "check the indentation"),
 )
 
 
@@ -159,15 +134,13 @@ class _Document:
     def _spend(self, node: Plain, depth: int) -> None:
         """Count one value, and raise `yaml-limit` for too many, or one too deep."""
         self.count += 1
+        message, hint = "", "is a bracket open, or an alias inside itself?"
         if self.count > MAX_NODES:
             message = f"the spec holds more than {MAX_NODES} values"
             hint = "move large tables into a CSV file; do not let aliases repeat aliases"
-            raise self.error("yaml-limit", message, self.mark(node), hint)
-        if depth > MAX_DEPTH:
+        elif depth > MAX_DEPTH:
             message = f"lists and mappings are nested more than {MAX_DEPTH} deep"
-            hint = (
-                "no key of a spec needs more than six levels; is a bracket open, or an alias inside itself?"
-            )
+        if message:
             raise self.error("yaml-limit", message, self.mark(node), hint)
 
     def _location(self, mark: Mark) -> Location:

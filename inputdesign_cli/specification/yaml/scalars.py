@@ -90,15 +90,10 @@ def _number_hint(text: str) -> str:
         return f"write it without underscores: {text.replace('_', '')}"
     if text.count(",") == 1 and NUMBER.fullmatch(text.replace(",", ".")):
         return f"use a decimal point: {text.replace(',', '.')}"
-    if re.fullmatch(r"[-+]?0x[0-9a-fA-F]+", text):
-        return f"write it in decimal: {int(text, 16)}"
-    if re.fullmatch(r"[-+]?0o[0-7]+", text):
-        return f"write it in decimal: {int(text, 8)}"
     if text.lower() == "pi":
         return "write 3.141592653589793"
-    if re.fullmatch(r"[-+]?[0-9.]+ */ *[0-9.]+", text):
-        return "fractions are not computed; write the decimal number"
-    return ""
+    computed = re.fullmatch(r"[-+]?(0x[0-9a-fA-F]+|0o[0-7]+|[0-9.]+ */ *[0-9.]+)", text)
+    return "nothing is computed here: write the decimal number" if computed else ""
 
 
 def _vanished(word: str, value: float) -> bool:

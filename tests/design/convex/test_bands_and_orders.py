@@ -38,6 +38,7 @@ def solved(model, band, order, criterion, *, hermitian=False):
     return problem, exchange(problem, power * problem.basis.even, tolerance=1e-7)
 
 
+@pytest.mark.slow
 def test_order_40_is_proved_and_no_worse_than_order_13():
     _, low = solved(two_by_two(), (0.0, 2.0), 13, "E")
     problem, high = solved(two_by_two(), (0.0, 2.0), 40, "E")

@@ -31,6 +31,7 @@ from tests.support.convex_designs import (
 from tests.support.on_grid import OnGrid
 
 
+@pytest.mark.first(1)
 @pytest.mark.parametrize("case", ["first_order", "flexible"])
 def test_goals_are_inverse_to_each_other(case, request):
     """With the least power as the limit, the best factor is one and the shortest experiment has N samples."""

@@ -10,6 +10,7 @@ from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.questions.task import build_task
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
 def test_sixteen_parameters(seed):
     """An output-error plant of order 8; the face once shrank to what the last round used, and cycled."""

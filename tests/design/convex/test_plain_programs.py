@@ -47,6 +47,7 @@ def test_criteria_agree_with_a_plain_program(letter):
     assert ours.value(1 / design.result.objective) == pytest.approx(plain, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_capped_least_cost_agrees_with_a_plain_program():
     """A cost that pulls one way and a limit that pulls the other: input cost under a cap on the output."""
     experiment, kind, order = resonant(), "output", 10

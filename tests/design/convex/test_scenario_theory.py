@@ -38,6 +38,7 @@ def test_nothing_is_said_by_too_few():
     assert risks == sorted(risks)
 
 
+@pytest.mark.slow
 def test_random_programs_keep_the_risk():
     """min c x subject to a x >= 1 for a on the unit circle's upper right: the violation is known exactly."""
     rng = np.random.default_rng(1)

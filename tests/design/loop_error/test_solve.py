@@ -84,6 +84,7 @@ def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed(spec):
     assert result["objective"]["relative_gap"] < 1e-10
 
 
+@pytest.mark.first(2)
 @pytest.mark.parametrize(
     ("overrides", "kind"),
     [

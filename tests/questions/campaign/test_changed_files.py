@@ -27,6 +27,7 @@ EDITS = {
 }
 
 
+@pytest.mark.first(9)
 @pytest.mark.parametrize("name", EDITS)
 def test_what_was_edited_by_hand_is_told(name, run, once, tmp_path):
     result = json.loads((once / "result.json").read_text())

@@ -146,7 +146,7 @@ def test_exchanged_channels_are_named(run, begin, tmp_path):
     assert run("next", "c", record, "--columns", columns, "--no-figures")[0] == 0
 
 
-@pytest.mark.first(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "order", "told", "right"),
     [

@@ -31,6 +31,7 @@ def until_it_ends(run, directory, folder, *options, most=12):
     return code, json.loads(out)
 
 
+@pytest.mark.slow
 def test_a_structure_that_is_refuted_ends_the_campaign(run, begun, tmp_path):
     code, result = until_it_ends(run, begun, tmp_path)
     assert code == 5

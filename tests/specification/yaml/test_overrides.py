@@ -60,7 +60,7 @@ def test_places_point_at_the_override():
         ("spectrum.ordr=3", "unknown-key", 1, "x"),
         ("expriment.samples=3", "unknown-key", 1, 'did you mean "experiment"'),
         ("sample_time=0", "out-of-range", 13, "greater than 0"),
-        ("plant.B.2=1", "bad-override", 1, "entries 0 to 1"),
+        ("plant.B.2=1", "bad-override", 1, "list of 2"),
         ("plant.B.x=1", "bad-override", 1, "no entry x"),
         ("plant.B.-1=1", "bad-override", 1, "no entry -1"),
         ("noise.variance.x=1", "bad-override", 1, "single value"),

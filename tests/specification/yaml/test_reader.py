@@ -195,7 +195,7 @@ def test_files_that_cannot_be_read(tmp_path):
         assert diagnostic.location.file == os.fspath(path)
         return diagnostic.code, diagnostic.hint
 
-    assert code_and_hint(tmp_path) == ("file-unreadable", "it holds first_order.yaml")
+    assert code_and_hint(tmp_path) == ("file-unreadable", "name the YAML file itself")
     code, hint = code_and_hint(tmp_path / "frist_order.yaml")
     assert code == "file-missing"
     assert hint == f'did you mean "{tmp_path / "first_order.yaml"}"?'

@@ -1,0 +1,153 @@
+"""The road of a designed and of a given spectrum: a record with what it relies on, and its trial."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
+from inputdesign_cli.arrays import Array
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.finding import Finding
+from inputdesign_cli.findings.designed_records import start_matters
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.monte_carlo.excitations import Excitation
+from inputdesign_cli.outcome import Signal
+from inputdesign_cli.outcome.results import Results
+from inputdesign_cli.outcome.units import Header
+from inputdesign_cli.questions.common.bound import Informed, Pairs
+from inputdesign_cli.questions.common.delivery import Delivered, adding
+from inputdesign_cli.questions.common.foresight import Foresight
+from inputdesign_cli.questions.common.record import RecordRequest, worst_ratio
+from inputdesign_cli.questions.common.signal_outcome import with_record
+from inputdesign_cli.questions.common.simulation import Simulation, simulate
+from inputdesign_cli.signal.selection import Record
+
+# Errors that grow by less than this, relative, where the start is unknown are not mentioned.
+_MATTERS = 0.2
+# A start that has faded to one per cent no longer counts.
+_FADED = float(np.log(100.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumTask(ABC):
+    """A question about the spectrum of an experiment, with its record and its trial.
+
+    Attributes:
+        unstated: errors of the entries of G that have r_u if no requirement bounds it.
+        ellipses: pairs of parameters; None for a choice of them.
+    """
+
+    header: Header
+    record: RecordRequest
+    unstated: Sequence[ModelError]
+    ellipses: Pairs | None
+    simulation: Simulation
+    foresight: Foresight | None
+
+    @abstractmethod
+    def delivered(self) -> Delivered:
+        """Return the answer, with what a trial takes from it."""
+
+    def solve(self) -> Results:
+        """Return the answer with its signal and its curves."""
+        return self.delivered().results
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """Return this with the experiment tried many times on the true system; see `common.simulation`."""
+        delivered = self.delivered()
+        if delivered.record is None:
+            seconds_left()  # or else its time is the reason
+        return simulate(self.simulation, delivered, executor)
+
+    def errors(self, experiment: Experiment, asked: Sequence[Requirement]) -> tuple[list[OnModelError], bool]:
+        """Return the errors that are asked about, or else those of every entry of G; and which they are."""
+        stated = model_errors(asked)
+        return stated or [replace(error, experiment=experiment) for error in self.unstated], bool(stated)
+
+    def applied(
+        self,
+        results: Results,
+        experiment: Experiment,
+        record: Record,
+        signal: Signal,
+        requirements: Sequence[Requirement],
+        findings: Iterable[Finding],
+    ) -> Results:
+        """Return the results with a record, what an unknown start changes, and the minima that data leave.
+
+        A design is of spectra, which have no start; the record may live on its start from rest.
+        """
+        samples, step, found = record.samples, self.record.step, list(findings)
+        if np.isfinite(record.worst_ratio):
+            growth = growth_by_start(experiment, samples, step, requirements)
+            if growth > 1.0 + _MATTERS:
+                known = growth if np.isfinite(growth) else None
+                signal = replace(signal, details={**signal.details, "begun_anywhere": known})
+                found.append(start_matters(growth))
+        results = with_record(results, self.record, self.header.units, experiment, record, signal)
+        results = adding(results, results.outcome, found)
+        if self.foresight is None:
+            return results
+        foreseen = self.foresight.foreseen(samples, requirements)
+        return adding(results, replace(results.outcome, foreseen=foreseen.entry), foreseen.findings)
+
+    def to_be_tried(
+        self,
+        results: Results,
+        record: Array,
+        renewed: Excitation | None,
+        alpha: float,
+        informed: Informed,
+        experiment: Experiment,
+        requirements: Sequence[Requirement],
+        *,
+        flat: bool = True,
+    ) -> Delivered:
+        """Return what a trial of a record (n, r) takes; the curves are those of the information."""
+        of_length = partial(informed.of_length, experiment, self.ellipses, flat=flat)
+        search = None if self.foresight is None else partial(self.foresight.tried, record, requirements)
+        return Delivered(results, record, renewed, alpha, of_length, search)
+
+
+def growth_by_start(
+    experiment: Experiment, record: Array, step: float, requirements: Sequence[Requirement]
+) -> float:
+    """Return how many times as large errors are if the start of a record (n, r) and its levels are unknown.
+
+    Infinite if one has no bound. What samples after the start has faded show, about their means, decides
+    where it is enough.
+
+    Args:
+        step: time between samples in the unit of the experiment's frequencies.
+    """
+    plant, error = FiniteRecord(experiment, len(record), step), worst_ratio(requirements)
+    try:
+        at_rest = error(plant.information(record))
+    except np.linalg.LinAlgError:
+        return np.inf
+    if at_rest <= 0.0:
+        return 1.0
+    unit = step if experiment.model.continuous else 1.0
+    damping = max(float(np.min(experiment.singularities.imag, initial=1.0)), 1e-9)
+    psi = plant.gradient(record)[int((_FADED / damping + experiment.memory) / unit) + 1 :]
+    with suppress(np.linalg.LinAlgError):  # too few samples are left
+        moved = psi - psi.mean(axis=0) if len(psi) else np.zeros_like(psi)
+        late = moved.swapaxes(0, 1).reshape(experiment.size, -1)
+        bound = error(plant.known + late @ late.T) / at_rest
+        if bound <= 1.0 + _MATTERS:
+            return bound
+    from inputdesign_cli.identification import information_begun_anywhere
+
+    u, y = plant.signals("input", record), plant.signals("output", record)
+    anywhere = information_begun_anywhere(experiment.model, u, y, step)
+    try:
+        return error(plant.known + experiment.whiten_matrix(anywhere)) / at_rest
+    except np.linalg.LinAlgError:
+        return np.inf
