@@ -210,7 +210,7 @@ class FlipSearch:
         *,
         enough: float,
         over: Callable[[], bool],
-        most_kicks: int = 200,
+        changes: int = 40,
     ) -> tuple[Array, float]:
         """Return the best record (samples, r) and its ratio.
 
@@ -218,6 +218,7 @@ class FlipSearch:
             starts: values (n, r), each improved on its own; the best is improved on.
             enough: ends the search once a ratio is as small.
             over: says when time is over; it is looked at between changes.
+            changes: the number of random changes of the best record that are tried at last.
         """
         best: _Point | None = None
         for start in starts:
@@ -227,7 +228,7 @@ class FlipSearch:
             if over() or best.ratio <= enough:
                 break
         assert best is not None
-        for _ in range(most_kicks):
+        for _ in range(changes):
             if over() or best.ratio <= enough:
                 break
             point = self._descended(self._at(self._kicked(best.values, rng)), over, enough)

@@ -18,6 +18,7 @@ from inputdesign_cli.finding import Finding
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.outcome.units import Units
+from inputdesign_cli.questions.common.searched_record import improved, searches
 from inputdesign_cli.signal.evaluation import MET, Target
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.limits import Bounds, limited_responses, peak_share
@@ -167,9 +168,32 @@ def make_record(
         beyond = _worst_few({n: _power_share(others[n], upper, record) for n in left if n not in missed}, MET)
         higher = beyond_peaks(record.samples, [n for n in others if n not in limiting])
         if not (missed or beyond or higher):
-            return record
+            return _searched(request, design, record, {n: others[n] for n in numbers}, scores, upper)
         numbers += [*missed, *beyond]
         limiting += higher
+
+
+def _searched(
+    request: RecordRequest,
+    design: Design,
+    record: Record,
+    plants: Mapping[int, FiniteRecord],
+    scores: Sequence[Callable[[Array], float]],
+    upper: Sequence[tuple[PowerKind, int | None, float]],
+) -> Record:
+    """Return a better record of two levels, where only the amplitude limits them and accuracy is the goal."""
+    bounds = request.bounds
+    alone = bounds.rate is None and bounds.output is None and not bounds.quantisers
+    if not searches(design, request.settings, amplitude_alone=alone):
+        return record
+
+    def score(samples: Array) -> float:
+        tried = replace(record, samples=samples)
+        if any(_power_share(plant, upper, tried) > MET for plant in plants.values()):
+            return np.inf
+        return max(ratio_at(plant, scores[n], samples) for n, plant in plants.items())
+
+    return improved(design, record, request.settings, plants, score)
 
 
 def _target(

@@ -32,6 +32,7 @@ from inputdesign_cli.questions.common.bound import Informed, equal_white
 from inputdesign_cli.questions.common.confidence import covered
 from inputdesign_cli.questions.common.delivery import Delivered, adding, results_of
 from inputdesign_cli.questions.common.record import Made, designed_spectrum, peak_at, redrawn, worst_ratio
+from inputdesign_cli.questions.common.searched_record import distance_to_best
 from inputdesign_cli.questions.common.signal_outcome import signal_of
 from inputdesign_cli.questions.common.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.questions.common.task import SpectrumTask
@@ -205,7 +206,9 @@ class ConvexTask(SpectrumTask):
             *length_of_record(record, asked, block, shares),
         ]
         if known is not None:
-            if problem.goal == "factor" and problem.demands.criterion is None:
+            # The distance to the best record says more, where it is known.
+            spectral = problem.goal == "factor" and problem.demands.criterion is None
+            if spectral and signal.distance_to_best is None:
                 designed = float(np.sqrt(done.design.result.objective))
                 findings += less_accurate(record.worst_ratio, designed)
             names = list(dict.fromkeys(requirement.name for requirement in problem.side))
@@ -225,6 +228,8 @@ class ConvexTask(SpectrumTask):
         )
         if exact is not None and known is not None:
             signal = replace(signal, confidence=covered(exact.of_record(done, record, known)))
+        if known is not None and design is done.design:
+            signal = replace(signal, distance_to_best=distance_to_best(done.design, known))
         if made.input_power is None:
             return signal
         return replace(signal, spectrum_of={"input_power": made.input_power})
